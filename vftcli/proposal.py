@@ -14,7 +14,6 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import Models
 from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
@@ -180,6 +179,12 @@ def free_part(
         yield ProposedOption(f"{remark}{own}")
 
 
+ONE_CYCLE = (
+    "the log holds one whole cycle, which has to be free of contact: say so with free-cycles"
+)
+"""Why a difference of cycles may tell nothing."""
+
+
 def references(
     recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
 ) -> Iterator[ProposedOption]:
@@ -190,7 +195,8 @@ def references(
         asked = replace(plain, reference=ReferenceChoice(name=name))
         try:
             motion = analyse(recording, robot, asked, models).motion
-            doubt = "" if name != "two-cycle" else doubt_of(motion)
+            given = name != "two-cycle" or motion.choice.is_given
+            doubt = "" if given or motion.cycles.whole > 1 else ONE_CYCLE
         except MissingSignalError:
             continue
         except VftError as error:
@@ -209,13 +215,6 @@ def reasons(recording: Recording) -> dict[str, str]:
     del others["sensor"]
     told = "the log holds a wrench of its controller: an estimate as well where no sensor is"
     return {"two-cycle": others.pop("two-cycle"), "sensor": told, **others}
-
-
-def doubt_of(motion: FreeMotion) -> str:
-    """Why a difference of cycles may tell nothing, "" where it does."""
-    if motion.choice.is_given or motion.cycles.whole > 1:
-        return ""
-    return "the log holds one whole cycle, which has to be free of contact: say so with free-cycles"
 
 
 HEADING = """\

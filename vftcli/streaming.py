@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import LongLog, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.steady_filter import PIECE
 
 
@@ -63,7 +64,7 @@ class BlockAnalysis:
         waiting: deque[Recording] = deque()
         ready: list[deque[ExternalTorque]] = [deque() for _ in runs]
         masked, least, done = [], np.inf, 0
-        for block in long_blocks(long):
+        for block in chain(long.blocks(PIECE), (None,)):  # None behind the last
             if block is not None:
                 waiting.append(block)
                 block_terms = terms.next(block)
@@ -109,9 +110,3 @@ class BlockAnalysis:
             told = (*sensed.remarks, *poses, *unknown_error().remarks)
             sensed = replace(sensed, masked=hidden, remarks=told)
         self.made = replace(self.made, estimates=tuple(last), virtual_sensor=sensed)
-
-
-def long_blocks(long: LongLog) -> Iterator[Recording | None]:
-    """The blocks of a log as observers take them, and None behind the last."""
-    yield from long.blocks(PIECE)
-    yield None

@@ -3,9 +3,7 @@
 import numpy as np
 
 from vftcli.contacts.model_error import (
-    PUSHED_SHARE,
     SPIKE,
-    STOP_SHARE,
     UNKNOWN,
     ErrorCourse,
     ErrorNoise,
@@ -15,6 +13,7 @@ from vftcli.contacts.model_error import (
     without_reversals,
 )
 from vftcli.robots.disturbance import Blocks
+from vftcli.robots.friction import PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask
 
 B = 0.024

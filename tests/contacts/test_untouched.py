@@ -10,7 +10,6 @@ from vftcli.contacts.sizes import START
 from vftcli.contacts.untouched import (
     BLOCK,
     DRY_SHARE,
-    RESTING_SHARE,
     block_length,
     expected_torque,
     free_part,
@@ -24,10 +23,10 @@ from vftcli.readers import read
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 
@@ -100,7 +99,7 @@ def test_resting_joints_are_given_their_stiction() -> None:
     speed = np.abs(LOG.require("dq"))
     far = np.convolve(speed[:, 0] < 0.01, np.ones(101), "same") == 0
     np.testing.assert_allclose(sd[far, 0], DRY_SHARE * dry[0])
-    assert np.all(sd[speed < 0.01] >= np.tile(RESTING_SHARE * dry, (len(speed), 1))[speed < 0.01])
+    assert np.all(sd[speed < 0.01] >= np.tile(NEAR_REST_SHARE * dry, (len(speed), 1))[speed < 0.01])
 
 
 def test_contacts_that_are_none_read_little() -> None:

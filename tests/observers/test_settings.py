@@ -13,10 +13,9 @@ from vftcli.observers import (
     MomentumObserver,
     Setup,
     build_observers,
-    observer_settings,
 )
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.settings import load_gains, overlay_gains
+from vftcli.observers.settings import load_gains, overlay_gains, parse_settings
 from vftcli.observers.table import sections
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import ParameterError
@@ -24,7 +23,7 @@ from vftcli.signals.errors import ParameterError
 
 def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -> Setup:
     gains = load_robot(robot).gains if robot else {}
-    settings = observer_settings(assignments)
+    settings = parse_settings(assignments, sections())
     return Setup(gains=gains, settings=settings, joints=joints, step=step, as_printed=False)
 
 
@@ -123,7 +122,7 @@ MALFORMED = {
 @pytest.mark.parametrize("assignment", MALFORMED)
 def test_a_malformed_assignment_says_what_is_wrong(assignment: str) -> None:
     with pytest.raises(ParameterError, match=MALFORMED[assignment]):
-        observer_settings([assignment])
+        parse_settings([assignment], sections())
 
 
 def test_another_number_of_gains_is_refused() -> None:

@@ -130,8 +130,10 @@ def test_dry_friction_of_every_model() -> None:
 
 
 def test_dry_friction_grows_with_the_load_either_way() -> None:
-    values = {"coulomb": 3.0, "load_coulomb": 0.1}
-    np.testing.assert_allclose(dry_torque(values, np.array([-20.0, 0.0, 20.0])), [5.0, 3.0, 5.0])
+    joint = JointFriction(
+        model="coulomb-viscous-load", parameters={"coulomb": 3.0, "load_coulomb": 0.1}
+    )
+    np.testing.assert_allclose(dry_torque(joint, np.array([-20.0, 0.0, 20.0])), [5.0, 3.0, 5.0])
 
 
 SIZE = st.floats(0.01, 50.0)

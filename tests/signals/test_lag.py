@@ -9,7 +9,6 @@ from vftcli.signals.lag import (
     LEAD,
     LONGEST,
     lag_fit,
-    lags,
     lags_of_each,
     parabola,
     peak,
@@ -39,7 +38,7 @@ def test_lags_and_offsets_have_one_sign(lag: float) -> None:
     t = np.arange(0, 12, 0.01)
     late, early = waves(t - lag), waves(t)
     # the ends, which do not overlap, pull a sine's peak by up to a fifth of the 10 ms step
-    np.testing.assert_allclose(lags(late, early, 0.01), lag, atol=2e-3)
+    np.testing.assert_allclose(lags_of_each([late], early, 0.01)[0], lag, atol=2e-3)
     assert time_offset(t, late, early).lag == pytest.approx(lag, abs=2e-3)
     samples = lag_fit(late, early, 0.3).closest
     assert 0.01 * samples == pytest.approx(lag, abs=0.005)  # half a step
@@ -89,7 +88,7 @@ def test_the_offset_is_that_of_the_best_normalised_correlation(seed: int) -> Non
 def test_nothing_fits_noise() -> None:
     noise = np.random.default_rng(0).standard_normal((2000, 1))
     flat = np.zeros((2000, 1))
-    assert np.isnan(lags(noise, flat, 0.01)[0])
+    assert np.isnan(lags_of_each([noise], flat, 0.01)[0, 0])
 
 
 @given(st.floats(-0.5, 0.5), st.floats(0.1, 10.0))
@@ -100,7 +99,7 @@ def test_the_parabola_s_peak(at: float, height: float) -> None:
 
 
 def whole_lags(late: np.ndarray, early: np.ndarray, step: float) -> np.ndarray:
-    """As `lags`, by plain sums over all samples at every lag."""
+    """As `lags_of_each`, by plain sums over all samples at every lag."""
     count, found = len(late), []
     first = -min(round(LEAD / step), count // 4)
     last = max(1, min(round(LONGEST / step), count // 4))

@@ -240,7 +240,9 @@ def run_closed_loop(
         if k % every_control == 0:
             log.append(act(loop, zero))
             forward = arm.servo.feed_forward(loop.reference)[0]
-            if has_run_away(loop):
+            x, fastest = loop.law.x[0], np.max(np.abs(loop.arm.v))
+            near = np.all(np.isfinite(x)) and np.linalg.norm(x[:3]) <= FARTHEST
+            if not near or fastest > 50.0:  # the arm has run away
                 break
             if progress is not None:
                 progress(k, arm.steps)
@@ -287,13 +289,6 @@ def act(loop: Loop, zero: tuple[float, float] | None) -> Row:
     wrench = loop.rest(counts=zero is not None and t >= zero[0]) if waits else loop.control()
     commanded, q = loop.law.x[0].copy(), loop.arm.q.copy()
     return Row(t, wrench, loop.dragged.copy(), commanded, q, loop.reached)
-
-
-def has_run_away(loop: Loop) -> bool:
-    """Whether the arm has left everything behind."""
-    x = loop.law.x[0]
-    fast = np.max(np.abs(loop.arm.v)) > 50.0
-    return bool(not np.all(np.isfinite(x)) or np.linalg.norm(x[:3]) > FARTHEST or fast)
 
 
 def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | None) -> ClosedLoop:

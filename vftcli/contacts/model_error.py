@@ -13,9 +13,21 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.disturbance import Blocks
+from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.smoother.noise import LEAST_NOISE, TIE, fit_joints, resting, steps
+from vftcli.virtual_sensor.smoother.noise import (
+    LEAST_NOISE,
+    PUSHED_TIME,
+    REST_TIME,
+    SEEN,
+    TIE,
+    UNSEEN_SHARE,
+    UNSEEN_TIME,
+    fit_joints,
+    resting,
+    steps,
+)
 
 LEAST_STRETCH = 20
 """Fewest blocks in a row that a spectrum is learned from."""
@@ -34,15 +46,8 @@ QUIET, QUIET_SD = 0.6, 0.8416
 """Where nothing was learned the quietest 60 % of the blocks in which a joint moves count as
 free; 60 % of a normal variable lie within so many standard deviations."""
 
-UNSEEN, UNSEEN_SHARE, UNSEEN_TIME = 0.2, 0.2, 1.0
-"""A joint that moves in less than this share of the free part errs by so much of F_c beyond what
-was learned, for at least so long [s]."""
-
-REST_SHARE, REST_TIME = 0.3, 2.0
-"""A resting joint errs by so much of F_c beyond what was learned, for at least so long [s]."""
-
-STOP_SHARE, STOP_DECAY = 0.7, float(np.exp(-5.0))
-"""The block in which a joint comes to rest draws b anew: so much of F_c, and this share left."""
+STOP_DECAY = float(np.exp(-5.0))
+"""The block in which a joint comes to rest draws b anew: this share is left of what it was."""
 
 RECENT = 0.1
 """What a joint has just done: it stops if it moved for more than half of this time before, and for
@@ -50,9 +55,6 @@ this time after a start b changes within `START_TIME`. [s]"""
 
 START_TIME = 0.05
 """Correlation time of b while a joint breaks away. [s]"""
-
-PUSHED_SHARE, PUSHED_TIME = 0.6, 0.3
-"""A joint that rests under a contact: the push re-settles its stiction, by so much of F_c."""
 
 SPIKE = 40.0
 """Variance of a spike, in variances of the innovation."""
@@ -130,7 +132,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
         variance=variance,
         time=time,
         dry=dry,
-        seen=(share >= UNSEEN).astype(float),
+        seen=(share >= SEEN).astype(float),
         free_seconds=float(sum(piece.length.sum() for piece in pieces)),
     )
     factor = inflation(found, pieces)
@@ -155,7 +157,7 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
         np.maximum(DRY_SHARE * dry, LEAST_ERROR),
     )
     moving = log.known[:, None] & ~resting(log)
-    asked = moving.mean(axis=0) >= UNSEEN
+    asked = moving.mean(axis=0) >= SEEN
     if learned is not None:
         # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
         asked &= DRY_SHARE * dry < LEAST_ERROR
@@ -243,7 +245,7 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
     unseen = noise.seen < 0.5
     in_motion = noise.variance + unseen * (UNSEEN_SHARE * noise.dry) ** 2
     motion_time = np.where(unseen, np.maximum(noise.time, UNSEEN_TIME), noise.time)
-    variance = np.where(rests, noise.variance + (REST_SHARE * noise.dry) ** 2, in_motion)
+    variance = np.where(rests, noise.variance + (CREEP_SHARE * noise.dry) ** 2, in_motion)
     time = np.where(rests, np.maximum(noise.time, REST_TIME), motion_time)
     starts = ~rests & rested_within(rests, count)
     time = np.where(starts, np.minimum(time, START_TIME), time)

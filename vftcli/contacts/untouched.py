@@ -31,12 +31,12 @@ from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.series import median_step, runs_of
-from vftcli.virtual_sensor.smoother.noise import dry_torques
 
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 """Length of a block [s]; on a clock whose steps differ by this share it holds so many samples."""
@@ -50,8 +50,8 @@ SETTLED = 0.3
 MOVING, LEAST_MOVING = 0.01, 50
 """Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from."""
 
-NEAR_REST, RESTING_SHARE = 0.3, 0.6 / 1.96
-"""Within so long [s] of a rest a joint's torque may be this share of the dry friction F_c."""
+NEAR_REST = 0.3
+"""Within so long of a rest a joint's torque may be `NEAR_REST_SHARE` of its dry friction. [s]"""
 
 Basis = Literal["free motion", "whole log", "friction", "none"]
 """What tells a contact from an error of the model: motion that is known to be free; the samples
@@ -305,7 +305,7 @@ def expected_torque(run: ModelledRun, level: Array | None) -> Array:
     k = np.arange(recording.samples)
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, recording.samples)
     near = total[last] - total[first] > 0.0
-    return np.where(near, np.maximum(sd, RESTING_SHARE * dry), sd)
+    return np.where(near, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
 class SelfTest(NamedTuple):

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
 from vftcli.doctor.effort import RANGE, case_of, is_modelled
 from vftcli.doctor.findings import on_joints
@@ -23,7 +24,6 @@ from vftcli.doctor.fit import (
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
-from vftcli.doctor.vendor import vendor_sign
 from vftcli.doctor.windows import up_axes, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
@@ -42,6 +42,10 @@ GENERATION = 1.5
 """A load from which another generation of the arm is looked at first. [kg]"""
 MISTAKEN = 0.1
 """Misfit up to which a cause is believed where nobody said which arm it is."""
+CLEARLY = 0.6
+"""Share of what one sign leaves that the other may leave at most to be the right one."""
+FELT = 0.02
+"""Size of the vendor's torque, relative to the effort, from which it tells its sign."""
 
 
 class ArmFindings(NamedTuple):
@@ -91,7 +95,10 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
         return ArmFindings((), ())
     case = maker_case(recording, diagnosis.case.windows)
     own = match(robot.name, case or diagnosis.case, by_maker=case is not None)
-    if (own.by_maker and own.misfit > GUESSED) or is_doubtful(diagnosis):
+    heavy = diagnosis.case.carries_load and diagnosis.case.loaded.values[0] > GENERATION
+    refuted = diagnosis.cause is not None and diagnosis.cause.code != "effort-offset"
+    doubtful = diagnosis.case.misfit > DOUBTFUL or heavy or refuted
+    if (own.by_maker and own.misfit > GUESSED) or doubtful:
         others = [
             found
             for name, other in profiles().items()
@@ -113,14 +120,6 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
     else:
         robots = (own,)
     return ArmFindings(tuple(explained(recording, robot, diagnosis, robots)), robots)
-
-
-def is_doubtful(diagnosis: Diagnosis) -> bool:
-    """Whether another arm may explain a log better."""
-    case = diagnosis.case
-    heavy = case.carries_load and case.loaded.values[0] > GENERATION
-    refuted = diagnosis.cause is not None and diagnosis.cause.code != "effort-offset"
-    return bool(case.misfit > DOUBTFUL or heavy or refuted)
 
 
 def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
@@ -227,9 +226,10 @@ def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Re
         "width": recording.joints,
     }
     if cause.vertical is not None:
+        gravity = -up_axes(cause.case.windows.chain.gravity) @ cause.case.up  # base axes [m/s²]
         values |= {
             "angle_deg": float(np.rad2deg(cause.vertical.angle)),
-            "gravity": gravity_of(cause),
+            "gravity": [round(float(component), 2) for component in gravity],
         }
     if cause.code == "milliamperes" and recording.current is not None:
         values = {"typical_A": float(np.percentile(np.abs(recording.current), 99))}
@@ -246,8 +246,28 @@ def said(cause: Cause) -> str:
     return f"{cause.code} {joints}".strip()
 
 
-def gravity_of(cause: Cause) -> list[float]:
-    """The gravity vector in base axes that a log's effort says. (3,) [m/s²]"""
-    chain = cause.case.windows.chain
-    found = -up_axes(chain.gravity) @ cause.case.up
-    return [round(float(component), 2) for component in found]
+def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
+    """That the vendor's torque fits the arm's only with its sign turned.
+
+    The effort plus the torque ON the robot is what moving and holding the arm takes; with the other
+    sign the pushes stand in it twice.
+    """
+    if recording.tau_ext is None or recording.torque is None:
+        return
+    vendor = case.windows.mean(recording.tau_ext)
+    # A load that the vendor's model knows and the robot file does not is in neither of them.
+    vendor = vendor - np.median(vendor, axis=0)
+    if size_of(vendor) < FELT * case.size:
+        return
+    # What the arm leaves over in all windows, contact among them.
+    straight, turned = (
+        float(np.sqrt(np.mean(replace(case, given=given).best.rest ** 2)))
+        for given in (case.given + vendor, case.given - vendor)
+    )
+    if turned < CLEARLY * straight:
+        yield warning(
+            "vendor-sign",
+            straight_Nm=straight,
+            turned_Nm=turned,
+            width=recording.joints,
+        )

@@ -15,11 +15,11 @@ import numpy as np
 from vftcli.doctor.case import Case
 from vftcli.doctor.drives import scales
 from vftcli.doctor.effort import CLEAR, RANGE, Reading, readings
-from vftcli.doctor.gravity import TILTED, Vertical, vertical_of
 from vftcli.doctor.order import SUSPECT, crossed_rests
-from vftcli.doctor.robust import solve, terms
+from vftcli.doctor.robust import RobustFit, solve, terms
 from vftcli.doctor.windows import spread, windows_of
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
 EXPLAINED = 0.6
@@ -51,6 +51,31 @@ OFFSET = 0.1
 """Offset from which a joint's effort counts as shifted, relative to the effort."""
 FEW = 60
 """Windows by which every pair of joints is tried: each pair needs the model anew."""
+TILTED = np.deg2rad(10.0)
+"""Angle between the fitted "up" and the robot file's from which a base counts as tilted. [rad]"""
+
+
+class Vertical(NamedTuple):
+    """The direction that is up, as a log's effort says.
+
+    Attributes:
+        up: It, in axes whose third is the robot file's own; its length is 1 where the masses fit.
+            (3,)
+        solution: The fit.
+    """
+
+    up: Array
+    solution: RobustFit
+
+    @property
+    def angle(self) -> float:
+        """Angle to the robot file's "up". [rad]"""
+        return float(np.arctan2(np.linalg.norm(self.up[:2]), self.up[2]))
+
+    @property
+    def length(self) -> float:
+        """Weight that the effort carries, relative to the robot file's."""
+        return float(np.linalg.norm(self.up))
 
 
 class Cause(NamedTuple):
@@ -149,13 +174,10 @@ def chosen(case: Case, found: list[Cause]) -> Diagnosis:
         # Of most joints it is the sign of all: joints that rub or carry nothing do not show it.
         all_turned = (c for c in found if c.code == "effort-sign")
         best = next((c for c in all_turned if c.misfit < AMBIGUOUS * best.misfit), best)
+    # The sign of all says that of single joints too.
+    implied = {"effort-sign": "joint-sign"}.get(best.code)
     near = (c for c in found if c.misfit < AMBIGUOUS * best.misfit and c.code != best.code)
-    return Diagnosis(case, best, next((c for c in near if not implied(best, c)), None))
-
-
-def implied(best: Cause, other: Cause) -> bool:
-    """Whether a cause says no more than another."""
-    return best.code == "effort-sign" and other.code == "joint-sign"
+    return Diagnosis(case, best, next((c for c in near if c.code != implied), None))
 
 
 def is_accepted(case: Case, cause: Cause) -> bool:
@@ -192,16 +214,14 @@ def offset_joint(case: Case) -> Iterator[Cause]:
         offset, sd = float(fit.values[0]), float(fit.sd[0])
         if abs(offset) < max(OFFSET * case.effort_sizes[j], 4 * sd):
             continue
-        if moves_both_ways(case, j) and case.lasts(fit, offset * column[:, :, 0]):
+        direction = case.windows.motion[0, :, j]
+        forth, back = np.sum(direction > 0.8), np.sum(direction < -0.8)
+        # Without enough motion to and fro an offset may be stiction.
+        if min(forth, back) < 8 or forth + back < 30:
+            continue
+        if case.lasts(fit, offset * column[:, :, 0]):
             healed = case.with_effort(case.given - offset * column[:, :, 0])
             yield Cause("effort-offset", (j,), healed, offset=offset, sd=sd)
-
-
-def moves_both_ways(case: Case, joint: int) -> bool:
-    """Whether a joint moves enough, to and fro, that its stiction is no offset."""
-    direction = case.windows.motion[0, :, joint]
-    forth, back = np.sum(direction > 0.8), np.sum(direction < -0.8)
-    return bool(min(forth, back) >= 8 and forth + back >= 30)
 
 
 def read_otherwise(readings: Sequence[Reading]) -> Iterator[Cause]:
@@ -223,10 +243,13 @@ def turned_base(case: Case) -> Iterator[Cause]:
     """A base that is tilted or hangs."""
     if case.gravity_range < RANGE or case.misfit < UPRIGHT:
         return
-    vertical = vertical_of(case)
+    windows = case.windows
+    # No load beside gravity, for the two trade.
+    fit = solve(case.given - windows.inertial, terms(windows.gravity).beside(windows.friction))
+    vertical = Vertical(fit.values[:3], fit)
     if vertical.angle > TILTED and 0.6 < vertical.length < 1.7:
         code = "upside-down" if vertical.angle > np.pi - 2 * TILTED else "tilted-base"
-        change = case.windows.gravity @ (vertical.up - case.up)
+        change = windows.gravity @ (vertical.up - case.up)
         if not case.lasts(vertical.solution, change):
             return
         yield Cause(code, (), replace(case, up=vertical.up / vertical.length), vertical)
@@ -253,22 +276,14 @@ def turned_or_swapped(case: Case) -> Iterator[Cause]:
             yield Cause("effort-order", (i, j), case.exchanged(i, j))
 
 
-def displaced(case: Case) -> list[int]:
-    """Joints that may be another's: their effort is far from what the model asks of them.
-
-    None unless gravity asks something of at least one of them.
-    """
+def exchanged_joints(case: Case) -> Iterator[Cause]:
+    """Two joints of which all signals changed places: the model is asked anew for each pair."""
     far = case.by_joint > SUSPECT
     gravity = np.sqrt(np.mean((case.windows.gravity @ case.up) ** 2, axis=0))
     if not np.any(far & (gravity > 0.25 * case.effort_sizes)):
-        return []
-    return [int(j) for j in np.flatnonzero(far)]
-
-
-def exchanged_joints(case: Case) -> Iterator[Cause]:
-    """Two joints of which all signals changed places: the model is asked anew for each pair."""
+        return  # gravity asks nothing of any joint that is far from the model
     few = spread(len(case.given), FEW)
-    for i, j in combinations(displaced(case), 2):
+    for i, j in combinations(np.flatnonzero(far).tolist(), 2):
         windows = case.windows.exchanged(i, j, FEW)
         swapped = case.exchanged(i, j)
         yield Cause(

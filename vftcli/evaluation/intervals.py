@@ -45,7 +45,7 @@ class Resampled(NamedTuple):
     blocks: int
 
 
-def resample(squares: Array, length: int, seed: int = SEED) -> Resampled:
+def resample(squares: Array, length: int) -> Resampled:
     """Mean squares of moving-block bootstrap repetitions; all columns share the same blocks.
 
     Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
@@ -55,11 +55,10 @@ def resample(squares: Array, length: int, seed: int = SEED) -> Resampled:
     Args:
         squares: Squared errors, one column an observer. (T, m) [(N·m)²]
         length: Length of the blocks. [samples]
-        seed: Of the block starts.
     """
     samples = len(squares)
     blocks = max(1, round(samples / length))
-    starts = np.random.default_rng(seed).integers(0, samples, (REPETITIONS, blocks))
+    starts = np.random.default_rng(SEED).integers(0, samples, (REPETITIONS, blocks))
     picked = np.zeros((REPETITIONS, squares.shape[1]))
     for column, x in enumerate(squares.T):
         total = np.cumsum(np.concatenate([[0.0], x, x[: length - 1]]))

@@ -18,7 +18,7 @@ from vftcli.identification.scoring import apparent_load, predicted_torque
 from vftcli.identification.stacking import ParameterColumns, WeightedLog, residuals
 from vftcli.identification.training import JointFit, Training, all_residuals, fit_frictions
 from vftcli.identification.warm_up import warm_up_remarks
-from vftcli.robots.friction import dry_friction
+from vftcli.robots.friction import dry_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
@@ -179,11 +179,9 @@ def model_doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]
 
 def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
     """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
-    motion, columns = data.motions[log], data.columns[log]
+    motion, load = data.motions[log], data.columns[log].load
     out = np.zeros(motion.q.shape)
     for j, fit in enumerate(fits):
         if fit is not None:
-            load = columns.load[motion.kept, j]
-            growth = fit.friction.parameters.get("load_coulomb", 0.0)
-            out[:, j] = dry_friction((fit.friction,), 1) + growth * load
+            out[:, j] = dry_torque(fit.friction, load[motion.kept, j])
     return out

@@ -13,7 +13,6 @@ from vftcli.observers.table import (
     LogSpectra,
     Setup,
     build_observers,
-    observer_settings,
 )
 
 __all__ = [
@@ -30,5 +29,4 @@ __all__ = [
     "Setup",
     "Tuning",
     "build_observers",
-    "observer_settings",
 ]

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 
 from vftcli.observers.lead import estimate_from_rest
 from vftcli.observers.observer import Observer
-from vftcli.observers.settings import Gains, Settings, check_gains, load_gains, overlay_gains
+from vftcli.observers.settings import (
+    Gains,
+    Settings,
+    check_gains,
+    load_gains,
+    overlay_gains,
+    parse_settings,
+)
 from vftcli.observers.table import (
     BEST,
     DEFAULT,
@@ -17,7 +24,6 @@ from vftcli.observers.table import (
     LogSpectra,
     Setup,
     build_observers,
-    observer_settings,
     read_as,
     sections,
 )
@@ -123,7 +129,7 @@ class ObserverChoice:
             word, gains_file = PAPER_GAINS, Path(word)
         return cls(
             names=tuple(observer or ()),
-            settings=observer_settings(assignments or ()),
+            settings=parse_settings(assignments or (), sections()),
             gains=word,
             gains_file=gains_file,
             match=target,

@@ -15,13 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.robots.friction import HELD
 from vftcli.signals.arrays import Array, Mask
 
 ENOUGH = 50
 """Free samples of a resting or a moving joint that its own mean square needs."""
-
-HELD = 0.45
-"""Share of the dry friction that a resting joint holds, rms; on real drives .31 to .61."""
 
 UNSEEN = 0.2
 """Share of the dry friction by which friction in motion may be off, where no free motion shows it.

@@ -72,7 +72,14 @@ def match_observers(
             "--match or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup) for observer in observers)
-    return tuned, match_remarks(goal, tuned)
+    remarks = [
+        fact("delay-matched", delay_s=goal.value)
+        if goal.quantity == "delay"
+        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
+    ]
+    if {"fdo", "gmo"} <= {observer.name for observer in tuned}:
+        remarks.append(fact("first-order-observers-alike"))
+    return tuned, tuple(remarks)
 
 
 def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
@@ -143,15 +150,3 @@ KNOBS: dict[type, tuple[Callable[[Observer, Array], Observer], float, float]] = 
 }
 """Observer → what makes it anew with another cutoff ω [rad/s], gain K [1/s] or Q_τ on each joint,
 and the least and the largest there is. A cutoff is one for all joints."""
-
-
-def match_remarks(goal: MatchTarget, observers: Sequence[Observer]) -> tuple[Remark, ...]:
-    """What was matched, and that filtered dynamics and momentum observer then agree."""
-    remark = (
-        fact("delay-matched", delay_s=goal.value)
-        if goal.quantity == "delay"
-        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
-    )
-    if {"fdo", "gmo"} <= {observer.name for observer in observers}:
-        return remark, fact("first-order-observers-alike")
-    return (remark,)

@@ -15,7 +15,6 @@ from vftcli.observers.settings import (
     Settings,
     joint_values,
     parameters_given,
-    parse_settings,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
@@ -289,15 +288,6 @@ def sections() -> dict[str, Sequence[str]]:
     """The ``--set`` sections and their parameters: shared ones, then each observer's own name."""
     own = {name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()}
     return {**PARAMETERS, **own}
-
-
-def observer_settings(assignments: Sequence[str]) -> Settings:
-    """Read the command line's ``--set`` values.
-
-    Raises:
-        ParameterError: If one is malformed or names nothing there is.
-    """
-    return parse_settings(assignments, sections())
 
 
 def build_observers(

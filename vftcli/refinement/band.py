@@ -6,7 +6,6 @@ import numpy as np
 
 from vftcli.observers.error_band import (
     ENOUGH,
-    HELD,
     UNSEEN,
     FreeError,
     error_band,
@@ -16,7 +15,7 @@ from vftcli.observers.table import BEST
 from vftcli.refinement.baseline import Baseline, FreeReading
 from vftcli.refinement.model_error import expected_spread, friction_alone, smooth_motion
 from vftcli.refinement.whole_log import WholeLogBias, stride_of
-from vftcli.robots.friction import dry_friction
+from vftcli.robots.friction import HELD, dry_friction
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import ExternalTorque

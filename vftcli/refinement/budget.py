@@ -6,7 +6,7 @@ import numpy as np
 
 from vftcli.observers.spectra import Spectra
 from vftcli.refinement.baseline import Baseline, FreeReading
-from vftcli.robots.friction import dry_friction
+from vftcli.robots.friction import ONE_STOP, dry_friction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import Remark, Where, fact
 
@@ -55,14 +55,13 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     velocity = [piece.run.recording.require("dq")[piece.inside] for piece in found.pieces]
     by_friction = modelled * friction_share(np.concatenate(velocity), reading.samples)
     robot = found.motion.log.robot
-    # Stiction may hold any torque up to dry friction: evenly spread, its square is a third.
-    hidden = dry_friction(robot.friction, robot.joints) ** 2 / 3.0 * found.standing.mean(axis=0)
+    hidden = ONE_STOP * dry_friction(robot.friction, robot.joints)
     squares = {
         "noise": noise,
         "friction": by_friction,
         "model": modelled - by_friction,
         "bandwidth": spectra.missed(response),
-        STICTION: hidden,
+        STICTION: hidden**2 * found.standing.mean(axis=0),
     }
     return Budget(observer.name, {cause: np.sqrt(value) for cause, value in squares.items()})
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.repetition.drive_run import band
 from vftcli.repetition.laid_over import LaidOver
+from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
@@ -27,16 +28,6 @@ QUIET = 0.1
 
 SEED = 15
 """Of the white noise that the quietest pieces are compared with."""
-
-AT_REST = 0.13
-"""Share of the dry friction by which two torques differ where the whole arm rests in both motions.
-
-Where it stops at the same place after the same motion its stiction repeats, as long as nobody
-touches it: three runs of one motion of a UR10e differ by .05 to .5 of it, .13 in the mean.
-"""
-
-ANYWHERE = np.sqrt(2.0 / 3.0)
-"""The same share for two torques anywhere within ±F_c: a joint that rests while others move."""
 
 TRUSTED_SHARE = 0.5
 """A joint is trusted if it moves in at least this share of the samples."""
@@ -105,7 +96,7 @@ def error_model(
       another instant included; all of it without the correction, with it the share by which the
       model misses the free run's own torque;
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after a
-      stop shorter than `STUCK` by its share, and by `AT_REST` of F_c where the whole arm rests.
+      stop shorter than `STUCK` by its share, and by `REPEATED_STOP` where the whole arm rests.
 
     Args:
         laid: The log over its free runs.
@@ -134,7 +125,7 @@ def error_model(
     sd = np.full_like(laid.stopped, np.nan)
     for j, stopped in enumerate(laid.stopped.T):
         left = less_noise(motion_error[:, j] * missed[j], own[j])
-        stuck = motion.coulomb[j] * np.where(at_rest, AT_REST, ANYWHERE * stopped)[known]
+        stuck = motion.coulomb[j] * np.where(at_rest, REPEATED_STOP, TWO_STOPS * stopped)[known]
         sd[known, j] = np.sqrt(noise[j] ** 2 + left**2 + stuck**2)
     return ErrorModel(sd, laid.standing)
 

@@ -61,7 +61,8 @@ def without_isolated(recording: Recording) -> Recording:
     for name in there:
         x = getattr(recording, name)
         with np.errstate(all="ignore"):  # what no arm does overflows, and is left as it is
-            span = SPREAD * inner_span(x) if name != "q" else 0.0
+            inner = np.quantile(x, (0.01, 0.99), axis=0)  # all but its outer hundredths
+            span = SPREAD * (inner[1] - inner[0]) if name != "q" else 0.0
             least = np.maximum(span, LEAST.get(name, FINEST))
             even, alone = drawn_in(x, least, PEAK if name in EFFORTS else 0.0)
         if alone.any():
@@ -74,12 +75,6 @@ def without_isolated(recording: Recording) -> Recording:
     said = fact("isolated-samples-evened", where, samples=count)
     source = replace(recording.source, remarks=(*recording.source.remarks, said))
     return replace(recording, source=source, **values)
-
-
-def inner_span(x: Array) -> Array:
-    """How much each column spans but for its outer hundredths. (n,)"""
-    low, high = np.quantile(x, (0.01, 0.99), axis=0)
-    return np.asarray(high - low)
 
 
 def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:

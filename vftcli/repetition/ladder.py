@@ -97,15 +97,12 @@ def differences(
         if way not in laid:
             # One way of pairing after the other: of a long log two have no room at once.
             laid.clear()
-            laid = {way: laid_over(motion, clocks[rung.clock], phase=rung.phase)}
+            pairings = clocks[rung.clock]
+            if rung.phase:
+                pairings = [by_phase(motion, pairing) for pairing in pairings]
+            laid = {way: LaidOver(motion=motion, pairings=pairings)}
         for cutoff in cutoffs:
             yield difference(laid[way], name, cutoff)
-
-
-def laid_over(motion: DriveRun, pairings: Sequence[Pairing], *, phase: bool) -> LaidOver:
-    """The log over its free runs, its partners moved along their path if asked."""
-    moved = [by_phase(motion, p) for p in pairings] if phase else pairings
-    return LaidOver(motion=motion, pairings=moved)
 
 
 def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:

@@ -15,7 +15,7 @@ from vftcli.outputs.page.charts import large, multiples
 from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
-from vftcli.reproduction.paper import FLOOR, Paper, PrintedLine, ShownItem
+from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
 
 PAGE, TEXT = "index.html", "reproduction.md"
 """The page, and the same in Markdown."""
@@ -72,24 +72,17 @@ def item_grid(shown: ShownItem) -> Grid:
 def beside_print(shown: ShownItem) -> str:
     """Ours over the print, the median of the lines that print a number, and its range."""
     kind = shown.item.nearest
-    ratios = [
-        ratio
-        for line in shown.item.lines
-        if (ratio := ratio_of(shown.values.get(line.key, {}).get(kind, []), line)) is not None
-    ]
+    ratios = []
+    for line in shown.item.lines:
+        values = shown.values.get(line.key, {}).get(kind, [])
+        known = [value for value in values if value is not None]
+        if known and line.number and line.compared:
+            ratios.append(float(np.mean(known)) / line.number)
     if not ratios:
         return DASH
     low, high = significant(min(ratios), 2), significant(max(ratios), 2)
     text = significant(float(np.median(ratios)), 2)
     return text if low == high else f"{text} ({low} … {high})"
-
-
-def ratio_of(values: Sequence[float | None], line: PrintedLine) -> float | None:
-    """Mean of ours over what is printed, None where either is missing."""
-    known = [value for value in values if value is not None]
-    if not (known and line.number and line.compared):
-        return None
-    return float(np.mean(known)) / line.number
 
 
 def short_overview(found: Mapping[str, ShownItem]) -> Grid:

@@ -66,7 +66,9 @@ class ArmSearch:
             )
         alike = [self.named(arm) for arm in arms if len(arm) == longest]
         if len(alike) > 1:
-            ends = alternatives([f"--tip {arm[-1].child}" for arm in alike])
+            tips = [f"--tip {arm[-1].child}" for arm in alike]
+            few = len(tips) <= LISTED
+            ends = f"{', '.join(tips[:-1])} or {tips[-1]}" if few else shortened(tips)
             count = {2: "two"}.get(len(alike), str(len(alike)))
             joints = f"{longest} joint{'s' if longest > 1 else ''}"
             raise RobotError(f"{self.tree.path}: {count} arms of {joints}: {ends}")
@@ -186,13 +188,6 @@ class ArmSearch:
                     f"{joint.follows!r} (mimic); only joints that move by themselves make an arm. "
                     f"--tip {run[-1].child} takes the joints before or behind it."
                 )
-
-
-def alternatives(words: Sequence[str]) -> str:
-    """Some words, the last two joined by "or", no more than a message lists."""
-    if len(words) > LISTED:
-        return shortened(words)
-    return " or ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def shortened(words: Sequence[str]) -> str:

@@ -75,7 +75,10 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
         what = CONVERSIONS.get(root.tag, other)
         raise RobotError(f"{path}: not a URDF, xacro or MJCF: {what}")
     tree = READERS[root.tag](path, root)
-    beside = beside_of(path)
+    stem = path  # the TOML beside it has its name without all endings of descriptions
+    while stem.suffix.lower() in DESCRIPTIONS:
+        stem = stem.with_suffix("")
+    beside = stem.with_name(f"{stem.name}.toml")
     file = RobotFile(beside).root if beside.is_file() else None
     angles = locked_angles(file, tree) if file is not None else {}
     wanted = tip or (file.text("tip") if file is not None else "")
@@ -93,13 +96,6 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     )
 
 
-def beside_of(path: Path) -> Path:
-    """The TOML beside a description: its name without all endings of descriptions, and .toml."""
-    while path.suffix.lower() in DESCRIPTIONS:
-        path = path.with_suffix("")
-    return path.with_name(f"{path.name}.toml")
-
-
 def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
     """The robot of an arm: its chain and limits, the rest from the TOML beside it if there is one.
 
@@ -109,7 +105,12 @@ def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
     chain, name = lumped.chain(), lumped.tree.name
     if why := weightless(float(np.sum(chain.mass))):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
-    limits = limits_of(lumped)
+    limits = Limits(
+        **{
+            key: np.array([joint.limits.get(key, np.nan) for joint in lumped.arm.joints])
+            for key in Limits.__dataclass_fields__
+        }
+    )
     if file is None:
         nothing = np.full(chain.joints, np.nan)
         return Robot(
@@ -167,17 +168,6 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
         Section(file.file, table, "joints", j)
         for j, table in (tables.get(name, (None, {"name": name})) for name in chain.names)
     ]
-
-
-def limits_of(lumped: LumpedArm) -> Limits:
-    """The description's joint limits; NaN where it gives none."""
-    joints = lumped.arm.joints
-    return Limits(
-        **{
-            name: np.array([joint.limits.get(name, np.nan) for joint in joints])
-            for name in Limits.__dataclass_fields__
-        }
-    )
 
 
 def simulated_friction(lumped: LumpedArm) -> tuple[JointFriction, ...]:

@@ -23,7 +23,9 @@ def paired(recording: Recording, robot: Robot) -> Recording:
         RobotError: If the log's joints do not cover the robot's; with both lists.
     """
     named = recording.joint_names
-    if len(named) == recording.joints and not is_nameless(robot):
+    tables = robot.document.get("joints", ())
+    nameless = bool(tables) and all("name" not in table for table in tables)
+    if len(named) == recording.joints and not nameless:
         order = places(named, robot.chain.names)
         if order is None:
             raise RobotError(
@@ -43,12 +45,6 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 def listed(names: Sequence[str]) -> str:
     """Names for a message."""
     return ", ".join(printable(name[:40]) for name in names[:24]) or "none"
-
-
-def is_nameless(robot: Robot) -> bool:
-    """Whether the joints' names are not the robot file's own: it gives none."""
-    tables = robot.document.get("joints", ())
-    return bool(tables) and all("name" not in table for table in tables)
 
 
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:

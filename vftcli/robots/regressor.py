@@ -5,7 +5,6 @@ m, m·c (3), then xx, xy, yy, xz, yz, zz of the tensor about the frame's origin.
 inertia is not part of it (Pinocchio's regressor leaves it out too): it is a column q̈_j of its own.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -133,25 +132,18 @@ def chain_parameters(chain: Chain) -> Array:
     return phi.ravel()
 
 
-def tensor_of(entries: Sequence[float] | Array) -> Array:
-    """The symmetric matrix of six entries in the regressor's order. (3, 3)"""
-    tensor = np.empty((3, 3))
-    for value, (r, c) in zip(entries, TENSOR, strict=True):
-        tensor[r, c] = tensor[c, r] = value
-    return tensor
-
-
 def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
     """The chain with other inertial parameters φ (10n,) and, if given, rotor inertias. (n,)"""
     masses, coms, inertias = [], [], []
     for row in phi.reshape(chain.joints, LINK):
         mass = float(row[0])
         com = row[1:4] / mass if mass > 0 else np.zeros(3)
+        tensor = np.empty((3, 3))
+        for value, (r, c) in zip(row[4:], TENSOR, strict=True):
+            tensor[r, c] = tensor[c, r] = value
         masses.append(mass)
         coms.append(com)
-        inertias.append(
-            tensor_of(row[4:]) - mass * (np.dot(com, com) * np.eye(3) - np.outer(com, com))
-        )
+        inertias.append(tensor - mass * (np.dot(com, com) * np.eye(3) - np.outer(com, com)))
     return replace(
         chain,
         mass=np.array(masses),

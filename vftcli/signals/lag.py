@@ -27,15 +27,6 @@ BLOCK = 8192
 """Samples that one Fourier transform takes, unless the lags looked for need more."""
 
 
-def lags(late: Array, early: Array, step: float) -> Array:
-    """Delay of each column at which it fits best, NaN where nothing fits. (n,) [s]
-
-    As `lags_of_each` of one series.
-    """
-    delays: Array = lags_of_each([late], early, step)[0]
-    return delays
-
-
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
     """Delay of each column of several series at which it fits best, NaN where nothing fits. (m, n)
 

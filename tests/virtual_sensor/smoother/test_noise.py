@@ -8,14 +8,13 @@ from scipy.optimize import minimize
 
 from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
+from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.virtual_sensor.smoother.noise import (
     ASSUMED_SHARE,
     NEAR_REST,
-    REST_SHARE,
     UNSEEN_SHARE,
     FreeTerms,
-    dry_torques,
     fit_spectrum,
     periodogram,
     torque_noise,

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
-from vftcli.robots.friction import dry_friction
+from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, median
@@ -31,16 +31,11 @@ STILL = 0.01
 TIE = 1e-6
 """What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s."""
 
-REST_SHARE = 0.5
-"""Standard deviation of the model error at rest, of the joint's dry friction F_c: on real UR10e
-logs the residual at rest is .31 to .61 of it."""
-
 REST_TIME = 2.0
 """Stiction keeps its state at least this long. [s]"""
 
-PUSHED_SHARE, PUSHED_TIME = 0.6, 0.3
-"""A joint that rests under a contact: the push re-settles its stiction, by so much of F_c, within
-so long [s]."""
+PUSHED_TIME = 0.3
+"""A joint that rests under a contact: the push re-settles its stiction within so long. [s]"""
 
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 """A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
@@ -142,17 +137,6 @@ def resting(blocks: Blocks) -> Mask:
     """Blocks in which each joint rests. (K, n)"""
     # Steps of an encoder make speeds of just `STILL`: they move, whatever rounding makes of them.
     return np.asarray(np.abs(blocks.velocity) < (1.0 - TIE) * STILL)
-
-
-def dry_torques(robot: Robot) -> Array:
-    """Dry friction of every joint, of a sigmoid its whole amplitude; 0 where none is known. (n,)
-
-    Args:
-        robot: The arm.
-    """
-    dry = dry_friction(robot.friction, robot.joints)
-    whole = [abs(joint.parameters.get("amplitude", 0.0)) for joint in robot.friction]
-    return np.maximum(dry, whole) if whole else dry
 
 
 def torque_noise(
