@@ -171,8 +171,8 @@ def test_summaries_are_those_of_the_commands() -> None:
 
 
 ROOT = Path(__file__).parent.parent.parent
-OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--dist", "--nthreads", "--protocol",
-                  "--tls-ca-file"}  # fmt: skip
+OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--dist", "--nthreads",
+                  "--protocol", "--tls-ca-file"}  # fmt: skip
 """Options in the documents that are those of pip, of ros2 bag, of Dask, or of all programs."""
 
 
