@@ -7,13 +7,13 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import reference_file
+from vftcli.evaluation.judgement import reference_wrench
 from vftcli.evaluation.reference_choice import (
     REFERENCES,
     ReferenceChoice,
     ReferenceSource,
     make_reference,
 )
-from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun

@@ -55,31 +55,21 @@ def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[
         period: Control period. [s]
     """
     longest: dict[str, int] = {}
+    long, near = round(RESTING[0] / period), RESTING[1]
     for drag in drags:
         part = logged[drag.begin : drag.release, :3]
-        if stands_still(part, round(RESTING[0] / period)):
+        if len(part) <= long:
+            continue
+        apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
+        # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
+        held = np.max(np.linalg.norm(part - part.mean(axis=0), axis=1))
+        if np.any(apart < near) and (held < near or np.median(apart) < near):
             axis = AXES[drag.axis]
             longest[axis] = max(longest.get(axis, 0), len(part))
     return tuple(
         caution("drag-at-rest", axis=axis, duration_s=count * period)
         for axis, count in longest.items()
     )
-
-
-def stands_still(place: Array, long: int) -> bool:
-    """Whether a point (T, 3) [m] stays within `RESTING`, throughout or most of the time.
-
-    Args:
-        place: The point.
-        long: Over how many samples it has to stay.
-    """
-    if len(place) <= long:
-        return False
-    near = RESTING[1]
-    apart = np.linalg.norm(place[long:] - place[:-long], axis=1)
-    # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
-    held = np.max(np.linalg.norm(place - place.mean(axis=0), axis=1))
-    return bool(np.any(apart < near) and (held < near or np.median(apart) < near))
 
 
 def limits_met(

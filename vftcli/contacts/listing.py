@@ -14,7 +14,7 @@ from vftcli.contacts.contact_list import (
 )
 from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
 from vftcli.contacts.loads import is_load, load_row
-from vftcli.contacts.model_error import UNKNOWN, UNSEEN_SHARE, error_course
+from vftcli.contacts.model_error import UNKNOWN, error_course
 from vftcli.contacts.places import places
 from vftcli.contacts.rows import NORMAL, SHORT, Measurer
 from vftcli.contacts.search import Found, search
@@ -39,6 +39,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.virtual_sensor.smoother.noise import UNSEEN_SHARE
 
 FINE = 0.008
 """A short contact is measured in blocks of this length: longer ones cut its peak. [s]"""

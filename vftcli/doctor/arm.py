@@ -215,12 +215,15 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
 
 def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:
     """The finding on the cause that explains a log."""
-    rival = diagnosis.rival
+    rival = "nothing else"
+    if diagnosis.rival is not None:
+        joints = [f"J{j + 1}" for j in diagnosis.rival.joints]
+        rival = " ".join([diagnosis.rival.code, *joints])
     robot_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
     values: dict[str, Any] = {
         "misfit_percent": 100 * diagnosis.case.misfit,
         "healed_percent": 100 * cause.misfit,
-        "rival": "nothing else" if rival is None else said(rival),
+        "rival": rival,
         "signal": "current" if robot_current else "torque",
         "column": "current" if robot_current else "tau",
         "width": recording.joints,
@@ -240,12 +243,6 @@ def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Re
     return warning(cause.code, on_joints(cause.joints), **values)
 
 
-def said(cause: Cause) -> str:
-    """A cause as the code of its finding, with its joints."""
-    joints = " ".join(f"J{j + 1}" for j in cause.joints)
-    return f"{cause.code} {joints}".strip()
-
-
 def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
     """That the vendor's torque fits the arm's only with its sign turned.
 
@@ -261,7 +258,7 @@ def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
         return
     # What the arm leaves over in all windows, contact among them.
     straight, turned = (
-        float(np.sqrt(np.mean(replace(case, given=given).best.rest ** 2)))
+        size_of(replace(case, given=given).best.rest)
         for given in (case.given + vendor, case.given - vendor)
     )
     if turned < CLEARLY * straight:

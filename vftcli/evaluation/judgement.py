@@ -1,23 +1,31 @@
 """From estimates and wrenches to how they compare with a reference: one table of errors."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.joint_means import joint_means
+from vftcli.evaluation.reference import ReferenceLoad
 from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
-from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
 from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.kinematics import link_poses
+from vftcli.robots.robot import Robot
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
+from vftcli.virtual_sensor.frames import from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
+from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
 class Judgement(NamedTuple):
@@ -89,3 +97,34 @@ def judge(
         scores = judge_contacts(estimates, sensed, reference, told)
         errors = with_contacts(errors, recording.name, reference.name, scores)
     return Judgement(reference=reference, errors=errors, virtual_sensor=sensed)
+
+
+def reference_wrench(
+    recording: Recording, robot: Robot, reference: ReferenceLoad, sensor: VirtualSensor
+) -> Wrench:
+    """The wrench that estimates are judged by, in the virtual sensor's frame.
+
+    A sensor's and a file's wrench are taken as they are; any other reference is a torque, and goes
+    through least squares. Samples in which the pose cannot tell a wrench are masked alike.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        reference: The reference.
+        sensor: Frame and mounting of the estimates.
+    """
+    torque = reference.torque
+    # Plain least squares whatever the estimates' solver is: a reference is not to be smoothed.
+    solved = replace(sensor, solver="pinv").wrench(torque, recording.q, robot.chain)
+    if reference.wrench is None:
+        return replace(solved, name=torque.name, sd=None, remarks=())
+    flange = link_poses(robot.chain, recording.q).rotation[:, -1]
+    X = from_base(sensor.frame, flange, sensor.mounting)
+    return replace(
+        solved,
+        name=torque.name,
+        values=np.einsum("tij,tj->ti", X, reference.wrench.values),
+        sd=None,
+        null_space=None,
+        remarks=reference.wrench.remarks,
+    )

@@ -4,9 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from vftcli.evaluation.reference import ReferenceLoad, vendor_reference, zero_reference
+from vftcli.evaluation.reference import (
+    ReferenceLoad,
+    sensor_reference,
+    vendor_reference,
+    zero_reference,
+)
 from vftcli.evaluation.reference_file import file_reference
-from vftcli.evaluation.reference_sensor import sensor_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.two_cycle import two_cycle_reference
 from vftcli.signals.errors import ReferenceTorqueError

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.evaluation.reference import ReferenceLoad
-from vftcli.evaluation.reference_sensor import torque_of
+from vftcli.evaluation.reference import ReferenceLoad, torque_of
 from vftcli.readers.references import read_reference
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array

@@ -7,7 +7,6 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.selection import facts
 from vftcli.observers import PAPER
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.page.charts import Chart
 from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
@@ -53,7 +52,11 @@ def tapped_circle(seed: int) -> RunResult:
         add_errors(values, variant, made)
         add_facts(values, variant, made)
         if variant == CORRECTED:
-            charts["fig3"] = traces(made)
+            chart = torque_chart(made)
+            # Four bands would hide one another.
+            lines = (line._replace(shown=True, leads=False, half=None) for line in chart.series)
+            title = "External torque: observers and reference"
+            charts["fig3"] = chart._replace(key="fig3", title=title, series=tuple(lines))
     return RunResult(values, charts)
 
 
@@ -87,12 +90,3 @@ def add_facts(values: Values, variant: str, made: Analysis) -> None:
         }
         for key, value in found.items():
             values.setdefault(f"{key}/{fact.name}", {})[variant] = value
-
-
-def traces(made: Analysis) -> Chart:
-    """Every observer's torque over the reference."""
-    chart = torque_chart(made)
-    # Four bands would hide one another.
-    lines = tuple(line._replace(shown=True, leads=False, half=None) for line in chart.series)
-    title = "External torque: observers and reference"
-    return chart._replace(key="fig3", title=title, series=lines)

@@ -195,18 +195,6 @@ def render_markdown(
     return "\n".join(parts)
 
 
-def drawings(found: Mapping[str, ShownItem]) -> dict[str, Drawing]:
-    """The traces as figures for a paper."""
-    return {
-        name: Drawing(
-            f"{shown.item.label}: {shown.item.title}",
-            partial(line_figure, plots=plots_of(shown.chart)),
-        )
-        for name, shown in found.items()
-        if shown.chart is not None
-    }
-
-
 def write_reproduction(
     folder: OutputFolder,
     paper: Paper,
@@ -219,7 +207,15 @@ def write_reproduction(
     folder.write(PAGE, render_page(paper, found, jobs))
     folder.write(TEXT, render_markdown(paper, found, jobs, command))
     if form is not None:
-        write_figures(folder, drawings(found), form)
+        drawings = {
+            name: Drawing(
+                f"{shown.item.label}: {shown.item.title}",
+                partial(line_figure, plots=plots_of(shown.chart)),
+            )
+            for name, shown in found.items()
+            if shown.chart is not None
+        }
+        write_figures(folder, drawings, form)
     record = {
         "command": command,
         "versions": versions(),

@@ -4,7 +4,7 @@ The TOML has the description's name with the ending ``.toml``. Its `tip` and `lo
 it is and at which angles the rest is held; its ``[[joints]]`` are matched by name.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, is_finite, robot_text
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
-from vftcli.robots.xacro_text import has_macros, urdf_of_xacro
+from vftcli.robots.xacro_text import NAMESPACE, urdf_of_xacro
 from vftcli.robots.xml_text import xml_root
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
@@ -65,7 +65,8 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     text = robot_text(path)
     root = xml_root(text, path)
     remarks: tuple[Remark, ...] = ()
-    if path.suffix.lower() == ".xacro" or has_macros(root):
+    has_macros = any(NAMESPACE.match(str(element.tag)) for element in root.iter())
+    if path.suffix.lower() == ".xacro" or has_macros:
         root = xml_root(urdf_of_xacro(path, arguments), path)
         remarks = (fact("xacro-run", file=path.name),)
     elif arguments:
@@ -200,7 +201,10 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         yield fact("arm-taken", **taken)
     else:
         lumps = lumped.lumped()
-        taken |= {"locked": locked, "locked_shown": held(locked), "lumped_kg": lumps}
+        zero = [name for name, value in locked.items() if not value]
+        held = [f"{name} at {value:g}" for name, value in locked.items() if value]
+        held += [f"{shortened(zero)} at 0"] if zero else []
+        taken |= {"locked": locked, "locked_shown": ", ".join(held), "lumped_kg": lumps}
         taken["lumped_shown"] = (
             ", ".join(f"{mass:.3g} kg into {joint}" for joint, mass in lumps.items()) or "none"
         )
@@ -210,13 +214,6 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     if beside:
         yield caution("side-branch-locked", locked=beside, locked_shown=shortened(beside))
     yield from inertia_remarks(lumped, chain)
-
-
-def held(locked: Mapping[str, float]) -> str:
-    """Locked joints and where they are held, in words."""
-    zero = [name for name, value in locked.items() if not value]
-    named = [f"{name} at {value:g}" for name, value in locked.items() if value]
-    return ", ".join(named + ([f"{shortened(zero)} at 0"] if zero else []))
 
 
 def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:

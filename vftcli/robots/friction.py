@@ -232,16 +232,6 @@ def joint_friction(joint: JointFriction, dq: Array, load: Array | None) -> Array
     return MODELS[joint.model](dq, **values)
 
 
-def presliding_joints(friction: Sequence[JointFriction]) -> tuple[list[int], Array]:
-    """The joints (from 0) that have presliding friction, and their presliding lengths. (m,) [rad]
-
-    Args:
-        friction: One model a joint; empty for a frictionless arm.
-    """
-    joints = [j for j, joint in enumerate(friction) if joint.parameters.get("presliding", 0.0) > 0]
-    return joints, np.array([friction[j].parameters["presliding_length"] for j in joints])
-
-
 def steady_torque(friction: JointFriction, dq: Array) -> Array:
     """One joint's friction in steady sliding, without offset and the dry torque that fades. [N·m]
 

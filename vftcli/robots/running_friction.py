@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.robots.friction import friction_torque, presliding_joints
+from vftcli.robots.friction import friction_torque
 from vftcli.robots.presliding import play
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
@@ -25,7 +25,10 @@ class RunningFriction:
     def __init__(self, friction: Sequence[JointFriction]) -> None:
         self.friction = friction
         self.centre: Array | None = None
-        self._joints, self._length = presliding_joints(friction)
+        presliding = [joint.parameters.get("presliding", 0.0) for joint in friction]
+        self._joints = [j for j, torque in enumerate(presliding) if torque > 0.0]
+        lengths = [friction[j].parameters["presliding_length"] for j in self._joints]
+        self._length = np.array(lengths)
 
     def torque(
         self,

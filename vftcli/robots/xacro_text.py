@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree as ET
 
 from vftcli.robots.robot_file import robot_text
 from vftcli.signals.errors import RobotError
@@ -20,7 +19,7 @@ from vftcli.signals.packages import needed
 from vftcli.signals.parsing import assignment, did_you_mean
 
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
-"""How the tag of an element of xacro begins."""
+"""How the tag of an element of xacro begins: a description with one still has to be expanded."""
 
 DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
 """A declaration of an argument, which has a default."""
@@ -43,11 +42,6 @@ WAITED = 6
 
 MEMORY = 1 << 30
 """Memory in which it must be expanded; large ones take a tenth. [B]"""
-
-
-def has_macros(root: ET.Element) -> bool:
-    """Whether a description still has to be expanded."""
-    return any(NAMESPACE.match(str(element.tag)) for element in root.iter())
 
 
 def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
