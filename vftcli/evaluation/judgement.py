@@ -12,7 +12,7 @@ from vftcli.evaluation.reference_wrench import reference_wrench
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
+from vftcli.refinement.limits import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark

@@ -8,10 +8,9 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.fallback import with_spare
-from vftcli.refinement.paper_gap import expected_gap
+from vftcli.refinement.limits import Budget, budget, expected_gap, limits_remark
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.shown import Shown
