@@ -14,7 +14,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource,
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.refinement.paper_gap import EXPECTED, MEASURED, gap_remark
+from vftcli.refinement.limits import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot

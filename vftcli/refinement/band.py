@@ -13,8 +13,8 @@ from vftcli.observers.error_band import (
 )
 from vftcli.observers.table import BEST
 from vftcli.refinement.baseline import Baseline, FreeReading
-from vftcli.refinement.model_error import expected_spread, friction_alone, smooth_motion
-from vftcli.refinement.whole_log import WholeLogBias, stride_of
+from vftcli.refinement.model_error import error_columns, friction_alone, smooth_motion
+from vftcli.refinement.whole_log import stride_of
 from vftcli.robots.friction import HELD, dry_friction
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ClockError
@@ -57,13 +57,12 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
     Returns:
         Standard deviation. (T, n) [N·m]
     """
-    run, off = found.motion.log, found.correction
+    run = found.motion.log
     friction = dry_friction(run.robot.friction, reading.estimate.joints)
     nothing = np.zeros_like(friction)
-    if off is not None and np.count_nonzero(off.free) >= ENOUGH:
-        fitted = read_where_free(found, reading, off)
-        called = free_error(fitted.samples, fitted.resting, friction)
-        return handed_over(error_band(called, nothing, run.rests, off.sd))
+    called = fitted_error(found, reading, friction)
+    if called is not None:
+        return handed_over(error_band(called, nothing, run.rests, found.correction_sd))
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
     try:
         motion = smooth_motion(run)
@@ -71,7 +70,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
         usual = held._replace(moving=(UNSEEN * friction) ** 2)
         return handed_over(error_band(usual, nothing, run.rests))
     t, stride = motion.t, stride_of(motion.t)
-    spread = expected_spread(run, motion, friction_alone(run.robot), stride)
+    columns = error_columns(run, motion, friction_alone(run.robot), stride)
+    spread = np.column_stack([np.sqrt(np.sum(column**2, axis=1)) for column in columns])
     sd = resample_columns(t, t[::stride], spread)
     return handed_over(error_band(held, nothing, run.rests, sd))
 
@@ -85,11 +85,9 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     """
     friction = dry_friction(found.motion.log.robot.friction, reading.estimate.joints)
     stated = free_error(reading.samples, reading.resting, friction)
-    off = found.correction
-    if off is None or np.count_nonzero(off.free) < ENOUGH:
+    called = fitted_error(found, reading, friction)
+    if called is None:
         return stated
-    fitted = read_where_free(found, reading, off)
-    called = free_error(fitted.samples, fitted.resting, friction)
     if found.by_fit:  # the free part is these samples, and the loads in them are no error
         return called
     moving = np.maximum(stated.moving, called.moving)
@@ -97,18 +95,20 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     return FreeError(moving, resting, unseen=stated.unseen & called.unseen)
 
 
-def read_where_free(found: Baseline, reading: FreeReading, off: WholeLogBias) -> FreeReading:
-    """A reading whose free samples are those that the fit of a correction calls free.
+def fitted_error(found: Baseline, reading: FreeReading, friction: Array) -> FreeError | None:
+    """What is read in the samples that the fit of a correction calls free; None in too few.
 
     Slow loads that the fit believes in are no error of who reads them, nor is a load that the free
     part carries where it believes in none.
     """
-    run, tau = found.motion.log, reading.estimate.tau
+    run, tau, off = found.motion.log, reading.estimate.tau, found.correction
+    if off is None or np.count_nonzero(off.free) < ENOUGH:
+        return None
     if off.load.any():
         tau = tau - off.load
     elif found.load is not None:
         tau = tau - found.load.torque(run)
-    return reading._replace(samples=tau[off.free], resting=run.rests[off.free])
+    return free_error(tau[off.free], run.rests[off.free], friction)
 
 
 def band_remarks(found: Baseline) -> tuple[Remark, ...]:

@@ -123,12 +123,11 @@ class Baseline:
 
         A load that they carry is no noise, and is off too.
         """
-        return [Part(self.without_load(piece.run), piece.inside) for piece in self.pieces]
-
-    def without_load(self, run: ModelledRun) -> DynamicsTerms:
-        """The terms of a free piece's recording, less a load that it carries."""
-        terms = self.terms_of(run)
-        return terms if self.load is None else self.load.off(terms, run)
+        parts = []
+        for run, inside in self.pieces:
+            terms = self.terms_of(run)
+            parts.append(Part(terms if self.load is None else self.load.off(terms, run), inside))
+        return parts
 
     @property
     def pieces(self) -> tuple[FreePiece, ...]:

@@ -10,10 +10,7 @@ AUTOMATIC = "auto"
 WHOLE_LOG = "whole-log"
 """The word for the bias that is fitted to the whole log and taken off before observers run."""
 
-NOTHING = "none"
-"""The word for a bias that stays."""
-
-REMOVALS = (AUTOMATIC, WHOLE_LOG, NOTHING)
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")
 """What ``--remove-bias`` takes."""
 
 

@@ -25,7 +25,7 @@ from vftcli.robots.regressor import (
     torque_regressor,
     with_parameters,
 )
-from vftcli.robots.robot import JointFriction, Robot
+from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step
@@ -137,18 +137,13 @@ def usual_friction(robot: Robot) -> UsualFriction:
         if "amplitude" in joint.parameters:
             found[j, 0] = 0.7 * abs(float(joint.parameters["amplitude"]))
         elif joint.model != "none":
-            found[j] = fitted_curve(joint, float(robot.limits.qd_max[j]))
+            limit = float(robot.limits.qd_max[j])
+            fastest = limit if np.isfinite(limit) and limit > 0.0 else USUAL_SPEED
+            speed = np.linspace(0.05, 1.0, 40) * fastest
+            A = np.column_stack([speed**0, speed, speed**2])
+            found[j] = np.linalg.lstsq(A, steady_torque(joint, speed), rcond=None)[0]
             found[j, 0] = abs(dry[j] or found[j, 0])
     return UsualFriction(*found.T)
-
-
-def fitted_curve(joint: JointFriction, limit: float) -> Array:
-    """Constant, slope and bend of a friction between low speed and a joint's limit. (3,)"""
-    fastest = limit if np.isfinite(limit) and limit > 0.0 else USUAL_SPEED
-    speed = np.linspace(0.05, 1.0, 40) * fastest
-    torque = steady_torque(joint, speed)
-    fit, *_ = np.linalg.lstsq(np.column_stack([speed**0, speed, speed**2]), torque, rcond=None)
-    return np.asarray(fit)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,21 +249,6 @@ def friction_alone(robot: Robot) -> ModelError:
     expected = expected_error(robot)
     none = {name: 0.0 * value for name, value in vars(expected).items() if name != "friction"}
     return replace(expected, **none)
-
-
-def expected_spread(
-    run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int
-) -> Array:
-    """Standard deviation of the torque that such an error makes, each column by chance. (S, n)
-
-    Args:
-        run: The log.
-        motion: Its smooth motion.
-        expected: The standard deviations.
-        stride: Every how many samples are taken.
-    """
-    columns = error_columns(run, motion, expected, stride)
-    return np.column_stack([np.sqrt(np.sum(c**2, axis=1)) for c in columns])
 
 
 def error_columns(

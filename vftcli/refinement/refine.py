@@ -8,10 +8,9 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, free_reading
-from vftcli.refinement.budget import Budget, budget, limits_remark
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.fallback import with_spare
-from vftcli.refinement.paper_gap import expected_gap
+from vftcli.refinement.limits import Budget, budget, expected_gap, limits_remark
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.shown import Shown
@@ -66,6 +65,8 @@ def refine(
     ]
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
     shown = tuple(with_band(*pair) for pair in zip(under, readings, strict=True))
+    # Of the most accurate estimate: of `best` if it ran, else of the last.
+    leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
     gap = expected_gap(found, shown, gains_of_file=gains_of_file)
     return Refinement(
         estimates=shown,
@@ -91,12 +92,7 @@ def refine(
                 for remark in bound_remarks(name, curve.best, curve.omega_n)
             ),
             *band_remarks(found),
-            *(limits_remark(one, found.stuck) for one in leading(budgets)),
+            *(limits_remark(one, found.stuck) for one in leading),
             *(() if gap is None else (gap,)),
         ),
     )
-
-
-def leading(budgets: Sequence[Budget]) -> Sequence[Budget]:
-    """The budget of the most accurate estimate: of `best` if it ran, else the last; or none."""
-    return [one for one in budgets if one.name == BEST] or budgets[-1:]

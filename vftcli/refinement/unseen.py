@@ -64,7 +64,8 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
         fit: The fit.
         dq: Joint velocities at its samples. (S, n) [rad/s]
     """
-    judged = judging(np.abs(dq) > MOVES, fit.free)
+    moves: Mask = np.abs(dq) > MOVES
+    judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
     folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
     left_out = [mask_of(len(fit.free), outer) for _, outer in folds]
     whole, *parts = fit.rows.all_sums(fit.weight, fit.free, left_out)
@@ -90,17 +91,6 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
 def faded(value: Array, full: float, none: float) -> Array:
     """How much of something is used: 1 up to a value, 0 from another on, straight between."""
     return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))
-
-
-def judging(moves: Mask, free: Mask) -> Mask:
-    """By which samples each joint is judged. (S, n)
-
-    Args:
-        moves: Where a joint moves. (S, n)
-        free: The samples free of contact. (S,)
-    """
-    seldom: Mask = moves[free].mean(axis=0) < SELDOM
-    return moves | seldom
 
 
 def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:

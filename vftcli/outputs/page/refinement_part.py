@@ -12,7 +12,7 @@ from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns
 from vftcli.outputs.page.charts import Chart, ChartLine, LineStyle, multiples, observer_lines
 from vftcli.outputs.page.shell import section
 from vftcli.outputs.page.torque_part import joint_panels
-from vftcli.refinement.budget import Budget
+from vftcli.refinement.limits import Budget
 from vftcli.signals.arrays import Array
 
 FREE, LOADED = "#3b7ea1", "#c2410c"

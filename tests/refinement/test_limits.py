@@ -1,21 +1,87 @@
-"""What the paper's gains cost: bands against bands, and the truth where there is one."""
+"""What limits a log: friction apart from other error, the largest cause, the paper's gains."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.judgement import with_measured_gap
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.refinement.paper_gap import EXPECTED, expected_gap, gap_remark
+from vftcli.refinement.limits import (
+    CAUSES,
+    EXPECTED,
+    SIGN_SPEED,
+    STICTION,
+    Budget,
+    expected_gap,
+    friction_share,
+    gap_remark,
+    limits_remark,
+)
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.remarks import Remark, fact
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 UR5 = AnalysisChoice(robot=RobotChoice(name="ur5"))
+RNG = np.random.default_rng(8)
+DQ = RNG.uniform(-1.0, 1.0, (4000, 2))
+
+
+def test_pure_friction_is_all_friction() -> None:
+    tau = 3.0 * np.tanh(DQ / SIGN_SPEED) + 0.5 * DQ
+    np.testing.assert_allclose(friction_share(DQ, tau), 1.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("size", [0.5, 1.0, 4.0])
+def test_friction_beside_another_error_is_its_share_of_the_power(size: float) -> None:
+    """tanh has a mean square of nearly 1, the other error `size`²; 4000 samples tell 3 %."""
+    other = size * RNG.standard_normal(DQ.shape)
+    power = np.mean(np.tanh(DQ / SIGN_SPEED) ** 2, axis=0)
+    found = friction_share(DQ, np.tanh(DQ / SIGN_SPEED) + other)
+    np.testing.assert_allclose(found, power / (power + size**2), atol=0.03)
+
+
+def test_no_torque_has_no_friction() -> None:
+    assert not friction_share(DQ, np.zeros_like(DQ)).any()
+
+
+def budget() -> Budget:
+    sizes = {
+        "noise": [3.0, 0.1],
+        "friction": [4.0, 0.2],
+        "model": [0.0, 0.1],
+        "bandwidth": [0.0, 0.5],
+    }
+    return Budget(
+        "gmo", {**{k: np.array(v) for k, v in sizes.items()}, STICTION: np.array([9.0, 7.0])}
+    )
+
+
+def test_stiction_is_no_part_of_the_sum() -> None:
+    assert set(budget().parts) == set(CAUSES)
+    np.testing.assert_allclose(budget().total, [5.0, np.sqrt(0.31)])
+
+
+def test_the_largest_cause_of_each_joint_is_named() -> None:
+    free = limits_remark(budget(), np.array([False, False]))
+    assert free.values["causes"] == ["friction", "bandwidth"]
+    assert free.values["size_Nm"] == [4.0, 0.5]
+    stuck = limits_remark(budget(), np.array([True, False]))
+    assert stuck.values["causes"] == [STICTION, "bandwidth"]
+    assert stuck.values["size_Nm"][0] == 9.0
+    # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
+    np.testing.assert_allclose(stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)])
+    assert str(stuck).startswith("gmo: what limits this log, from J1: stiction at rest, bandwidth")
+
+
+def test_a_joint_at_rest_without_known_friction_is_not_limited_by_stiction() -> None:
+    found = budget()
+    found.parts[STICTION][0] = 0.0
+    assert limits_remark(found, np.array([True, True])).values["causes"] == ["friction", STICTION]
 
 
 @pytest.fixture(scope="module")
@@ -79,8 +145,6 @@ def test_gains_that_do_as_well_are_not_called_off_the_best() -> None:
 
 @pytest.mark.slow
 def test_what_is_measured_takes_the_place_of_what_was_expected(analysis: Analysis) -> None:
-    import polars as pl
-
     rows = [("best", 1, 0.5), ("best", 2, 1.5), ("gmo", 1, 2.0), ("gmo", 2, 4.0), ("gmo", 3, None)]
     errors = pl.DataFrame(rows, schema=["observer", "joint", "rmse_Nm"], orient="row")
     other = fact("band")

@@ -1,13 +1,22 @@
-"""The error budget: how much of an estimate's error each cause makes, and what limits a log."""
+"""What limits a log, cause by cause, and how far the paper's gains are off the best on it.
 
+Without a reference the bands tell what an estimate's error is expected to be: the root mean square
+of their standard deviation over the log, the mean over the joints.
+"""
+
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
-from vftcli.refinement.baseline import Baseline, FreeReading
+from vftcli.observers.table import BEST, PAPER
+from vftcli.refinement.band import with_band
+from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
 from vftcli.robots.friction import ONE_STOP, dry_friction
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
 
 STICTION = "stiction at rest"
@@ -18,6 +27,15 @@ CAUSES = ("noise", "friction", "model", "bandwidth", STICTION)
 
 SIGN_SPEED = 0.02
 """Velocity over which the sign of friction turns. [rad/s]"""
+
+EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
+"""Codes of the remark that holds what the bands let expect: the gains are off the best, or not."""
+
+MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
+"""The same of the remark that holds what a reference says."""
+
+AHEAD = 1.05
+"""The best is ahead where the paper's gains make this many times its error."""
 
 
 class Budget(NamedTuple):
@@ -101,3 +119,56 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
     total = np.hypot(found.total, np.where(stuck, found.parts[STICTION], 0.0))
     where = Where(about=found.name)
     return fact("limits", where, causes=named, size_Nm=size, total_Nm=total.tolist())
+
+
+def expected_gap(
+    found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
+) -> Remark | None:
+    """The expected error with the paper's gains over that of `best`; None where either is unknown.
+
+    Args:
+        found: What the log shows.
+        estimates: The run's estimates, with their bands.
+        gains_of_file: Whether those of the paper's observers ran with the robot file's gains.
+            Where not, or where none of them ran, they run here.
+    """
+    known = {estimate.name: estimate for estimate in estimates}
+    if BEST not in known or known[BEST].error_sd is None:
+        return None
+    log = found.motion.log
+    step, n = log.recording.median_step, log.robot.joints
+    observers, _ = ObserverChoice(names=PAPER).build(log.robot, step)
+    paper = [o for o in observers if gains_of_file and o.name in known]
+    if not paper:
+        paper = [*observers]
+        readings = [free_reading(found, o, o.estimate(found.terms)) for o in paper]
+        known |= {r.observer.name: with_band(found, r) for r in readings}
+    errors = {}
+    for name in (BEST, *(o.name for o in paper)):
+        sd = known[name].error_sd
+        errors[name] = np.nan if sd is None else float(np.sqrt(np.mean(sd**2, axis=0)).mean())
+    return gap_remark(EXPECTED, errors, {o.name: o.tuning(step, n).delay for o in paper})
+
+
+def gap_remark(
+    codes: tuple[str, str], errors: Mapping[str, float], delays: Mapping[str, Array]
+) -> Remark | None:
+    """How far the paper's gains are off the best; None where an error is not known, or is none.
+
+    Args:
+        codes: `MEASURED` or `EXPECTED`.
+        errors: Observer → error, `best` among them. [N·m]
+        delays: Observer of the paper → delay of each joint. (n,) [s]
+    """
+    ratios = {name: errors[name] / errors[BEST] for name in delays} if errors[BEST] > 0.0 else {}
+    ratio = float(np.mean([*ratios.values()])) if ratios else float("nan")
+    if not np.isfinite(ratio):
+        return None
+    spread = np.concatenate([*delays.values()])
+    return fact(
+        codes[0] if ratio >= AHEAD else codes[1],
+        ratio=ratio,
+        ratios=ratios,
+        least_delay_ms=1e3 * float(spread.min()),
+        most_delay_ms=1e3 * float(spread.max()),
+    )
