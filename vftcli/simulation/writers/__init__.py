@@ -8,26 +8,20 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.schema import unknown_name
-from vftcli.simulation.writers.libfranka import check_franka, write_libfranka
 from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.simulation.writers.rtde import UR_JOINTS, check_ur, write_rtde, write_ur_rtde
+from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
 
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
-    "rtde": write_rtde,
-    "ur-rtde": write_ur_rtde,
-    "libfranka": write_libfranka,
+    "rtde": RTDE.write,
+    "ur-rtde": UR_RTDE.write,
+    "libfranka": LIBFRANKA.write,
     "rosbag2": write_rosbag2,
     "parquet": write_parquet,
 }
 """Name at ``--as`` → the function that writes it."""
 
-CHECKS: dict[str, Callable[[Robot], None]] = {
-    "rtde": check_ur,
-    "ur-rtde": check_ur,
-    "libfranka": check_franka,
-}
-"""Name at ``--as`` → the function that refuses an arm that cannot log so."""
+UR_JOINTS, FRANKA_JOINTS = 6, 7
 
 
 def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
@@ -39,13 +33,27 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
     name = wanted or scenario.format or vendor_format(robot)
     if name not in WRITERS:
         raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
-    if name in CHECKS:
-        CHECKS[name](robot)
+    if name in {"rtde", "ur-rtde"} and not is_ur(robot):
+        raise ParameterError(
+            f"robot {robot.name!r} has no motor currents or not six joints and cannot log in a UR "
+            "format; choose libfranka, rosbag2 or parquet with --as"
+        )
+    if name == "libfranka" and robot.joints != FRANKA_JOINTS:
+        raise ParameterError(
+            f"robot {robot.name!r} has {robot.joints} joints and cannot log as a Franka arm; "
+            "choose rtde, rosbag2 or parquet with --as"
+        )
     return name
+
+
+def is_ur(robot: Robot) -> bool:
+    """Whether an arm measures motor currents and has six joints."""
+    in_current = robot.torque_source == "current" and robot.torque_constant is not None
+    return in_current and robot.joints == UR_JOINTS
 
 
 def vendor_format(robot: Robot) -> str:
     """The format an arm's vendor logs in: RTDE for a UR, libfranka's for a Franka, else a table."""
-    if robot.torque_source == "current" and robot.joints == UR_JOINTS:
+    if is_ur(robot):
         return "rtde"
     return "libfranka" if robot.ros_state == ROBOT_STATE else "parquet"

@@ -9,6 +9,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.truth import AXES, Truth
+from vftcli.simulation.writers.signals import joint_signals
 
 TRUTH_FRAME = "base axes, moment about the flange point"
 """Of the truth's wrench."""
@@ -22,30 +23,10 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
     rows = np.array(simulation.measured.rows)
     start = simulation.scenario.sensing.start
     columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
-    for name, values in signals(simulation).items():
+    for name, values in joint_signals(simulation).items():
         labels = AXES if name == "wrench" else tuple(map(str, range(1, values.shape[1] + 1)))
         columns |= {f"{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
     write_columns(path, {name: values[rows] for name, values in columns.items()})
-
-
-def signals(simulation: Simulation) -> dict[str, Array]:
-    """Signal → its columns at every sample. (M, n) each"""
-    samples, measured, vendor = simulation.samples, simulation.measured, simulation.vendor
-    table = {"q": measured.q, "dq": measured.dq}
-    if measured.current is not None and vendor.target_current is not None:
-        table |= {"current": measured.current, "target_current": vendor.target_current}
-    else:
-        table["tau"] = measured.torque
-    table |= {
-        "target_q": samples.target_q,
-        "target_dq": samples.target_dq,
-        "target_torque": vendor.target_torque,
-        "tau_ext": vendor.tau_ext,
-        "temperature": measured.temperature,
-    }
-    if simulation.force_sensor is not None:
-        table["wrench"] = simulation.force_sensor
-    return table
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:

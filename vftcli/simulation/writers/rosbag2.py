@@ -18,7 +18,7 @@ from vftcli.readers.bags.ros_messages import (
 from vftcli.signals.arrays import Array
 from vftcli.signals.packages import needed
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.flange import flange_signals
+from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 
 RECEIVED_LATER_NS = 400_000
@@ -116,47 +116,62 @@ def wrenches(readings: Array, stamps: Nanoseconds) -> WrittenTopic:
 
 def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> WrittenTopic:
     """`/franka_robot_state_broadcaster/robot_state`; external estimates have libfranka's sign."""
-    columns = {name: column[rows] for name, column in franka_values(simulation).items()}
-    values = {**stamped(stamps), **robot_state(simulation.robot.name, columns)}
+    values = {**stamped(stamps), **robot_state(simulation, rows)}
     messages = serialised(ROBOT_STATE, values, len(rows), known_types())
     return WrittenTopic("/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages)
 
 
-def robot_state(robot: str, columns: dict[str, Array]) -> dict[str, Value]:
-    """The fields of FrankaRobotState that are not zero, from the columns of `franka_values`."""
-    names = [f"{robot}_joint{j}" for j in range(1, 8)]
-    measured, desired, motor, external = (
-        "measured_joint_state",
-        "desired_joint_state",
-        "measured_joint_motor_state",
-        "tau_ext_hat_filtered",
+def robot_state(simulation: Simulation, rows: Rows) -> dict[str, Value]:
+    """The fields of FrankaRobotState that are not zero."""
+    samples, seen, vendor = simulation.samples, simulation.measured, simulation.vendor
+    names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
+    measured, desired = "measured_joint_state", "desired_joint_state"
+    motor, external = "measured_joint_motor_state", "tau_ext_hat_filtered"
+    q, dq, target_q, target_dq = (
+        signal[rows] for signal in (seen.q, seen.dq, samples.target_q, samples.target_dq)
     )
+    actual, target = (
+        flange_signals(simulation.nominal.model, *motion)
+        for motion in ((q, dq), (target_q, target_dq))
+    )
+    tau_ext = -vendor.tau_ext[rows]
+    force, regular = wrench_of(tau_ext, actual.jacobian)
+    force[~regular] = 0.0
+    in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
+    about_base = force[:, 3:] + np.cross(actual.position, force[:, :3])
     return {
         **{f"{joints}.name": names for joints in (measured, desired, motor, external)},
-        f"{measured}.position": columns["q"],
-        f"{measured}.velocity": columns["dq"],
-        f"{measured}.effort": columns["tau"],
-        f"{desired}.position": columns["q_d"],
-        f"{desired}.velocity": columns["dq_d"],
-        f"{desired}.effort": columns["tau_d"],
-        f"{motor}.position": columns["q"],
-        f"{motor}.velocity": columns["dq"],
-        f"{external}.effort": columns["tau_ext"],
-        "ddq_d": columns["ddq_d"],
-        "dtau_j": columns["dtau"],
-        **six("k_f_ext_hat_k.wrench", WRENCH, columns["k_force"]),
-        **six("o_f_ext_hat_k.wrench", WRENCH, columns["o_force"]),
-        **pose("o_t_ee", columns["position"], columns["turn"]),
-        **pose("o_t_ee_d", columns["target_position"], columns["target_turn"]),
-        **pose("o_t_ee_c", columns["target_position"], columns["target_turn"]),
+        f"{measured}.position": q,
+        f"{measured}.velocity": dq,
+        f"{measured}.effort": seen.torque[rows],
+        f"{desired}.position": target_q,
+        f"{desired}.velocity": target_dq,
+        f"{desired}.effort": vendor.target_torque[rows],
+        f"{motor}.position": q,
+        f"{motor}.velocity": dq,
+        f"{external}.effort": tau_ext,
+        "ddq_d": samples.target_ddq[rows],
+        "dtau_j": np.gradient(seen.torque, samples.time, axis=0)[rows],
+        **six("k_f_ext_hat_k.wrench", WRENCH, np.hstack(in_flange)),
+        **six("o_f_ext_hat_k.wrench", WRENCH, np.hstack([force[:, :3], about_base])),
+        **pose("o_t_ee", actual.position, quaternions(actual.rotation)),
+        **pose("o_t_ee_d", target.position, quaternions(target.rotation)),
+        **pose("o_t_ee_c", target.position, quaternions(target.rotation)),
         **pose("f_t_ee", np.zeros((1, 3)), UPRIGHT),
         **pose("ee_t_k", np.zeros((1, 3)), UPRIGHT),
-        **six("o_dp_ee_d.twist", TWIST, columns["twist"]),
-        **six("o_dp_ee_c.twist", TWIST, columns["twist"]),
-        "time": columns["time"],
+        **six("o_dp_ee_d.twist", TWIST, target.twist),
+        **six("o_dp_ee_c.twist", TWIST, target.twist),
+        "time": (seen.stamp + simulation.scenario.sensing.start)[rows, None],
         "control_command_success_rate": 1.0,
         "robot_mode": MODE_MOVE,
     }
+
+
+def quaternions(rotation: Array) -> Array:
+    """Rotations (M, 3, 3) as x, y, z, w. (M, 4)"""
+    pin = needed("pinocchio", "a simulation")
+
+    return np.array([pin.Quaternion(R).coeffs() for R in rotation])
 
 
 def six(path: str, names: tuple[str, str], columns: Array) -> dict[str, Value]:
@@ -169,40 +184,3 @@ def pose(path: str, position: Array, quaternion: Array) -> dict[str, Value]:
     """A PoseStamped: position (M, 3) [m] and orientation (M, 4) as x, y, z, w."""
     turn = in_parts(f"{path}.pose.orientation", "xyzw", quaternion)
     return {**in_parts(f"{path}.pose.position", "xyz", position), **turn}
-
-
-def franka_values(simulation: Simulation) -> dict[str, Array]:
-    """Numbers of every sample by their mark. (M, count)"""
-    pin = needed("pinocchio", "a simulation")
-
-    samples, seen, model = simulation.samples, simulation.measured, simulation.nominal.model
-    actual = flange_signals(model, seen.q, seen.dq)
-    target = flange_signals(model, samples.target_q, samples.target_dq)
-    force, regular = wrench_of(-simulation.vendor.tau_ext, actual.jacobian)
-    force[~regular] = 0.0
-    in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
-    turn = np.array([pin.Quaternion(R).coeffs() for R in actual.rotation])
-    target_turn = np.array([pin.Quaternion(R).coeffs() for R in target.rotation])
-    rate = np.gradient(seen.torque, samples.time, axis=0)
-    return {
-        "q": seen.q,
-        "dq": seen.dq,
-        "tau": seen.torque,
-        "q_d": samples.target_q,
-        "dq_d": samples.target_dq,
-        "tau_d": simulation.vendor.target_torque,
-        "ddq_d": samples.target_ddq,
-        "dtau": rate,
-        "tau_ext": -simulation.vendor.tau_ext,
-        "k_force": np.hstack(in_flange),
-        # Its moment is about the base's origin.
-        "o_force": np.hstack(
-            [force[:, :3], force[:, 3:] + np.cross(actual.position, force[:, :3])]
-        ),
-        "position": actual.position,
-        "turn": turn,
-        "target_position": target.position,
-        "target_turn": target_turn,
-        "twist": target.twist,
-        "time": (seen.stamp + simulation.scenario.sensing.start)[:, None],
-    }

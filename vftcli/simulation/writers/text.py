@@ -1,0 +1,141 @@
+"""The vendors' text tables: which signal each column holds, and how its numbers are written.
+
+UR's two RTDE recorders: the official client writes one header row, single spaces and CR LF; SDU's
+ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the layout of 0.9.1 and
+later: commas, six significant digits.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.signals.errors import ParameterError
+from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.writers.signals import vendor_signals
+
+Columns = Mapping[str, str | tuple[float, ...]]
+"""Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
+row that follows, the last repeated: a command is executed one cycle later."""
+
+CLIENT: Columns = {
+    "timestamp": "time",
+    "target_q": "target_q",
+    "target_qd": "target_dq",
+    "target_qdd": "target_ddq",
+    "target_current": "target_current",
+    "target_moment": "target_torque",
+    "actual_q": "q",
+    "actual_qd": "dq",
+    "actual_current": "current",
+    "joint_control_output": "target_current",
+    "actual_TCP_pose": "pose",
+    "actual_TCP_speed": "twist",
+    "actual_TCP_force": "force",
+    "target_TCP_pose": "target_pose",
+    "target_TCP_speed": "target_twist",
+    "actual_digital_input_bits": (0,),
+    "joint_temperatures": "temperature",
+    "actual_execution_time": (0.0,),
+    "robot_mode": (7,),
+    "joint_mode": (253,) * 6,
+    "safety_status": (1,),
+    "actual_tool_accelerometer": "accelerometer",
+    "speed_scaling": (1.0,),
+    "target_speed_fraction": (1.0,),
+    "actual_momentum": "momentum",
+    "actual_main_voltage": (48.0,),
+    "actual_robot_voltage": (48.0,),
+    "actual_robot_current": (0.0,),
+    "actual_joint_voltage": (48.0,) * 6,
+    "actual_digital_output_bits": (0,),
+    "runtime_state": (2,),
+    "joint_position_deviation_ratio": (0.0,),
+}
+"""The default record_configuration.xml of the official client. The constants are of what the
+simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL."""
+
+RECORDER: Columns = {
+    "safety_mode" if name == "safety_status" else name: content
+    for name, content in CLIENT.items()
+    if name != "joint_position_deviation_ratio"
+}
+"""What ur_rtde's `startFileRecording` writes."""
+
+FRANKA: Columns = {
+    "time": "milliseconds",
+    "success_rate": (1,),
+    "state.q": "q",
+    "state.q_d": "target_q",
+    "state.dq": "dq",
+    "state.dq_d": "target_dq",
+    "state.tau_J": "tau",
+    "state.tau_ext_hat_filtered": "-tau_ext",
+    "cmd.q_d": "next target_q",
+    "cmd.dq_d": "next target_dq",
+    "cmd.O_T_EE_d": "next target_matrix",
+    "cmd.O_dP_EE_d": "next target_twist",
+    "cmd.tau_J_d": "next torque_command",
+}
+"""What `franka::logToCSV` writes; tau_ext_hat_filtered is minus the torque ON the arm."""
+
+SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment", "actual_q",
+         "actual_qd", "actual_current")  # fmt: skip
+"""The short recipe of a UR log: joint motion, currents and the target moment alone."""
+
+
+class TextTable(NamedTuple):
+    """A format: its columns, the mark of an element's number, and how rows and numbers look."""
+
+    columns: Columns
+    element: str
+    separator: str
+    end: str
+    number: str  # of a double
+    decimals: int | None = None  # to which it is rounded before
+
+    def write(self, path: Path, simulation: Simulation) -> None:
+        """Write the log.
+
+        Raises:
+            ParameterError: If the scenario asks for a recipe that is none.
+        """
+        known, rows = vendor_signals(simulation), np.array(simulation.measured.rows)
+        names, texts = [], []
+        for name, content in self.recipe(simulation).items():
+            if isinstance(content, str):
+                values = known[content.removeprefix("-").removeprefix("next ")]()
+                if content.startswith("next "):
+                    values = np.concatenate([values[1:], values[-1:]])
+                values = (-values if content.startswith("-") else values)[rows]
+                if self.decimals is not None:
+                    values = np.round(values, self.decimals)
+                columns = (values + values.dtype.type(0)).reshape(len(rows), -1).T.tolist()
+            else:
+                columns = [[value] * len(rows) for value in content]
+            several = len(columns) > 1
+            names += [name + self.element.format(i) * several for i in range(len(columns))]
+            texts += [list(map(self.text, column)) for column in columns]
+        lines = [self.separator.join(names), *map(self.separator.join, zip(*texts, strict=True))]
+        path.write_bytes((self.end.join(lines) + self.end).encode("ascii"))
+
+    def text(self, value: float) -> str:
+        """A number as it is written."""
+        return str(value) if isinstance(value, int) else self.number % value
+
+    def recipe(self, simulation: Simulation) -> Columns:
+        """The columns of the scenario's recipe; of a UR with the raw wrench of a mounted sensor."""
+        name = simulation.scenario.columns
+        if name not in {"full", "short"}:
+            raise ParameterError(f"columns is {name!r}; there is full, short")
+        if self.columns is FRANKA:
+            return FRANKA
+        extra = {} if simulation.force_sensor is None else {"ft_raw_wrench": "wrench"}
+        kept = {n: c for n, c in self.columns.items() if name == "full" or n in SHORT}
+        return {**kept, **extra}
+
+
+RTDE = TextTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
+UR_RTDE = TextTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
+LIBFRANKA = TextTable(FRANKA, "[{}]", ",", "\n", "%.6g")
