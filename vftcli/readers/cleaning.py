@@ -80,13 +80,15 @@ def cleaned(
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
     t = seconds(fresh)
+    gaps = gaps_of(t, GAP_STEPS)
+    of_gaps = told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
     source = source_of(raw, path, format_name, sha256, label)
     source = replace(
         source,
         rows=rows,
         duplicates=len(raw.stamps) - len(fresh.stamps),
         row_samples=row_samples(fresh, rows),
-        remarks=(*fresh.remarks, *gaps_in(t)),
+        remarks=(*fresh.remarks, *of_gaps),
     )
     return recording_of(raw, t, fresh.signals, source)
 
@@ -113,6 +115,9 @@ def source_of(
     raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
 ) -> Source:
     """Where a log came from, by its first samples."""
+    # In whole nanoseconds, where the log counts its stamps in them.
+    counts = raw.stamps.dtype.kind in "iu" and not raw.origin
+    per_tick = round(raw.tick * 1e9) if counts else 0
     return Source(
         path=path,
         label=f"{label or path.name} {raw.part}" if raw.part else label,
@@ -121,7 +126,7 @@ def source_of(
         sha256=sha256,
         clock=raw.clock,
         t0=float(raw.stamps[0]) * raw.tick + raw.origin,
-        t0_ns=first_nanosecond(raw),
+        t0_ns=int(raw.stamps[0]) * per_tick if per_tick >= 1 else None,
     )
 
 
@@ -146,14 +151,6 @@ def seconds(raw: RawLog) -> Array:
     """Time since the first sample; whole ticks are subtracted before they are scaled. (T,) [s]"""
     elapsed: Array = (raw.stamps - raw.stamps[0]).astype(np.float64)
     return elapsed if raw.tick == 1.0 else elapsed * raw.tick
-
-
-def first_nanosecond(raw: RawLog) -> int | None:
-    """The first stamp in whole nanoseconds, None where the log does not count them. [ns]"""
-    if raw.stamps.dtype.kind not in "iu" or raw.origin:
-        return None
-    per_tick = round(raw.tick * 1e9)
-    return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
 
 
 def without_empty_joints(raw: RawLog) -> RawLog:
@@ -357,12 +354,6 @@ def told_repeats(repeats: int, different: int) -> list[Remark]:
     if different:
         remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
     return remarks
-
-
-def gaps_in(t: Array) -> tuple[Remark, ...]:
-    """A remark on steps several times the median, which are kept as they are."""
-    gaps = gaps_of(t, GAP_STEPS)
-    return told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
 
 
 def told_gaps(gaps: Array) -> tuple[Remark, ...]:
