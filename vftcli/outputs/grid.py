@@ -238,7 +238,8 @@ def latex(*grids: Grid) -> str:
     place = "table*" if wide else "table"
     spec = "".join("l" if column.words else "r" for column in first.columns)
     parts = [rf"\begin{{{place}}}[tb]", r"\centering", rf"\caption{{{escape_latex(caption)}}}"]
-    parts += [rf"\label{{tab:{slug(first.title or caption)}}}", r"\footnotesize"]
+    letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
+    parts += [rf"\label{{tab:{letters or 'results'}}}", r"\footnotesize"]
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
     parts += latex_heads(first.columns)
     for grid in grids:
@@ -296,11 +297,6 @@ def latex_width(columns: Sequence[Column], rows: Sequence[Sequence[GridCell]]) -
         for k, c in enumerate(columns)
     ]
     return LETTER_WIDTH * sum(widths) + COLUMN_GAP * len(columns)
-
-
-def slug(title: str) -> str:
-    """A title as a label of LaTeX: small letters, digits and dashes."""
-    return re.sub("[^a-z0-9]+", "-", title.lower())[:40].strip("-") or "results"
 
 
 def latex_line(texts: Iterable[str]) -> str:

@@ -137,24 +137,17 @@ def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
     if analysis.reference is not None:
         yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
     for wrench in analysis.wrenches:
-        yield wrench_topic(
-            f"/vftcli/wrench/{ros_name(wrench.name)}", frame_id(wrench), wrench.known
-        )
+        parts: dict[str, Value] = {
+            "header.frame_id": frame_id(wrench),
+            **in_parts("wrench.force", "xyz", wrench.known[:, :3]),
+            **in_parts("wrench.torque", "xyz", wrench.known[:, 3:]),
+        }
+        yield OutputTopic(f"/vftcli/wrench/{ros_name(wrench.name)}", WRENCH, parts)
 
 
 def frame_id(wrench: Wrench) -> str:
     """The frame of a wrench: a link of the description, ``base@flange`` for base axes there."""
     return "base@flange" if wrench.frame == "base" else wrench.frame
-
-
-def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
-    """A topic of WrenchStamped messages. (T, 6)"""
-    parts: dict[str, Value] = {
-        "header.frame_id": frame,
-        **in_parts("wrench.force", "xyz", values[:, :3]),
-        **in_parts("wrench.torque", "xyz", values[:, 3:]),
-    }
-    return OutputTopic(name, WRENCH, parts)
 
 
 def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
@@ -178,9 +171,10 @@ def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
             (contact.stop, f"{contact_name(contact)} ends"),
         ):
             stamp = start + round(t * 1e9)
+            logged = stamped(np.array([stamp]), "timestamp")
             level = WARNING if contact.trust == "weak" else INFO
             values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
-            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged_at(stamp)))
+            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged))
     return sorted(made, key=lambda event: event.stamp)
 
 
@@ -191,11 +185,6 @@ def mounted_frames(analysis: Analysis) -> dict[str, Pose]:
     if sensed is None:
         return {}
     return {name: frame_pose(name, sensed.sensor.mounting) for name in sorted(names)}
-
-
-def logged_at(stamp: int) -> dict[str, Value]:
-    """The values of a log message's own stamp."""
-    return stamped(np.array([stamp]), "timestamp")
 
 
 def ros_name(name: str) -> str:
