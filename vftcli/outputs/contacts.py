@@ -14,12 +14,6 @@ from vftcli.signals.remarks import sentence
 MOST_ROWS = 20
 """Rows on the terminal unless all are asked for."""
 
-PART = 0.35
-"""An axis that holds more than this share of a force is named in its direction."""
-
-AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
-"""An axis' two directions, base axes."""
-
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
 
@@ -197,6 +191,13 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
     return [*row, place_words(contact), contact.trust]
+
+
+PART = 0.35
+"""An axis that holds more than this share of a force is named in its direction."""
+
+AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
+"""An axis' two directions, base axes."""
 
 
 def direction(force: Array) -> str:

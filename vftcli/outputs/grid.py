@@ -27,35 +27,6 @@ DECIMALS = "." + 20 * "0"
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
 """Width of a column of the IEEE, of a letter and of the gap between two columns. [in]"""
 
-LATEX_LETTERS = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "–": "--",
-    "†": r"$\dagger$",
-    "−": "$-$",
-    "α": r"$\alpha$",
-    "ξ": r"$\xi$",
-    "µ": r"$\mu$",
-    "τ": r"$\tau$",
-    "σ": r"$\sigma$",
-    "ω": r"$\omega$",
-    "×": r"$\times$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "→": r"$\rightarrow$",
-    "<": r"$<$",
-    "·": r"\,",
-}
-"""What LaTeX would not print as it stands, or not in every font encoding."""
-
 
 BEST = ' class="best"'
 """What the style sheet makes bold."""
@@ -353,6 +324,36 @@ def escape_markdown(text: str) -> str:
     for mark in "\\|*_`<>[]":
         text = text.replace(mark, f"\\{mark}")
     return text
+
+
+LATEX_LETTERS = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    "†": r"$\dagger$",
+    "−": "$-$",
+    "α": r"$\alpha$",
+    "ξ": r"$\xi$",
+    "µ": r"$\mu$",
+    "τ": r"$\tau$",
+    "σ": r"$\sigma$",
+    "ω": r"$\omega$",
+    "×": r"$\times$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "→": r"$\rightarrow$",
+    "<": r"$<$",
+    "·": r"\,",
+}
+"""What LaTeX would not print as it stands, or not in every font encoding."""
 
 
 def escape_latex(text: str) -> str:

@@ -16,19 +16,8 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
 from vftcli.signals.source import Source
 
-GARBAGE_ROWS = 100
-"""Rows at the start of a log among which a misaligned packet may have left garbage."""
-GARBAGE_VALUE = 1e6
-"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
-DENORMAL = 1e-300
-ABSURD_STAMP = 1e19
-"""Nanoseconds since 1970 stay below this for some centuries."""
-
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
-
-COLUMN = {"wrench": "axis", "jacobian": "cell"}
-"""What a column of a signal is that is none of a joint."""
 
 LEAVING_OUT = (
     "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
@@ -46,14 +35,8 @@ FARTHEST_START = 9e9
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 """How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
 
-BAD_SHARE = 0.05
-"""Share of samples below which positions of another size are errors, and not of another unit."""
-
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
-
-SEGMENT_ROWS = 20
-"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
@@ -176,6 +159,17 @@ def without_empty_joints(raw: RawLog) -> RawLog:
     )
 
 
+GARBAGE_ROWS = 100
+"""Rows at the start of a log among which a misaligned packet may have left garbage."""
+
+GARBAGE_VALUE = 1e6
+"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
+
+DENORMAL = 1e-300
+ABSURD_STAMP = 1e19
+"""Nanoseconds since 1970 stay below this for some centuries."""
+
+
 def without_leading_garbage(raw: RawLog) -> RawLog:
     """Drop the rows at the start that a misaligned packet left: absurd values, then a time jump.
 
@@ -208,6 +202,10 @@ def last_jump(raw: RawLog, rows: int) -> int:
     usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
     jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
     return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
+
+
+COLUMN = {"wrench": "axis", "jacobian": "cell"}
+"""What a column of a signal is that is none of a joint."""
 
 
 def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
@@ -245,6 +243,10 @@ class RestartError(ClockError):
     def __init__(self, message: str, rows: tuple[int, ...]) -> None:
         self.rows = rows
         super().__init__(message)
+
+
+SEGMENT_ROWS = 20
+"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
 def refuse_backward_steps(raw: RawLog, path: Path) -> None:
@@ -369,6 +371,10 @@ def told_gaps(gaps: Array) -> tuple[Remark, ...]:
         at_s=float(at),
     )
     return (remark,)
+
+
+BAD_SHARE = 0.05
+"""Share of samples below which positions of another size are errors, and not of another unit."""
 
 
 def refuse_degrees(raw: RawLog, path: Path) -> None:

@@ -44,9 +44,6 @@ TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
 INFO, WARNING = 2, 3
 """Levels of a log message."""
 
-LAST_STAMP = 2**31 - 1
-"""ROS 2 counts seconds in 32 bits with a sign."""
-
 BLOCK = 8192
 """Samples whose messages are held in memory at once."""
 
@@ -89,20 +86,6 @@ class Event(NamedTuple):
     kind: str
     values: Mapping[str, Value]
     latched: bool = False
-
-
-LATCHED = """\
-- history: keep_last
-  depth: 1
-  reliability: reliable
-  durability: transient_local
-  deadline: {sec: 9223372036, nsec: 854775807}
-  lifespan: {sec: 9223372036, nsec: 854775807}
-  liveliness: automatic
-  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
-  avoid_ros_namespace_conventions: false
-"""
-"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
 
 
 def joint_topic(
@@ -200,6 +183,10 @@ def source_stamps(recording: Recording) -> Nanoseconds:
     return stamps
 
 
+LAST_STAMP = 2**31 - 1
+"""ROS 2 counts seconds in 32 bits with a sign."""
+
+
 def stamps_of(recording: Recording) -> Nanoseconds:
     """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
     stamps = source_stamps(recording)
@@ -246,6 +233,20 @@ def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  
     """Write one message of a topic that has few."""
     body = serialised(event.kind, event.values, 1).tobytes()
     writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
+
+
+LATCHED = """\
+- history: keep_last
+  depth: 1
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
 
 
 def channel(writer: Any, topic: str, kind: str, latched: bool = False) -> int:  # noqa: ANN401
