@@ -22,7 +22,7 @@ from vftcli.batch.outcome import (
     Task,
     Work,
     failure_of,
-    perform_all,
+    perform,
 )
 from vftcli.signals.version import VERSION
 
@@ -111,13 +111,16 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
     Raises:
         EngineError: If no certificate can be made.
     """
+    from dask.system import CPU_COUNT
     from distributed import Client
     from distributed.security import Security
     from distributed.system import MEMORY_LIMIT
 
     from vftcli.batch.nodes import closed_cluster
 
-    workers = choice.workers or most_workers()
+    # As many as this machine has cores and memory for.
+    most = max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
+    workers = choice.workers or most
     memory = choice.memory or int(MEMORY_LIMIT / workers)
     try:
         security = Security.temporary()
@@ -132,14 +135,6 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
         Client(cluster, security=security) as client,
     ):
         yield client
-
-
-def most_workers() -> int:
-    """As many workers as this machine has cores and memory for, at most `MOST_WORKERS`."""
-    from dask.system import CPU_COUNT
-    from distributed.system import MEMORY_LIMIT
-
-    return max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
 
 
 @contextmanager
@@ -291,7 +286,7 @@ def perform_there(
 ) -> list[tuple[Any, Failure | None, Effort]]:
     """Do the work on each task of a group; this is what runs in a worker."""
     settle()
-    return perform_all(work, tasks)
+    return [perform(work, task) for task in tasks]
 
 
 @cache

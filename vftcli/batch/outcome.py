@@ -3,7 +3,7 @@
 import os
 import socket
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextvars import ContextVar
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -73,13 +73,6 @@ class Outcome(NamedTuple, Generic[Task]):
 def begin(stage: str) -> None:
     """Say what the work does now; a failure is told with it."""
     _stage.set(stage)
-
-
-def perform_all(
-    work: Work[Task], tasks: Sequence[Task]
-) -> list[tuple[Any, Failure | None, Effort]]:
-    """Do the work on each task of a group; this is what runs in a worker."""
-    return [perform(work, task) for task in tasks]
 
 
 def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:

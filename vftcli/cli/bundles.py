@@ -9,7 +9,6 @@ function with one parameter an option, and hands the command the bundles put tog
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
@@ -125,11 +124,15 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
 
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.cli.config import taken
+        from vftcli.cli.console import speaking
         from vftcli.outputs.files import protected
 
         kept = taken().path
         inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
-        with protected(inputs), loudness(values):
+        # How much it says: what its -v and -q ask, as usual where it has none.
+        asked = {name.rpartition("_")[2]: value for name, value in values.items()}
+        loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
+        with protected(inputs), loud:
             command(**{p.name: put_together(p.name, p.annotation, values) for p in own})
 
     flat = [single for p in own for single in parameters(p.name, p.annotation, p.default)]
@@ -138,14 +141,6 @@ def taken_apart(command: Callable[..., None]) -> Callable[..., None]:
     called.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
     called.__annotations__ = {}
     return called
-
-
-def loudness(values: Mapping[str, Any]) -> AbstractContextManager[None]:
-    """How much a command says: what its ``-v`` and ``-q`` ask, as usual where it has none."""
-    from vftcli.cli.console import speaking
-
-    asked = {name.rpartition("_")[2]: value for name, value in values.items()}
-    return speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
 
 
 def parameters(

@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
-    from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 QUIET, USUAL, DETAILS = range(3)
 """How much a command says."""
@@ -206,20 +205,15 @@ def say_analysis(analysis: "Analysis") -> None:
     for note in (*analysis.robot.remarks, *analysis.remarks, *own):
         detail(f"note: {note}")
     say_remarks(reference)
-    if analysis.virtual_sensor is not None:
-        say_wrenches(analysis.virtual_sensor)
+    if (sensed := analysis.virtual_sensor) is not None:
+        from vftcli.outputs.grid import terminal
+        from vftcli.outputs.log.wrench_tables import drift_grid
+        from vftcli.virtual_sensor.frames import FRAMES
 
-
-def say_wrenches(sensed: "SensorReading") -> None:
-    """Frame, zero drift and remarks of the virtual sensor."""
-    from vftcli.outputs.grid import terminal
-    from vftcli.outputs.log.wrench_tables import drift_grid
-    from vftcli.virtual_sensor.frames import FRAMES
-
-    detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
-    if sensed.drifts:
-        detail(terminal(drift_grid(sensed.drifts)).rstrip())
-    say_remarks(sensed.remarks)
+        detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")
+        if sensed.drifts:
+            detail(terminal(drift_grid(sensed.drifts)).rstrip())
+        say_remarks(sensed.remarks)
 
 
 def say_remarks(remarks: "Iterable[Remark]") -> None:

@@ -34,9 +34,6 @@ NARROWEST, WIDEST, LEFT = 72, 100, 33
 SHORT = 3
 """Lines of a paragraph that the short help shows."""
 
-TOPICS = Path(__file__).parent / "topics.toml"
-"""Topic → its summary and its text."""
-
 
 class GroupedCommand(TyperCommand):
     """A command whose `--help` shows the options wanted most, in groups, and `--help-all` all."""
@@ -207,6 +204,10 @@ def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
     shown = (p for p in group.get_params(ctx) if p.name != "show_completion")
     rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
     return "\n".join([*lines, "", *two_columns(rows, width)]) + "\n"
+
+
+TOPICS = Path(__file__).parent / "topics.toml"
+"""Topic → its summary and its text."""
 
 
 @cache

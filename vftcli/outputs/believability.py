@@ -45,9 +45,6 @@ SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
 STILL = 0.01
 """A joint slower than this rests. [rad/s]"""
 
-FULL_OF_REST = 0.5
-"""A joint that rests in more than this share of the log is said to rest."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
@@ -330,6 +327,10 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
             yield Ground(
                 standing="caution", subject="temperature", sentence=sentence(finding), of_log=False
             )
+
+
+FULL_OF_REST = 0.5
+"""A joint that rests in more than this share of the log is said to rest."""
 
 
 def resting(recording: Recording) -> Mask:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.contacts.contact_list import FIRST_COLUMNS, CarriedLoad, Contact, ContactList
+from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
 from vftcli.outputs.grid import Column, Grid
 from vftcli.outputs.plain_rows import csv_rows
 from vftcli.signals.arrays import Array
@@ -13,12 +13,6 @@ from vftcli.signals.remarks import sentence
 
 MOST_ROWS = 20
 """Rows on the terminal unless all are asked for."""
-
-PART = 0.35
-"""An axis that holds more than this share of a force is named in its direction."""
-
-AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
-"""An axis' two directions, base axes."""
 
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
@@ -80,18 +74,13 @@ def by_force(contact: Contact) -> tuple[bool, float, float]:
 
 def answer(found: ContactList) -> str:
     """What the arm carries and what touched it, in a few sentences."""
-    return " ".join(filter(None, (carried_words(found.load), list_words(found))))
-
-
-def carried_words(load: CarriedLoad | None) -> str:
-    """A load that the arm carries and its model lacks; "" without one."""
-    if load is None:
-        return ""
+    if (load := found.load) is None:
+        return list_words(found)
     mass, (start, stop) = f"{load.mass:.2f} ± {load.sd:.2f} kg", load.span
     hint = f": {load.payload}? Add --payload {load.payload}" if load.payload else ""
     return (
         f"The arm carries {mass} that {load.robot} does not know of "
-        f"({start:.1f}–{stop:.1f} s){hint}."
+        f"({start:.1f}–{stop:.1f} s){hint}. {list_words(found)}"
     )
 
 
@@ -197,6 +186,13 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
     return [*row, place_words(contact), contact.trust]
+
+
+PART = 0.35
+"""An axis that holds more than this share of a force is named in its direction."""
+
+AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
+"""An axis' two directions, base axes."""
 
 
 def direction(force: Array) -> str:

@@ -93,7 +93,7 @@ def table_file(path: Path) -> Iterator[Path]:
     try:
         yield path
     except ComputeError as error:
-        why = re.sub(r".*IO error: | \(os error \d+\)", "", one_line(error)[:200])
+        why = re.sub(r".*IO error: | \(os error \d+\)", "", " ".join(str(error).split())[:200])
         raise unwritable(Path(path.name), OSError(why)) from None
 
 
@@ -231,7 +231,10 @@ class OutputFolder:
                     # Renaming within a file system is atomic for each file.
                     places[path].replace(path)
             to_disk([self.path])
-            remove_empty({path.parent for path in earlier}, self.path)
+            # Folders that an earlier run filled and nothing is left in.
+            for folder in sorted({path.parent for path in earlier} - {self.path}, reverse=True):
+                with suppress(OSError):
+                    folder.rmdir()
 
     def _discard(self) -> None:
         """Remove the folders that were made, if they are empty."""
@@ -272,14 +275,6 @@ def kept_aside(paths: Iterable[Path], aside: Path) -> Iterator[None]:
             if place.exists() or place.is_symlink():
                 place.replace(path)
         raise
-
-
-def remove_empty(folders: Iterable[Path], top: Path) -> None:
-    """Remove folders below `top` that an earlier run filled and nothing is left in."""
-    for folder in sorted(set(folders), reverse=True):
-        if folder != top:
-            with suppress(OSError):
-                folder.rmdir()
 
 
 def refuse_existing(path: Path, force: bool) -> None:
@@ -349,8 +344,3 @@ def unwritable(path: Path, error: OSError) -> OutputError:
     """The one-line error for what the operating system refused."""
     why = error.strerror or str(error)
     return OutputError(f"{path} cannot be written: {why[0].lower()}{why[1:]}; give another -o")
-
-
-def one_line(error: Exception) -> str:
-    """What an error of a library says, on one line."""
-    return " ".join(str(error).split())

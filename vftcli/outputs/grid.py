@@ -27,35 +27,6 @@ DECIMALS = "." + 20 * "0"
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
 """Width of a column of the IEEE, of a letter and of the gap between two columns. [in]"""
 
-LATEX_LETTERS = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "–": "--",
-    "†": r"$\dagger$",
-    "−": "$-$",
-    "α": r"$\alpha$",
-    "ξ": r"$\xi$",
-    "µ": r"$\mu$",
-    "τ": r"$\tau$",
-    "σ": r"$\sigma$",
-    "ω": r"$\omega$",
-    "×": r"$\times$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "→": r"$\rightarrow$",
-    "<": r"$<$",
-    "·": r"\,",
-}
-"""What LaTeX would not print as it stands, or not in every font encoding."""
-
 
 BEST = ' class="best"'
 """What the style sheet makes bold."""
@@ -238,7 +209,8 @@ def latex(*grids: Grid) -> str:
     place = "table*" if wide else "table"
     spec = "".join("l" if column.words else "r" for column in first.columns)
     parts = [rf"\begin{{{place}}}[tb]", r"\centering", rf"\caption{{{escape_latex(caption)}}}"]
-    parts += [rf"\label{{tab:{slug(first.title or caption)}}}", r"\footnotesize"]
+    letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
+    parts += [rf"\label{{tab:{letters or 'results'}}}", r"\footnotesize"]
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
     parts += latex_heads(first.columns)
     for grid in grids:
@@ -298,11 +270,6 @@ def latex_width(columns: Sequence[Column], rows: Sequence[Sequence[GridCell]]) -
     return LETTER_WIDTH * sum(widths) + COLUMN_GAP * len(columns)
 
 
-def slug(title: str) -> str:
-    """A title as a label of LaTeX: small letters, digits and dashes."""
-    return re.sub("[^a-z0-9]+", "-", title.lower())[:40].strip("-") or "results"
-
-
 def latex_line(texts: Iterable[str]) -> str:
     """Entries as one row of a LaTeX tabular."""
     return rf"{' & '.join(texts)} \\"
@@ -357,6 +324,36 @@ def escape_markdown(text: str) -> str:
     for mark in "\\|*_`<>[]":
         text = text.replace(mark, f"\\{mark}")
     return text
+
+
+LATEX_LETTERS = {
+    "\\": r"\textbackslash{}",
+    "&": r"\&",
+    "%": r"\%",
+    "$": r"\$",
+    "#": r"\#",
+    "_": r"\_",
+    "{": r"\{",
+    "}": r"\}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "–": "--",
+    "†": r"$\dagger$",
+    "−": "$-$",
+    "α": r"$\alpha$",
+    "ξ": r"$\xi$",
+    "µ": r"$\mu$",
+    "τ": r"$\tau$",
+    "σ": r"$\sigma$",
+    "ω": r"$\omega$",
+    "×": r"$\times$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "→": r"$\rightarrow$",
+    "<": r"$<$",
+    "·": r"\,",
+}
+"""What LaTeX would not print as it stands, or not in every font encoding."""
 
 
 def escape_latex(text: str) -> str:

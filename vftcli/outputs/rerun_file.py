@@ -26,28 +26,6 @@ CONTACTS = "/contacts"
 
 Stream = Any
 
-SPELLED = {
-    "ᵀ": "^T",
-    "⁻": "^-",
-    "√": "sqrt ",
-    "≤": "<=",
-    "≥": ">=",
-    "≈": "~",
-    "→": "->",
-    "−": "-",
-    "–": "-",
-    "—": "-",
-    "…": "...",
-    "‘": "'",
-    "’": "'",
-    "“": '"',
-    "”": '"',
-    "∂": "d",
-    "Σ": "sum ",
-    "ẋ": "dx",
-}
-"""How to write what the viewer's font may lack."""
-
 
 class ArmView(NamedTuple):
     """The space in which arms stand.
@@ -269,6 +247,29 @@ def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
             color=np.array([int(f"{line.colour[1:]}ff", 16) for line in own], dtype=np.uint32),
         )
         stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
+
+
+SPELLED = {
+    "ᵀ": "^T",
+    "⁻": "^-",
+    "√": "sqrt ",
+    "≤": "<=",
+    "≥": ">=",
+    "≈": "~",
+    "→": "->",
+    "−": "-",
+    "–": "-",
+    "—": "-",
+    "…": "...",
+    "‘": "'",
+    "’": "'",
+    "“": '"',
+    "”": '"',
+    "∂": "d",
+    "Σ": "sum ",
+    "ẋ": "dx",
+}
+"""How to write what the viewer's font may lack."""
 
 
 def drawable(text: str) -> str:

@@ -64,7 +64,8 @@ def log_screen(
     tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
     text = ""
     for each, rows in FORMS[:1] if every else FORMS[1:]:
-        believed, table = belief_lines(found, canvas, each), table_lines(analysis, rows, canvas)
+        believed, listed = belief_lines(found, canvas, each), analysis.contacts
+        table = [] if listed is None else list_lines(listed, rows, canvas)
         parts = [part for part in (head, bars, table, [*believed, *tail], list(below)) if part]
         text = "\n\n".join("\n".join(block) for block in parts) + "\n"
         if text.count("\n") <= MOST_LINES:
@@ -72,7 +73,7 @@ def log_screen(
     return canvas.shown(text)
 
 
-def list_screen(found: ContactList, canvas: Canvas, *, every: bool = False) -> str:
+def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
     """A list that was made earlier: its log, the answer, the rows."""
     head = f"{printable(found.recording)} · {found.duration:.1f} s · as listed when it was written"
     lines = [canvas.painted(head, "bold"), "", f"  {answer(found)}", ""]
@@ -89,17 +90,6 @@ def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     contacts = analysis.contacts.contacts
     shown = [] if contacts[0].is_load else hardest_rows(contacts)
     return force_bars(analysis.t, force, shown, canvas)
-
-
-def table_lines(analysis: Analysis, most: int | None, canvas: Canvas) -> list[str]:
-    """The contacts, the hardest of them where they are many, and what can be said of the rest.
-
-    Args:
-        analysis: What was found.
-        most: Rows that are shown at most, None for all.
-        canvas: What the terminal can show.
-    """
-    return [] if analysis.contacts is None else list_lines(analysis.contacts, most, canvas)
 
 
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:

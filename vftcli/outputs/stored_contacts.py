@@ -46,6 +46,7 @@ def stored_record(estimates: Path) -> dict[str, Any]:
 def stored_list(record: Mapping[str, Any]) -> ContactList:
     """A list from its record; what its free motion was is not kept, but in words."""
     model = record["model"]
+    torque, load = record["largest_unexplained"], record["load"]
     prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
     return ContactList(
         recording=record["recording"],
@@ -58,8 +59,8 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
         false_on_free=record["false_on_free"],
         threshold=record["evidence_threshold_nats"],
         smallest_force=record["smallest_force_N"],
-        unexplained=stored_torque(record["largest_unexplained"]),
-        load=stored_load(record["load"]),
+        unexplained=None if torque is None else Unexplained(**torque),
+        load=None if load is None else stored_load(load),
         stops=tuple(record["stops_s"]),
         model=ContactModel(
             prior=None if None in prior else ContactPrior(*prior),
@@ -72,15 +73,8 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
     )
 
 
-def stored_torque(row: Mapping[str, Any] | None) -> Unexplained | None:
-    """The largest unexplained torque from its record."""
-    return None if row is None else Unexplained(**row)
-
-
-def stored_load(row: Mapping[str, Any] | None) -> CarriedLoad | None:
+def stored_load(row: Mapping[str, Any]) -> CarriedLoad:
     """A load from its record."""
-    if row is None:
-        return None
     start, stop = row["span_s"]
     return CarriedLoad(
         row["mass_kg"], row["mass_sd_kg"], row["robot"], row["payload"], (start, stop)

@@ -96,7 +96,7 @@ class Group(NamedTuple):
     twice: str = ""
 
 
-def picks_by_alias(table: Table, stated: Sequence[Item] = ()) -> tuple[Picks, tuple[str, ...]]:
+def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[str, ...]]:
     """Find the signals of a headed table by the names of its columns, and the joints' names.
 
     Args:
@@ -375,19 +375,3 @@ def table_clock(table: Table, column: int) -> Cell:
             "row, but a sample has one time. Name another column with --columns, as in t=…,q=…"
         )
     return Cell(column, 0 if column in table.lists else None)
-
-
-def vector_picks(table: Table, names: dict[str, str], joints: Sequence[int]) -> tuple[Pick, ...]:
-    """Picks of vendor columns that are called name_0, name_1, … where all of them are there.
-
-    Args:
-        table: The table.
-        names: Field of Recording → the vendor's name.
-        joints: The indices of the joints.
-    """
-    position = {name: column for column, name in reversed(list(enumerate(table.names or ())))}
-    return tuple(
-        Pick(signal=signal, cells=tuple(Cell(position[f"{name}_{j}"]) for j in joints))
-        for signal, name in names.items()
-        if all(f"{name}_{j}" in position for j in joints)
-    )

@@ -16,19 +16,8 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
 from vftcli.signals.source import Source
 
-GARBAGE_ROWS = 100
-"""Rows at the start of a log among which a misaligned packet may have left garbage."""
-GARBAGE_VALUE = 1e6
-"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
-DENORMAL = 1e-300
-ABSURD_STAMP = 1e19
-"""Nanoseconds since 1970 stay below this for some centuries."""
-
 ABSURD = 1e9
 """Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
-
-COLUMN = {"wrench": "axis", "jacobian": "cell"}
-"""What a column of a signal is that is none of a joint."""
 
 LEAVING_OUT = (
     "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
@@ -46,14 +35,8 @@ FARTHEST_START = 9e9
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
 """How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
 
-BAD_SHARE = 0.05
-"""Share of samples below which positions of another size are errors, and not of another unit."""
-
 GAP_STEPS = 4.0
 """A step this many times the median is reported as a gap."""
-
-SEGMENT_ROWS = 20
-"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
@@ -80,13 +63,15 @@ def cleaned(
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
     t = seconds(fresh)
+    gaps = gaps_of(t, GAP_STEPS)
+    of_gaps = told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
     source = source_of(raw, path, format_name, sha256, label)
     source = replace(
         source,
         rows=rows,
         duplicates=len(raw.stamps) - len(fresh.stamps),
         row_samples=row_samples(fresh, rows),
-        remarks=(*fresh.remarks, *gaps_in(t)),
+        remarks=(*fresh.remarks, *of_gaps),
     )
     return recording_of(raw, t, fresh.signals, source)
 
@@ -113,6 +98,9 @@ def source_of(
     raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
 ) -> Source:
     """Where a log came from, by its first samples."""
+    # In whole nanoseconds, where the log counts its stamps in them.
+    counts = raw.stamps.dtype.kind in "iu" and not raw.origin
+    per_tick = round(raw.tick * 1e9) if counts else 0
     return Source(
         path=path,
         label=f"{label or path.name} {raw.part}" if raw.part else label,
@@ -121,7 +109,7 @@ def source_of(
         sha256=sha256,
         clock=raw.clock,
         t0=float(raw.stamps[0]) * raw.tick + raw.origin,
-        t0_ns=first_nanosecond(raw),
+        t0_ns=int(raw.stamps[0]) * per_tick if per_tick >= 1 else None,
     )
 
 
@@ -148,14 +136,6 @@ def seconds(raw: RawLog) -> Array:
     return elapsed if raw.tick == 1.0 else elapsed * raw.tick
 
 
-def first_nanosecond(raw: RawLog) -> int | None:
-    """The first stamp in whole nanoseconds, None where the log does not count them. [ns]"""
-    if raw.stamps.dtype.kind not in "iu" or raw.origin:
-        return None
-    per_tick = round(raw.tick * 1e9)
-    return int(raw.stamps[0]) * per_tick if per_tick >= 1 else None
-
-
 def without_empty_joints(raw: RawLog) -> RawLog:
     """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
     names, width = raw.joint_names, len(raw.joint_names)
@@ -177,6 +157,17 @@ def without_empty_joints(raw: RawLog) -> RawLog:
         joint_names=tuple(names[k] for k in keep),
         remarks=(*raw.remarks, told),
     )
+
+
+GARBAGE_ROWS = 100
+"""Rows at the start of a log among which a misaligned packet may have left garbage."""
+
+GARBAGE_VALUE = 1e6
+"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
+
+DENORMAL = 1e-300
+ABSURD_STAMP = 1e19
+"""Nanoseconds since 1970 stay below this for some centuries."""
 
 
 def without_leading_garbage(raw: RawLog) -> RawLog:
@@ -211,6 +202,10 @@ def last_jump(raw: RawLog, rows: int) -> int:
     usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
     jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
     return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
+
+
+COLUMN = {"wrench": "axis", "jacobian": "cell"}
+"""What a column of a signal is that is none of a joint."""
 
 
 def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
@@ -248,6 +243,10 @@ class RestartError(ClockError):
     def __init__(self, message: str, rows: tuple[int, ...]) -> None:
         self.rows = rows
         super().__init__(message)
+
+
+SEGMENT_ROWS = 20
+"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
 def refuse_backward_steps(raw: RawLog, path: Path) -> None:
@@ -359,12 +358,6 @@ def told_repeats(repeats: int, different: int) -> list[Remark]:
     return remarks
 
 
-def gaps_in(t: Array) -> tuple[Remark, ...]:
-    """A remark on steps several times the median, which are kept as they are."""
-    gaps = gaps_of(t, GAP_STEPS)
-    return told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
-
-
 def told_gaps(gaps: Array) -> tuple[Remark, ...]:
     """A remark on gaps: their lengths, and the times at which they begin. (G, 2) [s]"""
     if not len(gaps):
@@ -378,6 +371,10 @@ def told_gaps(gaps: Array) -> tuple[Remark, ...]:
         at_s=float(at),
     )
     return (remark,)
+
+
+BAD_SHARE = 0.05
+"""Share of samples below which positions of another size are errors, and not of another unit."""
 
 
 def refuse_degrees(raw: RawLog, path: Path) -> None:

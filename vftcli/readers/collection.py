@@ -114,7 +114,10 @@ class LogCollection:
             return
         try:
             reader = recognise(folder, self._choice)
-            if reader is not DROID and not is_several_bags(folder, reader):
+            # Recorders write metadata.yaml beside the pieces of one recording: without it what
+            # reads as a bag is a folder of several.
+            several_bags = reader is ROS2 and not (folder / METADATA).is_file()
+            if reader is not DROID and not several_bags:
                 yield from self._episodes(folder, reader)
                 return
         except LogError:
@@ -153,14 +156,6 @@ class LogCollection:
         if reader.general and not holds_numbers(open_log(path)):
             return False  # prose reads as a table of one column
         return not stored_observers(path)
-
-
-def is_several_bags(folder: Path, reader: Reader) -> bool:
-    """Whether a folder that reads as a bag holds files that are logs themselves.
-
-    Recorders write metadata.yaml beside the pieces of one recording.
-    """
-    return reader is ROS2 and not (folder / METADATA).is_file()
 
 
 def holds_numbers(file: LogFile) -> bool:

@@ -177,18 +177,10 @@ def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: 
             f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
             "--columns, as in t=…,q=PATH/OF/POSITIONS."
         )
-    return from_table(leveled(table), request)
-
-
-def leveled(table: Hdf5Table) -> Hdf5Table:
-    """The datasets of the one group that has positions by name, and those at the top.
-
-    Raises:
-        LogError: If several groups have them.
-    """
     names = table.names or ()
-    prefix = level_of(table.path, names, "/")
-    return table.within(prefix, [name for name in names if "/" not in name])
+    # The datasets of the one group that has positions by name, and those at the top.
+    top = [name for name in names if "/" not in name]
+    return from_table(table.within(level_of(table.path, names, "/"), top), request)
 
 
 def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
@@ -260,7 +252,7 @@ def episodes_in(file: LogFile) -> tuple[int, ...]:
         return numbers_of(layout_of(table_of(file.path, content))[1])
 
 
-def episode_places(file: LogFile, columns: str | None = None) -> dict[int, str]:
+def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
     """The group, as "observations/", in which each episode of an HDF5 file has its positions.
 
     Args:

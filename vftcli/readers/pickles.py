@@ -14,9 +14,6 @@ from vftcli.readers.arrays_file import episodes_of_skills, read_dictionary
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.signals.errors import LogError
 
-PICKLE_LIMIT = 512 * 1024 * 1024
-"""Larger pickles are refused: they have to be held in memory twice."""
-
 BUILT_LIMIT = 1 << 20
 """Numbers that a pickle of any size may build; a larger one as many as it has bytes."""
 
@@ -220,6 +217,10 @@ class ArrayUnpickler(pickle.Unpickler):
         built = whole, 1 + sum(size for _, size in parts)
         known[id(value)] = built
         return built
+
+
+PICKLE_LIMIT = 512 * 1024 * 1024
+"""Larger pickles are refused: they have to be held in memory twice."""
 
 
 def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickle holds

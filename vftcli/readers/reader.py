@@ -88,7 +88,8 @@ class LogFile:
     @cached_property
     def lines(self) -> list[bytes]:
         """The non-empty lines of the head, without their ends; [] if the head is not text."""
-        if not looks_like_text(self.head):
+        # No text in UTF-8 or an eight-bit encoding holds one of these.
+        if any(bytes([c]) in self.head for c in (*range(7), *range(14, 20), 127)):
             return []
         lines = self.head.replace(b"\r", b"\n").split(b"\n")
         return [line for line in lines if line.strip()]
@@ -328,14 +329,6 @@ def format_words() -> dict[str, dict[str, str]]:
     """The words of every format, by its name."""
     text = (Path(__file__).parent / "formats.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
-
-
-def looks_like_text(head: bytes) -> bool:
-    """Whether bytes could be the start of a text file in UTF-8 or an eight-bit encoding."""
-    if not head or b"\0" in head:
-        return False
-    controls = sum(head.count(bytes([c])) for c in (1, 2, 3, 4, 5, 6, 14, 15, 16, 17, 18, 19, 127))
-    return controls == 0
 
 
 def open_log(path: Path) -> LogFile:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import vector_picks
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
@@ -48,12 +47,18 @@ def read_rtde(table: Table, request: ReadChoice) -> RawLog:
             "--format table --columns 't@125Hz,q=actual_q_{i},dq=actual_qd_{i},"
             "current=actual_current_{i}'."
         )
+    position = {name: column for column, name in reversed(list(enumerate(names)))}
+    signals = tuple(
+        Pick(signal=signal, cells=tuple(Cell(position[f"{name}_{j}"]) for j in range(6)))
+        for signal, name in JOINT_COLUMNS.items()
+        if all(f"{name}_{j}" in position for j in range(6))
+    )
     picks = Picks(
-        signals=vector_picks(table, JOINT_COLUMNS, range(6)),
+        signals=signals,
         clock=Pick(signal="t", cells=(Cell(names.index(CLOCK)),), unit="s"),
         constants=tuple(names.index(name) for name in PAYLOAD if name in names),
     )
-    if not any(pick.signal == "q" for pick in picks.signals):
+    if not any(pick.signal == "q" for pick in signals):
         raise LogError(
             f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add "
             "actual_q to the recipe and record again."

@@ -2,7 +2,7 @@
 
 import re
 import shlex
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,7 +81,18 @@ def description(file: LogFile) -> str:
     """What a path is and what to do, behind its name."""
     if file.is_folder:
         return of_folder(file.path, file.entries)
-    return known_kind(file) or (of_text(file) if file.lines else of_bytes(file.head))
+    if kind := known_kind(file):
+        return kind
+    if file.lines:
+        first = file.first_line.decode("utf-8", "replace")[:60].strip()
+        return (
+            f"a text that is no table of numbers (it begins {printable(first)!r}); save the log as "
+            "CSV: a line of names, then one row a sample"
+        )
+    return (
+        f"a binary file of no kind that is known (it begins {file.head[:8].hex(' ')}); export the "
+        "log as CSV, Parquet or MCAP, or name its format with --format (vftcli formats lists them)"
+    )
 
 
 def known_kind(file: LogFile) -> str | None:
@@ -104,7 +115,8 @@ def of_folder(path: Path, entries: Sequence[str]) -> str:
     if not logs:
         shown = listed(entries)
         return f"a folder without a log ({shown}); give a log, or the folder of a bag"
-    ending = most_common([name[name.rindex(".") :] for name in logs])
+    endings = [name[name.rindex(".") :] for name in logs]
+    ending = max(endings, key=endings.count)
     count = f"{len(logs)} files that may be logs" if len(logs) > 1 else "a file that may be a log"
     every = f"{shlex.quote(printable(str(path)))}/*{ending}"
     return (
@@ -114,31 +126,7 @@ def of_folder(path: Path, entries: Sequence[str]) -> str:
     )
 
 
-def of_text(file: LogFile) -> str:
-    """A text that is no table."""
-    first = file.first_line.decode("utf-8", "replace")[:60].strip()
-    return (
-        f"a text that is no table of numbers (it begins {printable(first)!r}); save the log as "
-        "CSV: a line of names, then one row a sample"
-    )
-
-
-def of_bytes(head: bytes) -> str:
-    """A file of bytes that nothing is known of."""
-    shown = head[:8].hex(" ")
-    return (
-        f"a binary file of no kind that is known (it begins {shown}); export the log as CSV, "
-        "Parquet or MCAP, or name its format with --format (vftcli formats lists them)"
-    )
-
-
 def listed(names: Sequence[str]) -> str:
     """A few names for a message."""
     more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
     return ", ".join(printable(name[:40]) for name in names[:SHOWN]) + more
-
-
-def most_common(words: Sequence[str]) -> str:
-    """The word that stands most often, the first of several."""
-    by_count: Callable[[str], int] = words.count
-    return max(dict.fromkeys(words), key=by_count)

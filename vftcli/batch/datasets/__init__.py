@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from vftcli.batch.datasets.episodes import Dataset
-from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below, is_hdf5_file
+from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset
+from vftcli.readers.hdf5 import is_hdf5
 from vftcli.readers.lerobot import LEROBOT
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
@@ -20,9 +21,10 @@ def open_dataset(path: Path, columns: str | None = None) -> Dataset:
     Raises:
         LogError: If it is none that forces can be written into.
     """
-    if LEROBOT.recognises(open_log(path)):
+    file = open_log(path)
+    if LEROBOT.recognises(file):
         return LeRobotDataset(path)
-    if path.is_file() and is_hdf5_file(path):
+    if path.is_file() and is_hdf5(file.head):
         return Hdf5Dataset(path.parent, path, columns)
     if path.is_dir() and files_below(path):
         return Hdf5Dataset(path, None, columns)

@@ -6,18 +6,12 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
-from vftcli.readers.hdf5 import is_hdf5
 from vftcli.readers.hdf5_layouts import episode_places, episodes_in
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
 ENDINGS = (".h5", ".hdf5")
 """Names that files of episodes end with."""
-
-
-def is_hdf5_file(path: Path) -> bool:
-    """Whether a file is HDF5."""
-    return is_hdf5(open_log(path).head)
 
 
 def files_below(folder: Path) -> list[Path]:

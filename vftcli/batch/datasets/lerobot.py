@@ -118,7 +118,8 @@ class LeRobotDataset:
             LogError: If a file of statistics holds none, or the features have no names.
         """
         info = info_of(self.folder)
-        fps = {"fps": info["fps"]} if is_third(info) and "fps" in info else {}
+        third = str(info.get("codebase_version", "")).startswith("v3")
+        fps = {"fps": info["fps"]} if third and "fps" in info else {}
         features = named_features(self.folder, info)
         for column in columns:
             features[PREFIX + column.name] = {
@@ -188,11 +189,6 @@ class LeRobotDataset:
                 told["stats"][PREFIX + column.name] = plain(own, keys)
             lines.append(json.dumps(told, ensure_ascii=False) + "\n")
         (copy / "meta" / path.name).write_text("".join(lines), encoding="utf-8")
-
-
-def is_third(info: Mapping[str, Any]) -> bool:
-    """Whether a description is of version 3."""
-    return str(info.get("codebase_version", "")).startswith("v3")
 
 
 def plain(statistics: Statistics, keys: Sequence[str]) -> dict[str, list[Any]]:

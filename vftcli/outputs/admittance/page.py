@@ -202,16 +202,11 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
             replay.motion.t,
             shown,
             families=(1, 1, 1, 2, 2, 2),
-            band=known_band(band),
+            band=band if band is not None and np.isfinite(band).any() else None,
             band_label=label,
         )
         for key, title, shown, band, label in found
     ]
-
-
-def known_band(band: Array | None) -> Array | None:
-    """A band, None where none of it is known."""
-    return band if band is not None and np.isfinite(band).any() else None
 
 
 def lines(controllers: list[tuple[Controller, str]], values: Array) -> tuple[ChartLine, ...]:

@@ -34,12 +34,6 @@ PLOTTED = 0.75
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
 """Unit of a horizontal axis → what it is called."""
 
-PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
-"""Dashes of the page → those on paper, where they are too much like others."""
-
-PAINTS = {INK: "black", REFERENCE: "0.65"}
-"""Colours of the page that follow its theme → theirs on white paper."""
-
 
 class Plot(NamedTuple):
     """One plot of a figure.
@@ -203,9 +197,17 @@ def band_look() -> dict[str, Any]:
     return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
 
 
+PAINTS = {INK: "black", REFERENCE: "0.65"}
+"""Colours of the page that follow its theme → theirs on white paper."""
+
+
 def paint(series: ChartLine) -> str:
     """A line's colour on paper."""
     return PAINTS.get(series.colour, series.colour)
+
+
+PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
+"""Dashes of the page → those on paper, where they are too much like others."""
 
 
 def look(series: ChartLine) -> dict[str, Any]:

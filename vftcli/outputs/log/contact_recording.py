@@ -20,7 +20,7 @@ from vftcli.outputs.rerun_file import CONTACTS, Stream
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS
-from vftcli.signals.remarks import Remark, sentence
+from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 
 SHAFT = 0.012
@@ -101,18 +101,12 @@ def contact_log(found: ContactList) -> list[LogLine]:
     for contact in found.contacts:
         path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
         lines.append(LogLine(path, contact.start, beginning(contact), colour))
-    lines += [
-        LogLine("/remarks", time_of(remark), sentence(remark), REFERENCE, "WARN")
-        for remark in found.remarks
-    ]
+    for remark in found.remarks:
+        begins = remark.where.span[0] if remark.where.span is not None else 0.0
+        lines.append(LogLine("/remarks", begins, sentence(remark), REFERENCE, "WARN"))
     if not found.contacts:
         lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", REFERENCE))
     return lines
-
-
-def time_of(remark: Remark) -> float:
-    """When what a remark says began, 0 where it holds throughout. [s]"""
-    return remark.where.span[0] if remark.where.span is not None else 0.0
 
 
 def painted_links(found: ContactList, joints: int) -> dict[int, list[PaintedSpan]]:

@@ -26,8 +26,6 @@ from vftcli.virtual_sensor.frames import FRAMES
 if TYPE_CHECKING:
     import polars as pl
 
-    from vftcli.contacts.contact_list import ContactList
-
 
 ALL = slice(None)
 """All rows of a table."""
@@ -51,14 +49,6 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     return frame_of(columns(analysis, rows))
 
 
-def contact_column(t: Array, found: "ContactList") -> Array:
-    """The number of the contact that each sample lies in, NaN outside of all. (T,)"""
-    number = np.full(len(t), np.nan)
-    for contact in found.contacts:
-        number[(t >= contact.start) & (t <= contact.stop)] = contact.number
-    return number
-
-
 def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
     """Name and values of every column, in order, of some rows."""
     recording = analysis.recording
@@ -75,7 +65,11 @@ def columns(analysis: Analysis, rows: slice) -> Iterator[tuple[str, Array]]:
     for name, values in wrench_columns(analysis):
         yield name, values[rows]
     if analysis.contacts is not None:
-        yield "contact", contact_column(analysis.t[rows], analysis.contacts)
+        t = analysis.t[rows]
+        number = np.full(len(t), np.nan)
+        for contact in analysis.contacts.contacts:
+            number[(t >= contact.start) & (t <= contact.stop)] = contact.number
+        yield "contact", number
 
 
 def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:

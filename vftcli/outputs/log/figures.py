@@ -81,12 +81,12 @@ def torque_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing:
     )
 
 
-def wrench_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing | None:
-    """The wrench axis by axis with the contacts, None without one; as `torque_drawing`."""
+def wrench_drawing(analysis: Analysis) -> Drawing | None:
+    """The wrench axis by axis with the contacts, None without one."""
     chart = wrench_chart(analysis)
     if chart is None:
         return None
-    chart = drawn_lines(analysis, chart, names)
+    chart = drawn_lines(analysis, chart)
     return Drawing(
         f"{analysis.recording.name}: force and moment on the robot, {chart.title}",
         partial(wrench_figure, chart, contact_numbers(analysis)),
@@ -99,7 +99,7 @@ def wrench_figure(chart: Chart, numbers: Mapping[int, float], width: float) -> "
     return line_figure(width, plots_of(chart, only=order), numbers=numbers)
 
 
-def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str]) -> Chart:
+def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:
     """The chart with the lines of these observers and the reference; a band only of one alone."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)

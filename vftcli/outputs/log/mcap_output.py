@@ -44,9 +44,6 @@ TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
 INFO, WARNING = 2, 3
 """Levels of a log message."""
 
-LAST_STAMP = 2**31 - 1
-"""ROS 2 counts seconds in 32 bits with a sign."""
-
 BLOCK = 8192
 """Samples whose messages are held in memory at once."""
 
@@ -91,20 +88,6 @@ class Event(NamedTuple):
     latched: bool = False
 
 
-LATCHED = """\
-- history: keep_last
-  depth: 1
-  reliability: reliable
-  durability: transient_local
-  deadline: {sec: 9223372036, nsec: 854775807}
-  lifespan: {sec: 9223372036, nsec: 854775807}
-  liveliness: automatic
-  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
-  avoid_ros_namespace_conventions: false
-"""
-"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
-
-
 def joint_topic(
     name: str,
     joints: Sequence[str],
@@ -137,24 +120,17 @@ def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
     if analysis.reference is not None:
         yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
     for wrench in analysis.wrenches:
-        yield wrench_topic(
-            f"/vftcli/wrench/{ros_name(wrench.name)}", frame_id(wrench), wrench.known
-        )
+        parts: dict[str, Value] = {
+            "header.frame_id": frame_id(wrench),
+            **in_parts("wrench.force", "xyz", wrench.known[:, :3]),
+            **in_parts("wrench.torque", "xyz", wrench.known[:, 3:]),
+        }
+        yield OutputTopic(f"/vftcli/wrench/{ros_name(wrench.name)}", WRENCH, parts)
 
 
 def frame_id(wrench: Wrench) -> str:
     """The frame of a wrench: a link of the description, ``base@flange`` for base axes there."""
     return "base@flange" if wrench.frame == "base" else wrench.frame
-
-
-def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
-    """A topic of WrenchStamped messages. (T, 6)"""
-    parts: dict[str, Value] = {
-        "header.frame_id": frame,
-        **in_parts("wrench.force", "xyz", values[:, :3]),
-        **in_parts("wrench.torque", "xyz", values[:, 3:]),
-    }
-    return OutputTopic(name, WRENCH, parts)
 
 
 def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
@@ -178,9 +154,10 @@ def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
             (contact.stop, f"{contact_name(contact)} ends"),
         ):
             stamp = start + round(t * 1e9)
+            logged = stamped(np.array([stamp]), "timestamp")
             level = WARNING if contact.trust == "weak" else INFO
             values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
-            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged_at(stamp)))
+            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged))
     return sorted(made, key=lambda event: event.stamp)
 
 
@@ -191,11 +168,6 @@ def mounted_frames(analysis: Analysis) -> dict[str, Pose]:
     if sensed is None:
         return {}
     return {name: frame_pose(name, sensed.sensor.mounting) for name in sorted(names)}
-
-
-def logged_at(stamp: int) -> dict[str, Value]:
-    """The values of a log message's own stamp."""
-    return stamped(np.array([stamp]), "timestamp")
 
 
 def ros_name(name: str) -> str:
@@ -209,6 +181,10 @@ def source_stamps(recording: Recording) -> Nanoseconds:
     start = source.t0_ns if source.t0_ns is not None else round(source.t0 * 1e9)
     stamps: Nanoseconds = start + np.rint(recording.t * 1e9).astype(np.int64)
     return stamps
+
+
+LAST_STAMP = 2**31 - 1
+"""ROS 2 counts seconds in 32 bits with a sign."""
 
 
 def stamps_of(recording: Recording) -> Nanoseconds:
@@ -257,6 +233,20 @@ def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  
     """Write one message of a topic that has few."""
     body = serialised(event.kind, event.values, 1).tobytes()
     writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
+
+
+LATCHED = """\
+- history: keep_last
+  depth: 1
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
 
 
 def channel(writer: Any, topic: str, kind: str, latched: bool = False) -> int:  # noqa: ANN401

@@ -37,7 +37,7 @@ from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.progress import steps
-from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
@@ -190,16 +190,12 @@ def wrench_lines(analysis: Analysis, k: int) -> Lines:
         else PlotLine(w.name, w.known[:, k], REFERENCE, 2.5)
         for w in found
     ]
-    lines += [line for w in found if w.name == BEST for line in wrench_band(w, k)]
+    for w in found:
+        if w.name == BEST and w.known_sd is not None:
+            for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
+                column = w.known[:, k] + sign * COVERS * w.known_sd[:, k]
+                lines.append(PlotLine(f"{w.name} 95 % {edge}", column, COLOURS[BEST], 0.6))
     return Lines(f"/wrench/{AXES[k]}", title, lines, unit_of(k))
-
-
-def wrench_band(wrench: Wrench, k: int) -> Iterator[PlotLine]:
-    """Both edges of the 95 % band of one axis of a wrench, where it has one."""
-    if wrench.known_sd is not None:
-        for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
-            column = wrench.known[:, k] + sign * COVERS * wrench.known_sd[:, k]
-            yield PlotLine(f"{wrench.name} 95 % {edge}", column, COLOURS[BEST], 0.6)
 
 
 def condition_lines(analysis: Analysis) -> list[Lines]:

@@ -153,16 +153,6 @@ FORMS = {"json": to_json, "csv": to_csv, "markdown": to_markdown, "latex": to_la
 """Name of a form → the text of the errors table in it."""
 
 
-def pairs_grid(rows: pl.DataFrame) -> Grid:
-    """Every pair of observers, the better one first; a star where the difference is sure."""
-    heads = ("recording", "joint", "better", "than", "by [N·m]", "95 % interval", "p")
-    first, *others = heads
-    return Grid(
-        columns=(Column(first, words=True), *map(Column, others)),
-        rows=tuple(pair_row(row) for row in rows.iter_rows(named=True)),
-    )
-
-
 def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
     """The entries of one pair: a difference above zero says that the second is the better."""
     difference, low, high, p = (row[k] for k in ("difference_Nm", "low_Nm", "high_Nm", "p"))
@@ -181,7 +171,15 @@ def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
 
 def pairs_text(rows: pl.DataFrame, *, as_json: bool = False) -> str:
     """The paired differences of all logs, as a terminal table or a JSON array of rows."""
-    return to_json(rows) if as_json else f"{terminal(pairs_grid(rows))}*: p below {SURE:g}\n"
+    if as_json:
+        return to_json(rows)
+    heads = ("recording", "joint", "better", "than", "by [N·m]", "95 % interval", "p")
+    first, *others = heads
+    grid = Grid(
+        columns=(Column(first, words=True), *map(Column, others)),
+        rows=tuple(pair_row(row) for row in rows.iter_rows(named=True)),
+    )
+    return f"{terminal(grid)}*: p below {SURE:g}\n"
 
 
 def print_text(found: "Comparison") -> str:

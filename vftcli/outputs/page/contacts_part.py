@@ -22,9 +22,6 @@ ONSET = 0.1
 FEW = 6
 """Of more contacts the lead tells how many were where, not which."""
 
-SIGNS = {"good": "✓", "fair": "○", "weak": "△"}
-"""A sign for each word of trust, so that it does not rest on colour."""
-
 HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust")
 """Heads of the table."""
 
@@ -209,6 +206,10 @@ def place(contact: Contact) -> str:
         links = [f"link {link}" if link else "flange" for link in contact.places]
         return f"{escape(words)}<small>{', '.join(links)}</small>"
     return f"unknown<small>{escape(words)} fit</small>" if contact.places else "unknown"
+
+
+SIGNS = {"good": "✓", "fair": "○", "weak": "△"}
+"""A sign for each word of trust, so that it does not rest on colour."""
 
 
 def trust(contact: Contact) -> str:

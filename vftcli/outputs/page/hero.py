@@ -74,7 +74,14 @@ def content(analysis: Analysis, found: ContactList, box: Box) -> str:
     t = analysis.t
     scales = Scales(box, Span(float(t[0]), float(t[-1])), Span(0.0, highest(found)))
     force = found.hardest is not None or told(found) is not None
-    parts = [hatching(box), *(hatched(scales, span) for span in free_spans(analysis))]
+    hatch = f"free-{box.width:g}"  # named by the chart: two may stand on one page
+    parts = [
+        f'<defs><pattern id="{hatch}" width="7" height="7" '
+        'patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
+        '<path d="M0 0V7" class="hatch"/></pattern></defs>'
+    ]
+    fill = f'fill="url(#{hatch})"'
+    parts += [figures.stripe(scales, *span, fill) for span in free_spans(analysis)]
     parts += [stripe_of(scales, contact) for contact in found.contacts]
     if (least := told(found)) is not None:
         parts.append(limit(scales, least))
@@ -96,25 +103,6 @@ def highest(found: ContactList) -> float:
         if (course := contact.course) is not None:
             tops.append(1.05 * float((course.force + np.minimum(course.band, course.force)).max()))
     return max(*tops, 0.0) or 1.0
-
-
-def hatching(box: Box) -> str:
-    """The pattern of the free part, named by the chart: two may stand on one page."""
-    return (
-        f'<defs><pattern id="{hatch_name(box)}" width="7" height="7" '
-        'patternUnits="userSpaceOnUse" patternTransform="rotate(45)">'
-        '<path d="M0 0V7" class="hatch"/></pattern></defs>'
-    )
-
-
-def hatch_name(box: Box) -> str:
-    """The pattern's name."""
-    return f"free-{box.width:g}"
-
-
-def hatched(scales: Scales, span: tuple[float, float]) -> str:
-    """A stretch of free motion."""
-    return figures.stripe(scales, *span, f'fill="url(#{hatch_name(scales.box)})"')
 
 
 def stripe_of(scales: Scales, contact: Contact) -> str:

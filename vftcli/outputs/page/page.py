@@ -1,12 +1,14 @@
 """The report of one log as one HTML page: the answer first, then what it rests on."""
 
+from collections.abc import Sequence
+from html import escape
+
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import grounds, load_doubt
+from vftcli.outputs.believability import Ground, grounds, load_doubt
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import comparisons, contacts_part, sections
-from vftcli.outputs.page.believability_part import believability_section
 from vftcli.outputs.page.charts import Chart, observer_lines
 from vftcli.outputs.page.hero import hero
 from vftcli.outputs.page.refinement_part import refinement_section
@@ -105,3 +107,24 @@ def contact_section(analysis: Analysis) -> str:
     details = contacts_part.contact_details(found)
     model = f"<h3>What the list rests on</h3>{pairs(contacts_part.model_pairs(found))}"
     return section("Contacts in numbers", details + model, f"{len(found.contacts)}", name="numbers")
+
+
+def believability_section(shown: Sequence[Ground]) -> str:
+    """The grounds side by side; the worst first, as they come."""
+    items = "".join(map(ground_item, shown))
+    return (
+        '<section id="believed"><h2>Can it be believed?</h2>'
+        f'<ul class="grounds">{items}</ul></section>'
+    )
+
+
+def ground_item(ground: Ground) -> str:
+    """One ground: its sign, what it is about, what is known of it, and what would mend it."""
+    subject = ground.subject[:1].upper() + ground.subject[1:]
+    remedy = ""
+    if ground.remedy:
+        remedy = f'<code class="remedy">{escape(ground.remedy)}</code>'
+    return (
+        f'<li><b class="sign {ground.standing}">{ground.mark}</b><span>'
+        f"{escape(subject)}<small>{escape(ground.sentence)}{remedy}</small></span></li>"
+    )

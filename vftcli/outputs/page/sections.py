@@ -9,7 +9,6 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.observers import OBSERVERS
-from vftcli.observers.observer import Observer
 from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
 from vftcli.outputs.log.rmse_tables import (
     blocks,
@@ -88,7 +87,12 @@ def observers_section(analysis: Analysis) -> str:
         rows=tuple(observer_row(analysis, observer.name) for observer in analysis.observers),
         swatches=True,
     )
-    parameters = "".join(parameter_row(o) for o in analysis.observers)
+    parameters = ""
+    for observer in analysis.observers:
+        # The record has parameters as JSON can hold them, also those of a wrapped observer.
+        used = observer_record(observer, None)["parameters"]
+        text = "; ".join(f"{key} = {value_text(value)}" for key, value in used.items())
+        parameters += f"<dt>{escape(observer.name)}</dt><dd>{escape(text)}</dd>"
     responses = response_charts(analysis)
     legend_of_all = legend(responses[0]) if responses else ""
     pictures = "".join(pictures_of(chart) for chart in responses)
@@ -126,14 +130,6 @@ def joint_values(values: Array) -> str:
         which = joints[0] if len(joints) == 1 else f"{joints[0]}–{joints[-1]}"
         lines.append(f'<span class="which">{which}</span> {text}')
     return "<br>".join(lines)
-
-
-def parameter_row(observer: Observer) -> str:
-    """One observer's parameters as they were used."""
-    # The record has parameters as JSON can hold them, also those of a wrapped observer.
-    used = observer_record(observer, None)["parameters"]
-    text = "; ".join(f"{key} = {value_text(value)}" for key, value in used.items())
-    return f"<dt>{escape(observer.name)}</dt><dd>{escape(text)}</dd>"
 
 
 def value_text(value: Any) -> str:  # noqa: ANN401 - whatever JSON can hold

@@ -132,25 +132,22 @@ def health(examinations: Sequence[Examination], *, opened: bool = False) -> str:
     if not examinations:
         return ""
     named = len(examinations) > 1
-    parts = [log_health(one, named=named) for one in examinations]
-    count = sum(len(warnings_of(one)) for one in examinations)
+    parts, count = [], 0
+    for one in examinations:
+        warnings = warnings_of(one)
+        count += len(warnings)
+        notes = [finding for finding in one.findings if finding.level != "warning"]
+        head = f"<h3>{escape(one.recording.name)}</h3>" if named else ""
+        found = "".join(map(finding_block, (*warnings, *notes)))
+        parts.append(head + (found or soft("Nothing was found.")))
     state = f"{count} warning{'s' * (count > 1)}" if count else "sound"
     return section("Log health", "".join(parts), state, name="health", opened=opened and count > 0)
-
-
-def log_health(examination: Examination, *, named: bool) -> str:
-    """One log's findings, its warnings first."""
-    warnings = warnings_of(examination)
-    notes = [finding for finding in examination.findings if finding.level != "warning"]
-    head = f"<h3>{escape(examination.recording.name)}</h3>" if named else ""
-    found = "".join(map(finding_block, (*warnings, *notes)))
-    return head + (found or soft("Nothing was found."))
 
 
 def finding_block(finding: Remark) -> str:
     """A finding: its name and evidence, then what it does and what to do about it."""
     said = in_words(finding)
-    rest = "".join(f" {escape(x)}." for x in (said.consequence,) if x)
+    rest = f" {escape(said.consequence)}." if said.consequence else ""
     remedy = f" <strong>What to do:</strong> {escape(said.remedy)}." if said.remedy else ""
     then = f'<p class="then">{rest}{remedy}</p>' if rest or remedy else ""
     evidence = f"<strong>{escape(said.name)}</strong>: {escape(said.evidence)}."

@@ -13,6 +13,7 @@ import numpy as np
 from vftcli.readers.bags.container import Batch, Ingest
 from vftcli.readers.bags.decode import Decoder, Stream
 from vftcli.readers.bags.documents import Documents
+from vftcli.readers.bags.json_messages import WRENCH
 from vftcli.readers.bags.topics import OWN, aligned, host_times, leading
 from vftcli.readers.reader import InOnePieceError, RawLog, ReadChoice
 from vftcli.signals.errors import LogError
@@ -59,6 +60,7 @@ def _blocks(
     """The blocks of a bag with nothing wrong."""
     decoder, documents, waiting = Decoder(ingest), Documents(ingest), Waiting(ingest.path, request)
     messages, row = 0, 1
+    wanted = request.wants("wrench")  # else topics that hold nothing but one are left out
 
     def block(streams: Sequence[Stream]) -> RawLog:
         raw = aligned(streams, ingest.path, request, decoder.others)
@@ -71,18 +73,13 @@ def _blocks(
         if documents.take(batch):
             raise InOnePieceError
         decoder.take(batch)
-        found = [s for s in decoder.taken() if not is_unwanted(s, request)]
+        found = [s for s in decoder.taken() if wanted or s.channel.type != WRENCH]
         if (streams := waiting.add(found, decoder.others)) is not None:
             raw = block(streams)
             yield raw
             row += len(raw.stamps)
     count(messages)
     yield block(list(waiting.streams.values()))
-
-
-def is_unwanted(stream: Stream, request: ReadChoice) -> bool:
-    """Whether a topic holds nothing but a wrench, and none is wanted."""
-    return stream.channel.type == "geometry_msgs/WrenchStamped" and not request.wants("wrench")
 
 
 Key = tuple[object, ...]

@@ -23,9 +23,6 @@ ROSBAG1 = b"#ROSBAG V2.0\n"
 MCAP = b"\x89MCAP0\r\n"
 SQLITE = b"SQLite format 3\0"
 
-STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
-"""Endings of the files of a bag folder that hold messages."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
@@ -238,6 +235,10 @@ class Ingest:
         """Remember a remark once."""
         if remark not in self.remarks:
             self.remarks.append(remark)
+
+
+STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
+"""Endings of the files of a bag folder that hold messages."""
 
 
 def storage_files(file: LogFile) -> list[str]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
-from vftcli.readers.bags.kinds import KINDS, Kind, constant_in, paths_in
+from vftcli.readers.bags.kinds import KINDS, Kind, paths_in
 from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
 from vftcli.readers.bags.ros_messages import types_for
 from vftcli.readers.joints import in_order, kinematic_order
@@ -158,8 +158,8 @@ class Decoder:
             columns = [layout.numbers(path, batch.buffer, offsets) for path in paths]
             if columns and (value := np.hstack(columns)).shape[1]:
                 signals[signal] = value
-        for name in kind.constants:
-            if path := constant_in(kind, name, layout.leaves):
+        for name, places in kind.constants.items():
+            if path := next((place for place in places if place in layout.leaves), None):
                 last = layout.numbers(path, batch.buffer, offsets[-1:])[0]
                 topic.constants[name] = tuple(float(value) for value in last)
         names = next((layout.texts[p] for p in kind.names if p in layout.texts), ())

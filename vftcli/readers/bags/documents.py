@@ -83,11 +83,8 @@ def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
     """
     if len(message) > MAX_BYTES:
         raise DocumentError("longer than any message of joints")
-    return _json(message) if json_like else joint_states(message)
-
-
-def _json(message: bytes) -> Any:  # noqa: ANN401
-    """A message in JSON."""
+    if not json_like:
+        return joint_states(message)
     try:
         return json.loads(message)
     except (ValueError, RecursionError) as error:
@@ -216,7 +213,8 @@ def _read(
     request: ReadChoice,
 ) -> RawLog:
     """The documents of one channel as a table, read by aliases or by --columns."""
-    names = _names(rows[0])
+    names = rows[0].get("name", [])
+    named = isinstance(names, list) and all(isinstance(name, str) for name in names)
     columns: dict[str, Column] = {}
     for key, first in rows[0].items():
         column = _column(first, [row.get(key) for row in rows])
@@ -230,16 +228,9 @@ def _read(
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
     table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
     raw = from_table(table, request, clock_name=clock)
-    if len(names) != raw.signals["q"].shape[1]:
+    if not named or len(names) != raw.signals["q"].shape[1]:
         return raw
-    return laid_along(raw, names, request)
-
-
-def _names(row: dict[str, Any]) -> tuple[str, ...]:
-    """The joints' names that a document holds, or none."""
-    names = row.get("name", [])
-    good = isinstance(names, list) and all(isinstance(name, str) for name in names)
-    return tuple(names) if good else ()
+    return laid_along(raw, tuple(names), request)
 
 
 def _column(first: Any, values: list[Any]) -> Column | None:  # noqa: ANN401

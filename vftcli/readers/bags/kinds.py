@@ -87,8 +87,3 @@ def paths_in(kind: Kind, signal: str, leaves: Mapping[str, object]) -> tuple[str
         if all(f"{path}.{part}" in leaves for part in VECTORS):
             return tuple(f"{path}.{part}" for part in VECTORS)
     return ()
-
-
-def constant_in(kind: Kind, name: str, leaves: Mapping[str, object]) -> str | None:
-    """The path of a constant that a message has."""
-    return next((path for path in kind.constants.get(name, ()) if path in leaves), None)

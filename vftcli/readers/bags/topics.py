@@ -95,7 +95,8 @@ class Gathering:
     Attributes:
         lead: The topic with the joints' positions.
         clock: Its clock.
-        chosen: Signal → message field and factor, as --columns says.
+        chosen: Signal → message field, "" for its own, and factor, as --columns says:
+            -tau=effort, current[mA]=effort, -tau.
         said_of_wrench: What --columns says of the wrench, None for nothing.
         signals: Field of Recording → values at the leading topic's times. (T, k)
         taken: Topics beside the leading one of which a signal was taken.
@@ -105,8 +106,14 @@ class Gathering:
     def __init__(self, lead: Stream, request: ReadChoice) -> None:
         self.lead = lead
         self.clock = clock_of(lead)
-        self.chosen = chosen_fields(request)
-        self.said_of_wrench = next((i for i in said(request) if i.signal == "wrench"), None)
+        items = said(request)
+        # A wrench without a field is the one that is read anyway, of whichever topic.
+        self.chosen = {
+            SIGNALS[item.signal]: (item.pattern or "", item.factor)
+            for item in items
+            if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
+        }
+        self.said_of_wrench = next((i for i in items if i.signal == "wrench"), None)
         self.signals: dict[str, Array] = {}
         self.taken: set[str] = set()
         self.remarks: list[Remark] = []
@@ -286,18 +293,6 @@ class Gathering:
 
 FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
 """Field of a JointState → signal."""
-
-
-def chosen_fields(request: ReadChoice) -> dict[str, tuple[str, float]]:
-    """Signal → message field, "" for its own, and factor: -tau=effort, current[mA]=effort, -tau.
-
-    A wrench without a field is the one that is read anyway, of whichever topic.
-    """
-    return {
-        SIGNALS[item.signal]: (item.pattern or "", item.factor)
-        for item in said(request)
-        if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
-    }
 
 
 def said(request: ReadChoice) -> tuple[Item, ...]:
