@@ -19,9 +19,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.model_error import SPIKE, ErrorCourse
+from vftcli.contacts.model_error import ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import SPIKE
 from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.smoother.noise import steps
 
