@@ -15,8 +15,8 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
-from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.smoother.noise import (
     LEAST_NOISE,
     PUSHED_TIME,
@@ -282,8 +282,8 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
     decay[0] = 0.0
     added[0] = variance[0] + np.where(rests[0], anew[0], 0.0)
     white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
-    near = near_motion(~rests, blocks)
-    return ErrorCourse(decay, added, white, np.where(near, SPIKES_MOVING, SPIKES_RESTING))
+    spikes = np.where(near_motion(~rests, blocks), SPIKES_MOVING, SPIKES_RESTING)
+    return ErrorCourse(decay, added, white, spikes)
 
 
 def moved_before(moving: Mask, count: int) -> Array:
@@ -305,8 +305,4 @@ def near_motion(moving: Mask, blocks: Blocks) -> Mask:
     """Blocks within `SPIKE_REACH` of a joint's motion. (K, n)"""
     # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
     count = max(round(SPIKE_REACH / float(np.median(blocks.length)) - TIE), 1)
-    total = np.vstack([np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)])
-    k = np.arange(len(moving))
-    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(moving))
-    near: Mask = total[last] - total[first] > 0.0
-    return near
+    return near(moving, count)

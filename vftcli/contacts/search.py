@@ -15,7 +15,7 @@ from vftcli.contacts.windows import BlockLog, ContactPrior, Run
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 LASTING = 1.0
 """A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
