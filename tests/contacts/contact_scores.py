@@ -9,10 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.candidates import close_gaps
 from vftcli.contacts.contact_list import Contact
 from vftcli.signals.arrays import Array
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import intervals
 from vftcli.virtual_sensor.contact import credits, overlaps
 
 LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12
@@ -47,7 +46,7 @@ def true_contacts(t: Array, wrench: Array) -> list[TrueContact]:
     """The contacts of a true wrench (M, 6)."""
     force = np.linalg.norm(wrench[:, :3], axis=1)
     found = []
-    for start, stop in runs_of(close_gaps(t, touched(wrench), GAP)):
+    for start, stop in intervals(t, touched(wrench), gap=GAP):
         span = slice(start, stop)
         peak = start + int(np.argmax(force[span]))
         impulse = np.trapezoid(wrench[span, :3], t[span], axis=0)

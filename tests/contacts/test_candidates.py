@@ -7,7 +7,6 @@ from test_model_error import B, blocks, drawn, noise
 from vftcli.contacts.candidates import (
     STRETCH,
     WARM_UP,
-    close_gaps,
     filtered_contacts,
     stretches_of,
     threshold_contacts,
@@ -17,7 +16,7 @@ from vftcli.contacts.model_error import error_course
 from vftcli.contacts.search import turned_round
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:
@@ -87,12 +86,6 @@ def test_stretches_cover_the_log() -> None:
     assert begins[0] == 0
     assert begins[-1] + length >= 5000
     assert stretches_of(100, B) == ([0], 0, 100)
-
-
-def test_gaps_shorter_than_a_limit_are_closed() -> None:
-    t = 0.1 * np.arange(8)
-    mask = np.array([1, 0, 1, 0, 0, 0, 1, 0], dtype=bool)
-    np.testing.assert_array_equal(close_gaps(t, mask, 0.25), [1, 1, 1, 0, 0, 0, 1, 0])
 
 
 def test_a_threshold_takes_what_lasts() -> None:

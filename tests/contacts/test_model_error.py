@@ -3,18 +3,20 @@
 import numpy as np
 
 from vftcli.contacts.model_error import (
-    SPIKE,
     UNKNOWN,
     ErrorCourse,
     ErrorNoise,
     error_course,
+    error_model,
     innovations,
     learn_noise,
+    spiked_white,
     without_reversals,
 )
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import SPIKE
 
 B = 0.024
 
@@ -85,8 +87,8 @@ def test_reversals_are_bridged_in_a_straight_line() -> None:
 def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
     """Σ ν²/S is dᵀ C⁻¹ d with the dense covariance of the model."""
     log = blocks(drawn(40, np.random.default_rng(3)), np.full((40, 1), 0.5))
-    course = error_course(noise(), log)._replace(spikes=np.full((40, 1), 1e-300))
-    squares = innovations(log.d, course)[0]
+    model = error_model(log.d, error_course(noise(), log))
+    squares = innovations(model, np.full((40, 1), 1e-300))[0]
     lag = np.abs(log.t[:, None] - log.t)
     covariance = 0.25 * np.exp(-lag / 0.4) + 0.01 * np.eye(40)
     # Rounding of a 40×40 solve.
@@ -100,7 +102,7 @@ def test_a_bad_sample_is_a_spike() -> None:
     d[25] = 20.0
     log = blocks(d, np.full((50, 1), 0.5))
     course = error_course(noise(), log)
-    white = innovations(d, course)[1]
+    white = spiked_white(d, course)
     assert white[25, 0] > (SPIKE - 1.0) * course.white[25, 0]
     assert np.all(np.delete(white, 25) == np.delete(course.white, 25))
 

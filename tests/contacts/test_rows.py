@@ -11,10 +11,10 @@ from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.model_error import error_course
 from vftcli.contacts.places import PointFit, arm_parts
 from vftcli.contacts.rows import (
-    QuietError,
     Site,
     force_course,
     from_flange,
+    quiet_error,
     sensor_force,
     vendor_force,
     with_drives,
@@ -30,16 +30,16 @@ from vftcli.signals.wrench import WrenchFrame
 def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
     d = drawn(60, np.random.default_rng(8))
     log = blocks(d, np.full_like(d, 0.5))
-    hidden = ((np.arange(60) > 20) & (np.arange(60) < 30))[:, None]
-    made = QuietError.across(d, error_course(noise(), log), hidden)
-    known = ~hidden[:, 0]
+    hidden = (np.arange(60) > 20) & (np.arange(60) < 30)
+    mean, variance = quiet_error(d, error_course(noise(), log), hidden)
+    known = ~hidden
     prior = 0.25 * np.exp(-np.abs(log.t[:, None] - log.t) / 0.4)
     S = prior[known][:, known] + 0.01 * np.eye(known.sum())
     gain = np.linalg.solve(S, prior[known]).T
     # What is hidden still has a variance, 1e9 (N·m)²: it tells a part in 1e9.
-    np.testing.assert_allclose(made.mean[:, 0], gain @ d[known, 0], atol=1e-7)
+    np.testing.assert_allclose(mean[:, 0], gain @ d[known, 0], atol=1e-7)
     exact = np.diag(prior - gain @ prior[known])
-    np.testing.assert_allclose(made.variance[:, 0], exact, rtol=1e-7)
+    np.testing.assert_allclose(variance[:, 0], exact, rtol=1e-7)
 
 
 def still(**signals: object) -> ModelledRun:

@@ -1,6 +1,4 @@
-"""Time series: runs, gaps, steps and other clocks, each against the plainest way to say it."""
-
-from itertools import pairwise
+"""Time series: gaps, steps and other clocks, each against the plainest way to say it."""
 
 import numpy as np
 import pytest
@@ -14,27 +12,8 @@ from vftcli.signals.series import (
     gaps_of,
     median_step,
     resample_columns,
-    runs_of,
     white_noise,
 )
-
-
-@given(st.lists(st.booleans(), max_size=60))
-def test_runs_are_the_true_samples_and_nothing_else(flags: list[bool]) -> None:
-    mask = np.array(flags, dtype=bool)
-    runs = runs_of(mask)
-    again = np.zeros(len(mask), dtype=bool)
-    for start, stop in runs:
-        assert start < stop
-        again[start:stop] = True
-    assert np.array_equal(again, mask)
-    # Unbroken: between two runs lies at least one false sample.
-    assert all(second[0] > first[1] for first, second in pairwise(runs))
-
-
-def test_runs_reach_the_first_and_the_last_sample() -> None:
-    assert runs_of(np.array([True, True, False, True])) == [(0, 2), (3, 4)]
-    assert runs_of(np.zeros(0, dtype=bool)) == []
 
 
 @given(st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=40))

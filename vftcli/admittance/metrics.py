@@ -11,7 +11,7 @@ from vftcli.admittance.motion import AxisMotion
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.thresholds import Phases
 from vftcli.signals.arrays import Array
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 PAUSE = 1.0
 """Drags of one axis that follow each other within this time are one. [s]"""

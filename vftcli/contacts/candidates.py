@@ -14,15 +14,15 @@ References:
     Markovian switching coefficients", IEEE Trans. Automatic Control 33(8), 1988.
 """
 
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.model_error import SPIKE, ErrorCourse
+from vftcli.contacts.model_error import ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import covered, intervals
+from vftcli.signals.linear_model import SPIKE
 from vftcli.virtual_sensor.smoother.noise import steps
 
 PUSH = np.repeat([30.0, 3.0], 3)
@@ -94,24 +94,11 @@ def filtered_contacts(blocks: Blocks, courses: tuple[ErrorCourse, ErrorCourse], 
 
 def sure_runs(blocks: Blocks, forward: Array, backward: Array) -> Mask:
     """Blocks of the runs in which the mean of two log odds is positive, one of them sure. (K,)"""
-    above = close_gaps(blocks.t, 0.5 * (forward + backward) > 0.0, GAP)
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
     high, low = np.maximum(forward, backward), np.minimum(forward, backward)
     seed = (high > sure) & (low > likely)
-    taken = np.zeros(len(above), dtype=bool)
-    for start, stop in runs_of(above):
-        taken[start:stop] = seed[start:stop].any()
-    return taken
-
-
-def close_gaps(t: Array, taken: Mask, gap: float) -> Mask:
-    """The mask with pauses shorter than `gap` filled. (K,)"""
-    closed = taken.copy()
-    runs = runs_of(taken)
-    for (_, stop), (start, _) in pairwise(runs):
-        if t[start] - t[stop - 1] < gap:
-            closed[stop:start] = True
-    return closed
+    runs = intervals(blocks.t, 0.5 * (forward + backward) > 0.0, gap=GAP)
+    return covered([run for run in runs if seed[slice(*run)].any()], len(seed))
 
 
 def two_state_odds(
@@ -256,8 +243,4 @@ def threshold_contacts(t: Array, torque: Array, sd: Array) -> Mask:
         sd: Its standard deviation where nothing touches. (T, n) [N·m]
     """
     above: Mask = np.any(np.abs(torque) > LEVEL * sd, axis=1)
-    taken = close_gaps(t, above, NEAR)
-    for start, stop in runs_of(taken):
-        if t[stop - 1] - t[start] < LASTING:
-            taken[start:stop] = False
-    return taken
+    return covered(intervals(t, above, least=LASTING, gap=NEAR), len(t))

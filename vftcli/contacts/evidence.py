@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.contacts.model_error import SPIKE, UNKNOWN
+from vftcli.contacts.model_error import ErrorCourse, error_model, innovations
 from vftcli.contacts.places import ContactPlace
 from vftcli.contacts.windows import (
     BlockLog,
@@ -21,9 +21,11 @@ from vftcli.contacts.windows import (
     batches,
     gate_of,
     likelihoods,
+    padding,
     window_of,
 )
 from vftcli.signals.arrays import Array
+from vftcli.signals.linear_model import SPIKE
 
 LEAST_EVIDENCE = 12.0
 """Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free motion one
@@ -93,25 +95,16 @@ def untouched(log: BlockLog, lanes: Sequence[Lane]) -> Array:
     found = np.empty(len(lanes))
     for batch in batches(lanes):
         some = [lanes[i] for i in batch]
-        d, _, white, decay, added = assembled(log, some)
-        decay, added = decay[:, :, 6:], added[:, :, 6:]
-        often = np.zeros_like(d)
+        model = assembled(log, some)
+        often = np.zeros_like(model.d)
         for place, lane in enumerate(some):
             span = slice(*lane.window)
             inside = lane.gate[span, None] & log.blocks.known[span, None]
             often[: span.stop - span.start, place] = inside * log.course.spikes[span]
+        course = ErrorCourse(model.decay[..., 6:], model.added[..., 6:], model.white, often)
+        square, S = innovations(error_model(model.d, course), often)
         with np.errstate(divide="ignore"):
             usual, spiked = np.log1p(-often), np.log(often) - 0.5 * np.log(SPIKE)
-        b, P, total = np.zeros(d.shape[1:]), np.zeros(d.shape[1:]), np.zeros(len(some))
-        for k in range(len(d)):
-            b, P = decay[k] * b, decay[k] ** 2 * P + added[k]
-            S, nu = P + white[k], d[k] - b
-            square = nu * nu / S
-            plain, spike = usual[k] - 0.5 * square, spiked[k] - 0.5 * square / SPIKE
-            total += (np.logaddexp(plain, spike) - 0.5 * np.log(S)).sum(axis=1)
-            gain = P / np.where(spike > plain, SPIKE * S, S)
-            b, P = b + gain * nu, P * (1.0 - gain)
-        for i, lane in zip(batch, some, strict=True):
-            padded = len(d) - (lane.window[1] - lane.window[0])
-            found[i] = total[batch.index(i)] + 0.5 * padded * d.shape[2] * np.log(UNKNOWN)
+        either = np.logaddexp(usual - 0.5 * square, spiked - 0.5 * square / SPIKE)
+        found[batch] = (either - 0.5 * np.log(S)).sum(axis=(0, 2)) + padding(log, some)
     return found

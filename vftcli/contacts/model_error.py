@@ -15,7 +15,8 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import near, runs_of
+from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
 from vftcli.virtual_sensor.smoother.noise import (
     LEAST_NOISE,
     PUSHED_TIME,
@@ -55,9 +56,6 @@ this time after a start b changes within `START_TIME`. [s]"""
 
 START_TIME = 0.05
 """Correlation time of b while a joint breaks away. [s]"""
-
-SPIKE = 40.0
-"""Variance of a spike, in variances of the innovation."""
 
 SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
 """How often a joint's innovation is a spike within so long [s] of its motion, and at rest."""
@@ -200,33 +198,55 @@ def inflation(noise: ErrorNoise, pieces: Sequence[Blocks]) -> Array:
     squares = []
     for piece in pieces:
         course = error_course(noise, piece)
-        squares.append(innovations(piece.d, course)[0])
+        squares.append(innovations(error_model(piece.d, course), course.spikes)[0])
     together = np.concatenate(squares)
     each = [np.quantile(together, share, axis=0) / value for share, value in QUANTILES]
     factor: Array = np.maximum(np.max(each, axis=0), 1.0)
     return factor
 
 
-def innovations(d: Array, course: ErrorCourse) -> tuple[Array, Array]:
-    """ν²/S of the filter of b alone, and R with its spikes in it. (K, n) each
+def error_model(d: Array, course: ErrorCourse) -> LinearModel:
+    """The model of b alone, each joint for itself.
 
-    An innovation that is more likely a spike counts with `SPIKE` times its variance.
+    Args:
+        d: Mean disturbance. (K, …, n) [N·m]
+        course: How b goes.
     """
-    squares, white = np.empty_like(d), course.white.copy()
-    b, P = np.zeros(d.shape[1]), np.zeros(d.shape[1])
-    often = np.log(course.spikes / (1.0 - course.spikes)) - 0.5 * np.log(SPIKE)
-    for k in range(len(d)):
-        f = course.decay[k]
-        b, P = f * b, f * f * P + course.added[k]
-        S = P + white[k]
-        nu = d[k] - b
-        square = nu * nu / S
-        squares[k] = square
-        spike = often[k] + 0.5 * square * (1.0 - 1.0 / SPIKE) > 0.0
-        white[k] += np.where(spike, (SPIKE - 1.0) * S, 0.0)
-        gain = P / np.where(spike, SPIKE * S, S)
-        b, P = b + gain * nu, P * (1.0 - gain)
-    return squares, white
+    own = (each[..., None] for each in (course.white, course.decay, course.added))
+    return LinearModel(d[..., None], np.ones((*d.shape, 1, 1)), *own)
+
+
+def spike_limit(spikes: Array) -> Array:
+    """ν²/S beyond which an innovation is more likely a spike, for how often it is one. (K, …, n)"""
+    with np.errstate(divide="ignore"):
+        odds = np.log(spikes) - np.log1p(-spikes)
+    limit: Array = (np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE)
+    return limit
+
+
+def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:
+    """ν²/S of every joint's model, and S. (K, …, n) each
+
+    Args:
+        model: The model of b alone.
+        spikes: How often an innovation is a spike. (K, …, n)
+    """
+    blocks = filtered(model, spike_limit(spikes))
+    each = [(block.square, block.spread[..., 0, 0]) for block in blocks]
+    squares, spreads = (np.array(series) for series in zip(*each, strict=True))
+    return squares, spreads
+
+
+def spiked_white(d: Array, course: ErrorCourse) -> Array:
+    """R of every block with its spikes in it. (K, n) [(N·m)²]
+
+    Args:
+        d: Mean disturbance. (K, n) [N·m]
+        course: How b goes.
+    """
+    squares, spreads = innovations(error_model(d, course), course.spikes)
+    spiked = squares > spike_limit(course.spikes)
+    return course.white + np.where(spiked, (SPIKE - 1.0) * spreads, 0.0)
 
 
 def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) -> ErrorCourse:
@@ -262,8 +282,8 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
     decay[0] = 0.0
     added[0] = variance[0] + np.where(rests[0], anew[0], 0.0)
     white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
-    near = near_motion(~rests, blocks)
-    return ErrorCourse(decay, added, white, np.where(near, SPIKES_MOVING, SPIKES_RESTING))
+    spikes = np.where(near_motion(~rests, blocks), SPIKES_MOVING, SPIKES_RESTING)
+    return ErrorCourse(decay, added, white, spikes)
 
 
 def moved_before(moving: Mask, count: int) -> Array:
@@ -285,8 +305,4 @@ def near_motion(moving: Mask, blocks: Blocks) -> Mask:
     """Blocks within `SPIKE_REACH` of a joint's motion. (K, n)"""
     # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
     count = max(round(SPIKE_REACH / float(np.median(blocks.length)) - TIE), 1)
-    total = np.vstack([np.zeros((1, moving.shape[1])), np.cumsum(moving, axis=0)])
-    k = np.arange(len(moving))
-    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(moving))
-    near: Mask = total[last] - total[first] > 0.0
-    return near
+    return near(moving, count)

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
-from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course
+from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course, error_model
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
     ArmPart,
@@ -25,6 +25,7 @@ from vftcli.contacts.untouched import SelfTest, Untouched, self_test
 from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.smoother.noise import resting
@@ -72,7 +73,8 @@ class Measurer:
         log: The log in blocks; joints at rest may settle anew under a contact.
         prior: How the wrench of the contacts moves.
         test: How well free motion lets a wrench be told.
-        quiet: What the model errs by, bridged across the contacts.
+        quiet: Mean and variance of what the model errs by, bridged across the contacts.
+            (K, n) [N·m], (K, n) [(N·m)²]
         bent: Share of a peak's bend that may be hidden.
     """
 
@@ -81,7 +83,7 @@ class Measurer:
     log: BlockLog
     prior: ContactPrior
     test: SelfTest
-    quiet: "QuietError"
+    quiet: tuple[Array, Array]
     bent: float = BENT
 
     @classmethod
@@ -114,7 +116,7 @@ class Measurer:
             log=log,
             prior=prior,
             test=test,
-            quiet=QuietError.across(blocks.d, course, gate[:, None]),
+            quiet=quiet_error(blocks.d, course, gate),
             bent=bent,
         )
 
@@ -173,9 +175,9 @@ class Measurer:
         core = np.arange(*run)[inside.size >= CORE * inside.size.max()]
         core = core[np.abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
         core = core[blocks.known[core]] if blocks.known[core].any() else core
-        torque = (blocks.d[core] - self.quiet.mean[core]).mean(axis=0)
-        variance = self.quiet.variance[core].mean(axis=0)
-        sd = np.sqrt(variance + self.log.course.white[core].mean(axis=0) / len(core))
+        mean, variance = (series[core] for series in self.quiet)
+        torque = (blocks.d[core] - mean).mean(axis=0)
+        sd = np.sqrt(variance.mean(axis=0) + self.log.course.white[core].mean(axis=0) / len(core))
         chain = self.run.robot.loaded_chain
         fits = those_that_fit(point_fits(chain, blocks.q[peak], torque, sd))
         jacobian = self.found.places[0].jacobian
@@ -315,42 +317,17 @@ class Site(NamedTuple):
         return max(low, 0.0), high
 
 
-class QuietError(NamedTuple):
-    """The model error b as the blocks outside of contacts tell it, bridged across these.
+def quiet_error(d: Array, course: ErrorCourse, hidden: Mask) -> tuple[Array, Array]:
+    """Mean and variance of the model error b from the blocks outside of contacts. (K, n) each
 
-    Attributes:
-        mean: (K, n) [N·m]
-        variance: (K, n) [(N·m)²]
+    Args:
+        d: Mean disturbance. (K, n) [N·m]
+        course: How b goes.
+        hidden: Blocks that say nothing. (K,)
     """
-
-    mean: Array
-    variance: Array
-
-    @classmethod
-    def across(cls, d: Array, course: ErrorCourse, hidden: Mask) -> "QuietError":
-        """Filter and smooth b alone, without the hidden blocks.
-
-        Args:
-            d: Mean disturbance. (K, n) [N·m]
-            course: How b goes.
-            hidden: Blocks that say nothing. (K, 1)
-        """
-        white = np.where(hidden, UNKNOWN, course.white)
-        b, P, ahead = np.empty_like(d), np.empty_like(d), np.empty_like(d)
-        x, p = np.zeros(d.shape[1]), np.zeros(d.shape[1])
-        for k in range(len(d)):
-            f = course.decay[k]
-            x, p = f * x, f * f * p + course.added[k]
-            ahead[k] = p
-            gain = p / (p + white[k])
-            x, p = x + gain * (d[k] - x), p * (1.0 - gain)
-            b[k], P[k] = x, p
-        for k in range(len(d) - 2, -1, -1):
-            f = course.decay[k + 1]
-            C = P[k] * f / ahead[k + 1]
-            b[k] += C * (b[k + 1] - f * b[k])
-            P[k] += C * C * (P[k + 1] - ahead[k + 1])
-        return cls(b, P)
+    known = course._replace(white=np.where(hidden[:, None], UNKNOWN, course.white))
+    mean, covariance = smoothed(error_model(d, known))
+    return mean[..., 0], covariance[..., 0, 0]
 
 
 def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:

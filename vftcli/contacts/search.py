@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
 from vftcli.contacts.evidence import evidence
-from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, innovations
+from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, spiked_white
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
@@ -15,7 +15,7 @@ from vftcli.contacts.windows import BlockLog, ContactPrior, Run
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 LASTING = 1.0
 """A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
@@ -87,8 +87,7 @@ def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) ->
         taken[start:stop] = True
     # What is no candidate keeps its spikes, whatever hypothesis is weighed.
     hidden = ahead._replace(white=np.where(taken[:, None], UNKNOWN, ahead.white))
-    spiked = innovations(blocks.d, hidden)[1]
-    white = np.where(taken[:, None], ahead.white, spiked)
+    white = np.where(taken[:, None], ahead.white, spiked_white(blocks.d, hidden))
     log = BlockLog.of(blocks, ahead._replace(white=white))
     if not runs:
         return Found(log, there, [], np.zeros((0, len(there))), [], START)

@@ -21,7 +21,8 @@ from vftcli.contacts.windows import (
     smooth_lanes,
     window_of,
 )
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.intervals import runs_of
 
 START = ContactPrior(0.3, 30.0, 3.0)
 """The prior that learning starts from."""
@@ -134,7 +135,7 @@ def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list
     low, at = size < RELEASED * sd, t[run[0] : run[1]]
     pieces, begin = [], 0
     for k, end in quiet_pauses(low, at):
-        if all(x[k:end].min() < valley(x[begin:k], x[end:]) for x in (size, torque)):
+        if is_valley((size[begin:], torque[begin:]), k - begin, end - begin, RELEASE_SHARE):
             pieces.append((run[0] + begin, run[0] + k))
             begin = end
     pieces.append((run[0] + begin, run[1]))
@@ -160,7 +161,7 @@ def split_at_turns(t: Array, force: Array, torque: Array, piece: Run) -> list[Ru
     size = np.linalg.norm(there, axis=1)
     inner = np.flatnonzero((at - at[0] >= APART) & (at[-1] - at >= APART))
     for k in inner[np.argsort(size[inner])].tolist():
-        if not all(x[k] < HALF * min(x[:k].max(), x[k:].max()) for x in (size, load)):
+        if not is_valley((size, load), k, k + 1, HALF):
             continue
         i, j = int(np.argmax(size[:k])), k + int(np.argmax(size[k:]))
         if there[i] @ there[j] < TURNED * size[i] * size[j]:
@@ -169,18 +170,16 @@ def split_at_turns(t: Array, force: Array, torque: Array, piece: Run) -> list[Ru
     return [piece]
 
 
-def valley(before: Array, after: Array) -> float:
-    """What a valley between two stretches must fall below."""
-    return RELEASE_SHARE * float(min(before.max(), after.max()))
+def is_valley(series: Sequence[Array], start: int, stop: int, share: float) -> bool:
+    """Whether all series fall below a share of their peaks on both sides."""
+    return all(x[start:stop].min() < share * min(x[:start].max(), x[stop:].max()) for x in series)
 
 
-def quiet_pauses(low: Array, t: Array) -> list[tuple[int, int]]:
+def quiet_pauses(low: Mask, t: Array) -> list[tuple[int, int]]:
     """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], low, [False]]).astype(int)))
-    pairs = list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
     usual = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
     return [
         (start, stop)
-        for start, stop in pairs
+        for start, stop in runs_of(low)
         if start > 0 and stop < len(low) and t[stop - 1] - t[start] + usual >= RELEASE_TIME
     ]

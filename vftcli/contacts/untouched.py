@@ -35,8 +35,9 @@ from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.remarks import Remark, Where, fact
-from vftcli.signals.series import median_step, runs_of
+from vftcli.signals.series import median_step
 
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 """Length of a block [s]; on a clock whose steps differ by this share it holds so many samples."""
@@ -301,11 +302,7 @@ def expected_torque(run: ModelledRun, level: Array | None) -> Array:
     sd = np.tile(np.maximum(least, DRY_SHARE * dry), (recording.samples, 1))
     count = max(round(NEAR_REST / median_step(recording.t)), 1)
     still = np.abs(recording.require("dq")) < MOVING
-    total = np.vstack([np.zeros((1, len(dry))), np.cumsum(still, axis=0)])
-    k = np.arange(recording.samples)
-    first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, recording.samples)
-    near = total[last] - total[first] > 0.0
-    return np.where(near, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
+    return np.where(near(still, count), np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
 class SelfTest(NamedTuple):

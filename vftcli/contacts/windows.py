@@ -5,10 +5,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.lanes import Lanes, nats, smoothed
 from vftcli.contacts.model_error import UNKNOWN, ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import (
+    LinearModel,
+    beside_errors,
+    log_likelihood,
+    smoothed,
+)
 from vftcli.virtual_sensor.smoother.noise import steps
 
 MARGIN = 1.0
@@ -101,7 +106,7 @@ def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
         yield batch
 
 
-def assembled(log: BlockLog, lanes: Sequence[Lane]) -> Lanes:
+def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
     """Lanes side by side; shorter ones end in blocks that say nothing."""
     n = log.blocks.d.shape[1]
     longest = max(lane.window[1] - lane.window[0] for lane in lanes)
@@ -130,20 +135,22 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> Lanes:
         variance = np.repeat([lane.prior.force**2, lane.prior.moment**2], 3)
         decay[:count, i, :6] = stays[:, None]
         added[:count, i, :6] = np.where(inside, 1.0 - stays**2, 0.0)[:, None] * variance
-    return Lanes(d, jacobian, white, decay, added)
+    return LinearModel(d, beside_errors(jacobian), white, decay, added)
+
+
+def padding(log: BlockLog, lanes: Sequence[Lane]) -> Array:
+    """What the blocks behind lanes side by side take off each one's log likelihood. (L,) [nats]"""
+    length = np.array([stop - start for start, stop in (lane.window for lane in lanes)])
+    found: Array = 0.5 * (length.max() - length) * log.blocks.d.shape[1] * np.log(UNKNOWN)
+    return found
 
 
 def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
     """Log likelihood ln p(d) of every lane; only lanes of one window may be compared. [nats]"""
     found = np.empty(len(lanes))
     for batch in batches(lanes):
-        found[batch] = nats(assembled(log, [lanes[i] for i in batch]))
-        # What the padding and the hidden blocks add is the same for lanes of one window only if
-        # they went side by side; it is taken off, so that it is the same everywhere.
-        longest = max(lanes[i].window[1] - lanes[i].window[0] for i in batch)
-        for i in batch:
-            padded = longest - (lanes[i].window[1] - lanes[i].window[0])
-            found[i] += 0.5 * padded * log.blocks.d.shape[1] * np.log(UNKNOWN)
+        some = [lanes[i] for i in batch]
+        found[batch] = log_likelihood(assembled(log, some)) + padding(log, some)
     return found
 
 

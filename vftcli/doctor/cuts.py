@@ -16,10 +16,10 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask, median
 from vftcli.signals.errors import ExaminationError
+from vftcli.signals.intervals import runs_of
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, fact, warning
-from vftcli.signals.series import runs_of
 from vftcli.signals.source import Cut
 
 BEYOND = 1.5

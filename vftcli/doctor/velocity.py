@@ -14,9 +14,9 @@ import numpy as np
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import stuck_joints, travel_of
 from vftcli.signals.arrays import Array, Mask, median
+from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
-from vftcli.signals.series import runs_of
 
 WINDOW = 0.2
 """Length of a window: short beside motion, long beside the noise of single samples and an arm's

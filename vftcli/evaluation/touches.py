@@ -11,8 +11,8 @@ import numpy as np
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
+from vftcli.signals.intervals import runs_of
 from vftcli.signals.remarks import Remark, Where, warning
-from vftcli.signals.series import runs_of
 
 CUTOFF = 2.0
 """Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]"""

@@ -9,8 +9,9 @@ from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.processing import PreparedLog
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.intervals import intervals, near
 from vftcli.signals.remarks import Remark, Where, warning
-from vftcli.signals.series import median_step, runs_of
+from vftcli.signals.series import median_step
 
 SLOW = 0.02
 """A joint must move faster than this to identify anything. [rad/s]"""
@@ -105,17 +106,10 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     z = excess * usable / np.maximum(sd, 1e-9)
     worst = z.max(axis=1)
     found = []
-    for start, stop in runs_of(worst > TOUCH):
-        if motion.t[stop - 1] - motion.t[start] >= TOUCH_TIME:
-            k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
-            found.append(
-                ContactSpan(
-                    float(motion.t[start]),
-                    float(motion.t[stop - 1]),
-                    int(j) + 1,
-                    float(residual[start + k, j]),
-                )
-            )
+    for start, stop in intervals(motion.t, worst > TOUCH, least=TOUCH_TIME):
+        k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
+        begin, end = float(motion.t[start]), float(motion.t[stop - 1])
+        found.append(ContactSpan(begin, end, int(j) + 1, float(residual[start + k, j])))
     return join_neighbours(found)
 
 
@@ -127,11 +121,7 @@ def near_standstill(motion: PreparedLog) -> Mask:
     step = median_step(motion.t)
     reach = max(1, round(1.0 / (motion.processing.cutoff * step)))
     # The zero-phase filter spreads what happens at standstill over about a period of its cutoff.
-    spread = slow.copy()
-    for k in range(1, min(reach, motion.samples - 1) + 1):
-        spread[k:] |= slow[:-k]
-        spread[:-k] |= slow[k:]
-    return spread
+    return near(slow, reach)
 
 
 def join_neighbours(found: Sequence[ContactSpan]) -> list[ContactSpan]:

@@ -22,9 +22,10 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
+from vftcli.signals.intervals import intervals
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.series import resample_columns, runs_of
+from vftcli.signals.series import resample_columns
 
 STATIC = 4
 """Parameters that gravity tells: mass and three first moments."""
@@ -375,12 +376,11 @@ def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array,
     q, torque = [], []
     for recording in recordings:
         effort = drive_torque(recording, robot)
-        for start, stop in runs_of(standing(recording)):
-            if recording.t[stop - 1] - recording.t[start] >= DWELL:
-                edge = (stop - start) // 5  # where the arm still settles or already leaves
-                span = slice(start + edge, stop - edge)
-                q.append(recording.q[span].mean(axis=0))
-                torque.append(effort[span].mean(axis=0))
+        for start, stop in intervals(recording.t, standing(recording), least=DWELL):
+            edge = (stop - start) // 5  # where the arm still settles or already leaves
+            span = slice(start + edge, stop - edge)
+            q.append(recording.q[span].mean(axis=0))
+            torque.append(effort[span].mean(axis=0))
     n = robot.joints
     return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
 

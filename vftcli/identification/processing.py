@@ -13,8 +13,9 @@ from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
+from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import gaps_of, runs_of
+from vftcli.signals.series import gaps_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -144,9 +145,8 @@ def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, column in enumerate(np.abs(dq).T):
-        for start, stop in runs_of(column <= processing.still):
-            if t[stop - 1] - t[start] >= processing.rest:
-                usable[start:stop, j] = False
+        stops = intervals(t, column <= processing.still, least=processing.rest)
+        usable[:, j] = ~covered(stops, len(t))
     # What the filter makes of a gap reaches half a period of its cutoff to either side.
     margin = 0.5 / processing.cutoff
     for k in gaps_of(t, processing.gap):

@@ -32,8 +32,8 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import runs_of
 
 CUTOFF = 4.0
 """Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]"""

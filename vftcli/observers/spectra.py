@@ -25,7 +25,8 @@ from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import median_step, runs_of
+from vftcli.signals.intervals import grown, intervals
+from vftcli.signals.series import median_step
 from vftcli.signals.spectrum import welch
 
 SEGMENT = 4.0
@@ -179,13 +180,7 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
         t: Clock. (T,) [s]
         inside: The loaded samples. (T,)
     """
-    runs = runs_of(inside)
-    if not runs or any(t[stop - 1] - t[start] >= IMPACT for start, stop in runs):
-        return inside
-    wide = inside.copy()
-    for start, stop in runs:
-        wide |= (t >= t[start] - 0.5 * IMPACT) & (t <= t[stop - 1] + 0.5 * IMPACT)
-    return wide
+    return inside if intervals(t, inside, least=IMPACT) else grown(t, inside, 0.5 * IMPACT)
 
 
 def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vftcli.refinement.normal_equations import FittedError, Rows, Sums, solve
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import covered, runs_of
 
 CORRELATED = 0.3
 """Residuals this close in time count as one. [s]"""
@@ -147,12 +147,9 @@ def free_samples(worst: Array, step: float) -> Mask:
         worst: Largest residual of any joint, in its scale. (S,)
         step: Time between two samples. [s]
     """
-    contact = np.zeros(len(worst), dtype=bool)
-    grown = round(GROWN / step)
-    for start, stop in runs_of(worst > CONTACT):
-        # the rounding of a step must not make a run of just that length too short
-        if (stop - start) * step >= LASTS - 1e-9:
-            contact[max(start - grown, 0) : stop + grown] = True
+    # the rounding of a step must not make a run of just that length too short
+    runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
+    contact = covered(runs, len(worst), margin=round(GROWN / step))
     if np.count_nonzero(~contact) < FEWEST:
         return np.ones(len(worst), dtype=bool)
     return ~contact

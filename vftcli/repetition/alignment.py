@@ -6,9 +6,10 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.lag import lag_fit
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resample_columns, runs_of
+from vftcli.signals.series import resample_columns
 
 LEAST_OVERLAP = 0.3
 """Share of the shorter log that must overlap at an admissible shift."""
@@ -185,9 +186,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
         return None
     shift, rate = refined(recording, free, best, 1.0)
     matched = near(rate * recording.t + shift, recording.q, free)
-    long = np.zeros(recording.samples, dtype=bool)
-    for start, stop in runs_of(matched):
-        long[start:stop] = recording.t[stop - 1] - recording.t[start] >= 1.0
+    long = covered(intervals(recording.t, matched, least=1.0), recording.samples)
     found = lying_at(recording, free, shift, rate, long)
     return found if np.isfinite(found.deviation) else None
 

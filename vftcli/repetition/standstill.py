@@ -3,7 +3,8 @@
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import median_step, runs_of
+from vftcli.signals.intervals import grown, runs_of
+from vftcli.signals.series import median_step
 
 STILL = 0.01
 """Speed below which a joint counts as standing. [rad/s]"""
@@ -40,14 +41,8 @@ def standing(t: Array, dq: Array) -> Mask:
         t: Clock. (T,) [s]
         dq: Joint velocities. (T, n) [rad/s]
     """
-    found = np.zeros(dq.shape, dtype=bool)
-    for j, long in enumerate((duration(t, dq) >= LEAST).T):
-        for start, end in runs_of(long):
-            # A joint is stuck before its speed is zero and settles after it has broken away.
-            first = np.searchsorted(t, t[start] - BREAKAWAY)
-            last = np.searchsorted(t, t[end - 1] + BREAKAWAY, side="right")
-            found[first:last, j] = True
-    return found
+    # A joint is stuck before its speed is zero and settles after it has broken away.
+    return np.column_stack([grown(t, long, BREAKAWAY) for long in (duration(t, dq) >= LEAST).T])
 
 
 def resting(t: Array, dq: Array) -> Mask:

@@ -6,7 +6,8 @@ import numpy as np
 
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
-from vftcli.signals.series import gaps_of, median_step, resample_columns, runs_of
+from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import gaps_of, median_step, resample_columns
 
 GAP = 5.5
 """A step of more than this many median steps is a gap; no stretch reaches across."""

@@ -1,11 +1,11 @@
-"""What is done to a time series whatever it holds: its step, its gaps, its runs, another clock."""
+"""What is done to a time series whatever it holds: its step, its gaps, another clock."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask, empty_series, is_uniform, median
+from vftcli.signals.arrays import Array, empty_series, is_uniform, median
 from vftcli.signals.errors import ClockError
 
 
@@ -54,21 +54,6 @@ def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     taken = np.diff(t)
     return np.flatnonzero(taken > steps * median(taken))
-
-
-def runs_of(mask: Mask) -> list[tuple[int, int]]:
-    """Where the unbroken runs of true samples begin and end, as ``slice`` takes them.
-
-    Args:
-        mask: True or false, sample by sample. (T,)
-
-    Returns:
-        Of each run the index of its first sample and of the one behind its last.
-    """
-    # With a false sample at either end every run has both its edges.
-    walled = np.concatenate([[False], mask, [False]])
-    edges = np.flatnonzero(walled[1:] != walled[:-1]).tolist()
-    return list(zip(edges[::2], edges[1::2], strict=True))
 
 
 def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import intervals, runs_of
 
 LEAVE = 0.6
 """A contact ends where the score falls below this share of its threshold, 1: hysteresis."""
@@ -71,18 +71,16 @@ def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInte
         score: Departure in half widths of the free band. (T,)
         gap: Two contacts closer than this are one. [s]
     """
-    found: list[ContactInterval] = []
+    inside = np.zeros(len(t), dtype=bool)
     for begin, end in runs_of(score > LEAVE):
         above = score[begin:end] > 1.0
-        if not above.any():
-            continue
         # It starts where 1 is first exceeded, not where the lower threshold is.
-        start, stop = float(t[begin + int(np.argmax(above))]), float(t[end - 1])
-        # A hand that slips for a moment has not let go.
-        if found and start - found[-1].stop < gap:
-            start = found.pop().start
-        found.append(ContactInterval(start, stop))
-    return tuple(c for c in found if c.stop - c.start >= HOLD)
+        inside[begin:end] = np.logical_or.accumulate(above)
+    # A hand that slips for a moment has not let go.
+    return tuple(
+        ContactInterval(float(t[start]), float(t[stop - 1]))
+        for start, stop in intervals(t, inside, least=HOLD, gap=gap)
+    )
 
 
 class Interval(Protocol):

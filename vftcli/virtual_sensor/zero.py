@@ -8,9 +8,9 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, Where, fact, warning
-from vftcli.signals.series import runs_of
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import ZeroChoice
 
@@ -208,11 +208,8 @@ def unloaded_start(wrench: Wrench) -> Span | None:
 
 def lasting(flags: Mask, t: Array, least: float) -> Mask:
     """Flags of runs that last at least `least` [s]. (T,)"""
-    kept = np.zeros(len(flags), dtype=bool)
-    for start, stop in runs_of(flags):
-        if t[min(stop, len(t) - 1)] - t[start] >= least:
-            kept[start:stop] = True
-    return kept
+    last = len(t) - 1
+    return covered([(a, b) for a, b in runs_of(flags) if t[min(b, last)] - t[a] >= least], len(t))
 
 
 def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:

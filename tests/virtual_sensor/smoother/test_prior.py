@@ -3,8 +3,9 @@
 import numpy as np
 
 from vftcli.robots.disturbance import Blocks
+from vftcli.signals.arrays import Array, Mask
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import GRID, LEVER, WrenchPrior, evolution, gated
+from vftcli.virtual_sensor.smoother.prior import GRID, LEVER, WrenchPrior, gated, wrench_model
 
 COUNT, SECONDS = 30, 0.1
 T = SECONDS * (np.arange(COUNT) + 0.5)
@@ -22,6 +23,12 @@ NOISE = TorqueNoise(
 PRIOR = WrenchPrior(2.0, 30.0)
 
 
+def moves(blocks: Blocks, inside: Mask) -> tuple[Array, Array]:
+    """Decay and added variance of wrench and model error under `PRIOR`. (K, 12) each"""
+    model = wrench_model(blocks, np.zeros((COUNT, 6, 6)), NOISE, [PRIOR], inside)
+    return model.decay[:, 0], model.added[:, 0]
+
+
 def test_a_listed_contact_opens_its_blocks_and_one_on_either_side() -> None:
     # .55 to .85 s touches blocks 5 to 8
     assert np.flatnonzero(gated(BLOCKS, [(0.55, 0.85)])).tolist() == list(range(4, 10))
@@ -32,7 +39,7 @@ def test_a_listed_contact_opens_its_blocks_and_one_on_either_side() -> None:
 
 def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it() -> None:
     inside = gated(BLOCKS, [(0.55, 0.85), (2.0, 2.2)])
-    decay, variance = (part[:, 0] for part in evolution(BLOCKS, NOISE, [PRIOR], inside))
+    decay, variance = moves(BLOCKS, inside)
     assert not decay[~inside, :6].any()
     assert not variance[~inside, :6].any()
     stationary = np.repeat([900.0, (LEVER * 30.0) ** 2], 3)
@@ -44,7 +51,7 @@ def test_a_wrench_keeps_its_variance_while_it_lasts_and_starts_with_it() -> None
 
 
 def test_the_model_error_is_stationary_from_the_first_block_on() -> None:
-    decay, variance = (p[:, 0] for p in evolution(BLOCKS, NOISE, [PRIOR], gated(BLOCKS, None)))
+    decay, variance = moves(BLOCKS, gated(BLOCKS, None))
     assert not decay[0].any()
     np.testing.assert_allclose(variance[0, 6:], 4.0)
     np.testing.assert_allclose(decay[1:, 6:], np.exp(-SECONDS / 0.5))
@@ -53,7 +60,7 @@ def test_the_model_error_is_stationary_from_the_first_block_on() -> None:
 
 def test_a_gap_lets_both_decay_by_its_own_length() -> None:
     late = BLOCKS._replace(t=np.concatenate([T[:10], T[10:] + 3.0]))
-    decay = evolution(late, NOISE, [PRIOR], gated(late, None)).decay[:, 0]
+    decay, _ = moves(late, gated(late, None))
     np.testing.assert_allclose(decay[10, :6], np.exp(-3.1 / 2.0))
     np.testing.assert_allclose(decay[10, 6:], np.exp(-3.1 / 0.5))
 

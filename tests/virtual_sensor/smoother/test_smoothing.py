@@ -16,7 +16,6 @@ from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.smoother.kalman import Measurement
 from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import (
@@ -290,10 +289,7 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) 
         resting=np.full(n, 10.0), resting_time=np.full(n, 2.0), near=near,
     )  # fmt: skip
     J = np.broadcast_to(np.eye(6), (count, 6, n))
-    known = np.ones(count, dtype=bool)
-    found = unlisted(
-        blocks, Measurement(blocks.d, J, noise.white, known), noise, WrenchPrior(1.0, 1e3)
-    )
+    found = unlisted(blocks, J, noise, WrenchPrior(1.0, 1e3))
     variance = np.diagonal(found, axis1=1, axis2=2)[:, :3]
     assert np.all(variance > 0.0)
     assert np.all(variance <= 0.1 + 1.44 * 10.0 + 1e-2)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vftcli.outputs.decimation import decimated
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 STEPS = 1.0, 2.0, 5.0, 10.0
 """What a tick's distance may begin with."""

@@ -11,7 +11,7 @@ from vftcli.outputs.contacts import by_force
 from vftcli.outputs.page import figures
 from vftcli.outputs.page.figures import Box, Scales, Span
 from vftcli.signals.errors import VftError
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
 
 WIDE = Box(width=1024, height=300, left=44, bottom=24, top=28, right=10)
 NARROW = Box(width=400, height=260, left=38, bottom=24, top=28, right=8)

@@ -22,7 +22,7 @@ from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, median
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import grown, runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 STILL = 0.01
@@ -120,12 +120,7 @@ class TorqueNoise:
     def rests(self, blocks: Blocks) -> Mask:
         """Blocks in which each joint rests, those within `near` of one too. (K, n)"""
         still = resting(blocks)
-        if self.near:
-            for j, column in enumerate(still.T):
-                for start, stop in runs_of(column.copy()):
-                    begin, end = blocks.t[start] - self.near, blocks.t[stop - 1] + self.near
-                    still[(blocks.t >= begin) & (blocks.t <= end), j] = True
-        return still
+        return np.column_stack([grown(blocks.t, column, self.near) for column in still.T])
 
 
 def steps(blocks: Blocks) -> Array:

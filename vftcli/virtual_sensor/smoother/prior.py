@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.virtual_sensor.smoother.kalman import Evolution, Measurement, likelihoods
+from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
 LEVER = 0.1
@@ -76,40 +76,45 @@ def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Ma
     return inside
 
 
-def evolution(
-    blocks: Blocks, noise: TorqueNoise, priors: Sequence[WrenchPrior], inside: Mask
-) -> Evolution:
-    """How wrench and model error go from block to block under each of G priors. (K, G, 6 + n)
+def wrench_model(
+    blocks: Blocks, J: Array, noise: TorqueNoise, priors: Sequence[WrenchPrior], inside: Mask
+) -> LinearModel:
+    """Wrench w and model error b under each of G priors: d = Jᵀw + b + noise. (K, G, 6 + n)
 
     Outside the gate the wrench is pinned to zero; the first block inside starts it with the prior's
     own variance, independent of before. So does the first block of the log the model error.
 
     Args:
         blocks: The blocks.
+        J: Jacobian of the wrench's point. (K, 6, n)
         noise: Noise and model error.
         priors: The priors.
         inside: Blocks in which there may be a wrench. (K,)
     """
     count, n = blocks.d.shape
-    decay, variance = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
+    decay, added = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
     goes_on = inside & np.concatenate([[False], inside[:-1]])
     step = steps(blocks)
     for g, prior in enumerate(priors):
         kept = np.where(goes_on, np.exp(-step / prior.time), 0.0)[:, None]
         decay[:, g, :6] = kept
-        variance[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
+        added[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
     # Where the whole log may be touched nothing tells a push from what it re-settles.
     pushed = inside if not inside.all() else np.zeros(count, dtype=bool)
     kept = noise.decay(blocks, pushed)
     kept[0] = 0.0
     decay[:, :, 6:] = kept[:, None, :]
-    variance[:, :, 6:] = (noise.variance(blocks, pushed) * (1.0 - kept**2))[:, None, :]
-    return Evolution(decay, variance)
+    added[:, :, 6:] = (noise.variance(blocks, pushed) * (1.0 - kept**2))[:, None, :]
+    known = blocks.known[:, None, None]
+    return LinearModel(
+        d=np.where(known, blocks.d[:, None], 0.0),
+        observation=(beside_errors(J) * known)[:, None],
+        white=np.where(known, noise.white, 1.0),
+        decay=decay,
+        added=added,
+    )
 
 
-def choose_prior(
-    blocks: Blocks, measured: Measurement, noise: TorqueNoise, inside: Mask
-) -> WrenchPrior:
-    """The prior of `GRID` under which the log is most likely."""
-    nats = likelihoods(evolution(blocks, noise, GRID, inside), measured)
-    return GRID[int(np.argmax(nats))]
+def choose_prior(blocks: Blocks, J: Array, noise: TorqueNoise, inside: Mask) -> WrenchPrior:
+    """The prior of `GRID` under which the log is most likely; the arguments of `wrench_model`."""
+    return GRID[int(np.argmax(log_likelihood(wrench_model(blocks, J, noise, GRID, inside))))]

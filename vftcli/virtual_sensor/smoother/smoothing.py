@@ -18,16 +18,11 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
+from vftcli.signals.linear_model import LinearModel, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.virtual_sensor.smoother.kalman import (
-    Evolution,
-    Measurement,
-    filter_forward,
-    smooth_backward,
-)
 from vftcli.virtual_sensor.smoother.noise import TIE, FreeTerms, TorqueNoise, torque_noise
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, evolution, gated
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, gated, wrench_model
 
 COARSE = 0.1
 """Length of a block for steady loads, and for the choice of the prior. [s]"""
@@ -188,7 +183,7 @@ def smooth_wrench(
     gate: Sequence[tuple[float, float]] | None = None,
     prior: WrenchPrior | None = None,
 ) -> SmoothedWrench:
-    """The wrench at the flange from the whole log, by the model of `kalman`.
+    """The wrench at the flange from the whole log, by `wrench_model`.
 
     Args:
         terms: p and μ along the log, corrected or not.
@@ -211,13 +206,12 @@ def smooth_wrench(
     if prior is None:
         prior = prior_of(terms, q, robot, free, gate)
     seconds = block_length(terms.t, fine=not prior.is_steady)
-    blocks, measured, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
-    steps = evolution(blocks, noise, [prior], inside)
-    single = Evolution(steps.decay[:, 0], steps.variance[:, 0])
-    mean, covariance = smooth_backward(single, filter_forward(single, measured))
+    blocks, J, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
+    model = wrench_model(blocks, J, noise, [prior], inside)
+    mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model)))
     own = covariance[:, :6, :6]
     if gate is not None:
-        own = np.where(inside[:, None, None], own, unlisted(blocks, measured, noise, prior))
+        own = np.where(inside[:, None, None], own, unlisted(blocks, J, noise, prior))
     spread = own * np.outer(WIDENED, WIDENED)
     if gate is not None:
         spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
@@ -233,9 +227,7 @@ def smooth_wrench(
     )
 
 
-def unlisted(
-    blocks: Blocks, measured: Measurement, noise: TorqueNoise, prior: WrenchPrior
-) -> Array:
+def unlisted(blocks: Blocks, J: Array, noise: TorqueNoise, prior: WrenchPrior) -> Array:
     """Covariance that a contact of `UNLISTED` seconds about each block would have. (K, 6, 6)
 
     The quiet blocks before it leave the model error b with the variance of a filter's steady state,
@@ -253,12 +245,12 @@ def unlisted(
 
     Args:
         blocks: The log.
-        measured: Jacobians and white noise.
+        J: Jacobian of the wrench's point. (K, 6, n)
         noise: Noise and model error.
         prior: How the contacts' wrench moves.
     """
     # A log of one sample is a block without length.
-    R, length = measured.noise, float(np.median(blocks.length)) or FINE
+    R, length = noise.white, float(np.median(blocks.length)) or FINE
     count = len(blocks.t)
     half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
     kept = np.exp(-2.0 * length / noise.time(blocks))
@@ -277,7 +269,6 @@ def unlisted(
     known = (total[last] - total[first]) / (last - first)[:, None]
     # In a gap of the clock nothing would be known of it.
     weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))
-    J = measured.jacobian
     information = (J * weight[:, None, :]) @ J.swapaxes(1, 2) + np.diag(1.0 / prior.variance)
     return np.linalg.inv(information)
 
@@ -320,8 +311,7 @@ def prior_of(
     gate: Sequence[tuple[float, float]] | None = None,
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
-    model = blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False))
-    return choose_prior(model.blocks, model.measured, model.noise, model.inside)
+    return choose_prior(*blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False)))
 
 
 def block_length(t: Array, *, fine: bool) -> float:
@@ -339,13 +329,13 @@ class BlockModel(NamedTuple):
 
     Attributes:
         blocks: The blocks.
-        measured: What they say of the state.
+        jacobian: J of the flange. (K, 6, n)
         noise: Noise and model error.
         inside: Blocks in which there may be a wrench. (K,)
     """
 
     blocks: Blocks
-    measured: Measurement
+    jacobian: Array
     noise: TorqueNoise
     inside: Mask
 
@@ -362,5 +352,4 @@ def blocks_of(
     blocks = disturbance_blocks(terms, q, seconds)
     noise = torque_noise(blocks, free, robot, seconds)
     jacobian = flange_jacobian(robot.chain, blocks.q)
-    measured = Measurement(blocks.d, jacobian, noise.white, blocks.known)
-    return BlockModel(blocks, measured, noise, gated(blocks, gate))
+    return BlockModel(blocks, jacobian, noise, gated(blocks, gate))
