@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 
 __version__ = VERSION
 
+#: Public name → the module it lives in.
 HOMES = {
     "Analysis": "analysis",
     "AnalysisChoice": "pipeline",
@@ -95,7 +96,6 @@ HOMES = {
     "thresholds": "notebook",
     "two_cycle_difference": "repetition.two_cycle",
 }
-"""Public name → the module it lives in."""
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - the names are of every kind

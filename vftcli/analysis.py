@@ -30,37 +30,30 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Analysis(Shown):
-    """One log, one robot, its observers' estimates, and how they compare with the reference.
+    """One log, one robot, its observers' estimates, and how they compare with the reference."""
 
-    Attributes:
-        motion: The log with its robot as it was used, payload mounted, friction possibly off, and
-            what is known of its free motion.
-        observers: The observers that ran.
-        estimates: Their estimates, in the same order.
-        tunings: What each observer's parameters mean at this log's sample time, by name.
-        refinement: What the complete log makes of the estimates, or None where nothing asked.
-        virtual_sensor: The wrenches and what is known of them, or None where none was asked for.
-        reference: What the estimates are judged by, or None.
-        errors: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
-        contacts: What touched the arm, or None where it is not asked or cannot be told.
-        published: A printed table beside these errors, or None where none was asked for.
-        examinations: What is wrong with the log, then with its free runs.
-        remarks: What the reader of the numbers should know, as `Remarks`.
-        run: The command, versions and conventions, as `run.json` holds them.
-    """
-
+    #: The log with its robot as it was used, payload mounted, friction possibly off, and what is
+    #: known of its free motion.
     motion: "FreeMotion"
-    observers: tuple[Observer, ...]
-    estimates: tuple[ExternalTorque, ...]
+    observers: tuple[Observer, ...]  #: The observers that ran.
+    estimates: tuple[ExternalTorque, ...]  #: Their estimates, in the same order.
+    #: What each observer's parameters mean at this log's sample time, by name.
     tunings: Mapping[str, Tuning]
+    #: What the complete log makes of the estimates, or None where nothing asked.
     refinement: "Refinement | None" = None
+    #: The wrenches and what is known of them, or None where none was asked for.
     virtual_sensor: "SensorReading | None" = None
-    reference: ExternalTorque | None = None
+    reference: ExternalTorque | None = None  #: What the estimates are judged by, or None.
+    #: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
     errors: "pl.DataFrame | None" = None
+    #: What touched the arm, or None where it is not asked or cannot be told.
     contacts: "ContactList | None" = None
+    #: A printed table beside these errors, or None where none was asked for.
     published: "Comparison | None" = None
+    #: What is wrong with the log, then with its free runs.
     examinations: "tuple[Examination, ...]" = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know, as `Remarks`.
+    #: The command, versions and conventions, as `run.json` holds them.
     run: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -143,11 +136,5 @@ class Analysis(Shown):
 
 
 def terms_of(baseline: "Baseline | None", name: str, run: "ModelledRun") -> DynamicsTerms:
-    """P and μ of a recording as one observer of its log has them.
-
-    Args:
-        baseline: What the log shows, None where nothing asks for it.
-        name: The observer.
-        run: The log, or one of its free runs.
-    """
+    """P and μ of a recording as one observer of its log has them."""
     return run.terms if baseline is None else baseline.under(name).terms_of(run)

@@ -27,11 +27,9 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
     from vftcli.contacts.thresholds import Thresholds
 
-Log = str | Path | Recording
-"""A log as a user names it."""
-
+Log = str | Path | Recording  #: A log as a user names it.
+#: A robot as a user names it; None where the log settles it.
 NamedRobot = str | Path | Robot | None
-"""A robot as a user names it; None where the log settles it."""
 
 
 def report(

@@ -38,34 +38,30 @@ WRITING = 0.7  # share of a log's work that is done before its files are written
 
 @dataclass(frozen=True, kw_only=True)
 class AnalysisChoice:
-    """What a user asks of one log, as estimate, compare and report share it: a choice a room.
+    """What a user asks of one log, as estimate, compare and report share it: a choice a room."""
 
-    Attributes:
-        read: How the log is read, and which part of it is used.
-        robot: Which arm made it, and how it is modelled.
-        observers: Which observers run, and with which gains.
-        free: What motion nobody touched, and how the two-cycle difference lays it under the log.
-        refinement: What is done with the estimates once the whole log is known.
-        wrench: What is asked of the virtual force/torque sensor, None for joint torques alone.
-        reference: What the estimates are compared with, or None.
-        contacts: Whether what touched the arm is listed, where the complete log may be used.
-        library: Where the logs of the command are read, each once.
-        examiner: Who examines them, each once, and says whether results mean anything.
-        spares_memory: Whether what only the examination looks at of a log is let go after it.
-        progress: Told what is being done, and from which share of a log's work to which.
-    """
-
+    #: How the log is read, and which part of it is used.
     read: ReadChoice = field(default_factory=ReadChoice)
+    #: Which arm made it, and how it is modelled.
     robot: RobotChoice = field(default_factory=RobotChoice)
+    #: Which observers run, and with which gains.
     observers: ObserverChoice = field(default_factory=ObserverChoice)
+    #: What motion nobody touched, and how the two-cycle difference lays it under the log.
     free: FreeChoice = field(default_factory=FreeChoice)
+    #: What is done with the estimates once the whole log is known.
     refinement: RefinementChoice = field(default_factory=RefinementChoice)
+    #: What is asked of the virtual force/torque sensor, None for joint torques alone.
     wrench: "WrenchChoice | None" = None
-    reference: "ReferenceChoice | None" = None
+    reference: "ReferenceChoice | None" = None  #: What the estimates are compared with, or None.
+    #: Whether what touched the arm is listed, where the complete log may be used.
     contacts: bool = True
+    #: Where the logs of the command are read, each once.
     library: Library = field(default_factory=Library, repr=False, compare=False)
+    #: Who examines them, each once, and says whether results mean anything.
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
+    #: Whether what only the examination looks at of a log is let go after it.
     spares_memory: bool = False
+    #: Told what is being done, and from which share of a log's work to which.
     progress: Callable[[str, float, float], None] = field(
         default=no_stage, repr=False, compare=False
     )
@@ -94,11 +90,9 @@ class AnalysisChoice:
         return self.contacts and not self.observers.causal
 
 
+#: What is done with each log of a command.
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
-"""What is done with each log of a command."""
-
-Failed = Callable[[Path, VftError], None]
-"""Who is told which log could not be analysed, and why."""
+Failed = Callable[[Path, VftError], None]  #: Who is told which log could not be analysed, and why.
 
 
 def raise_error(_log: Path, error: VftError) -> None:

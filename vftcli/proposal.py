@@ -22,46 +22,28 @@ from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
 
-MOST_ROBOTS = 5
-"""Profiles that are named where none is settled."""
-
+MOST_ROBOTS = 5  #: Profiles that are named where none is settled.
+#: What estimates can be compared with, the most telling first, and what for.
 REFERENCES = {
     "sensor": "the log holds a wrench that was measured",
     "two-cycle": "the motion is known without contact too, and the difference of the two is taken",
     "vendor": "the log holds an external torque of its controller: an estimate as well",
 }
-"""What estimates can be compared with, the most telling first, and what for."""
 
 
 class ProposedOption(NamedTuple):
-    """One option for a file of options, or a remark alone.
+    """One option for a file of options, or a remark alone."""
 
-    Attributes:
-        why: Its reason.
-        key: The option without its dashes; "" of a remark.
-        value: Its value: a text or several.
-        taken: Whether it holds, or is only there to be taken.
-    """
-
-    why: str
-    key: str = ""
-    value: str | list[str] = ""
-    taken: bool = True
+    why: str  #: Its reason.
+    key: str = ""  #: The option without its dashes; "" of a remark.
+    value: str | list[str] = ""  #: Its value: a text or several.
+    taken: bool = True  #: Whether it holds, or is only there to be taken.
 
 
 def propose(
     logs: Sequence[Path], choice: AnalysisChoice, given: Mapping[str, str | list[str]]
 ) -> Iterator[ProposedOption]:
-    """The options that logs call for.
-
-    Args:
-        logs: The log; further ones are offered as free motion where nothing touches the arm.
-        choice: How they are read, and which arm it is, as far as the user says.
-        given: What the user says, by key.
-
-    Raises:
-        VftError: If the first log cannot be read, or a robot that is named is none.
-    """
+    """The options that logs call for."""
     yield from (ProposedOption("as given", key, value) for key, value in given.items())
     recording = choice.library.open(logs[0], choice.read)
     for option in read_so(recording):
@@ -179,10 +161,10 @@ def free_part(
         yield ProposedOption(f"{remark}{own}")
 
 
+#: Why a difference of cycles may tell nothing.
 ONE_CYCLE = (
     "the log holds one whole cycle, which has to be free of contact: say so with free-cycles"
 )
-"""Why a difference of cycles may tell nothing."""
 
 
 def references(
@@ -217,15 +199,13 @@ def reasons(recording: Recording) -> dict[str, str]:
     return {"two-cycle": others.pop("two-cycle"), "sensor": told, **others}
 
 
+#: Begins a file of options.
 HEADING = """\
 # Options of every command that reads a log, as they are typed, without their dashes. What is typed
 # goes before them; --config none leaves them out. Files are named from this file's folder on.
 # Tables as [compare] hold what is for one command. More: vftcli help config
 """
-"""Begins a file of options."""
-
-WIDTH = 98
-"""Letters of a reason's line."""
+WIDTH = 98  #: Letters of a reason's line.
 
 
 def config_text(options: Iterable[ProposedOption]) -> str:

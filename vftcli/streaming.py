@@ -19,13 +19,7 @@ from vftcli.signals.steady_filter import PIECE
 
 
 def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) -> bool:
-    """Whether nothing that is asked of a long log needs all of it at once.
-
-    Args:
-        recording: The log.
-        robot: Its arm.
-        choice: What is asked of it.
-    """
+    """Whether nothing that is asked of a long log needs all of it at once."""
     wrench = choice.wrench
     if recording.long is None or choice.looks_back or choice.lists_contacts:
         return False
@@ -43,12 +37,7 @@ def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) 
 
 
 class BlockAnalysis:
-    """The blocks of a long log's analysis, and what is known when the last has gone by.
-
-    Args:
-        made: The analysis of stretches of the log, without estimates.
-        choice: What was asked.
-    """
+    """The blocks of a long log's analysis, and what is known when the last has gone by."""
 
     def __init__(self, made: Analysis, choice: AnalysisChoice) -> None:
         self.made, self.choice = made, choice

@@ -23,30 +23,21 @@ from vftcli.signals import parsing
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
 
-FROM_DAMPING = "from-B"
-"""The word for a damping ratio ξ that is that of the drag phase."""
+FROM_DAMPING = "from-B"  #: The word for a damping ratio ξ that is that of the drag phase.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ControlChoice:
-    """Which controllers are compared, and with which parameters.
+    """Which controllers are compared, and with which parameters."""
 
-    Attributes:
-        kinds: Keys of `vftcli.admittance.law.KINDS`; all if empty.
-        alphas: One variable controller for each; the parameters' own α if empty.
-        settings: Parameters the user sets, which go before every file's.
-        file: A file whose ``[admittance]`` is taken instead of the robot's, or None.
-        force_unstable: Whether unstable settings run too.
-
-    Raises:
-        ParameterError: If there is no such kind.
-    """
-
-    kinds: tuple[str, ...] = ()
+    kinds: tuple[str, ...] = ()  #: Keys of `vftcli.admittance.law.KINDS`; all if empty.
+    #: One variable controller for each; the parameters' own α if empty.
     alphas: tuple[float, ...] = ()
+    #: Parameters the user sets, which go before every file's.
     settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    #: A file whose ``[admittance]`` is taken instead of the robot's, or None.
     file: Path | None = None
-    force_unstable: bool = False
+    force_unstable: bool = False  #: Whether unstable settings run too.
 
     def __post_init__(self) -> None:
         check_kinds(self.kinds)
@@ -64,21 +55,7 @@ class ControlChoice:
         force_unstable: bool = False,
         as_printed: bool = False,
     ) -> "ControlChoice":
-        """The choice that the options of a command state.
-
-        Args:
-            assignments: Those of ``--set SECTION.PARAMETER=VALUE`` that are of the admittance.
-            alpha: Values of α, comma-separated.
-            controller: The kinds of every ``--controller``.
-            xi: Damping ratio of the recovery, or "from-B" for the drag phase's.
-            threshold_mode: "hard", "soft" or "literal".
-            parameters: See `file`.
-            force_unstable: See the attribute.
-            as_printed: Whether Algorithm 1 runs as printed, where no mode is named.
-
-        Raises:
-            ParameterError: If a word is malformed or names nothing there is.
-        """
+        """The choice that the options of a command state."""
         # What is named comes later, and so goes before it.
         given = ["admittance.threshold_mode=literal"] if as_printed else []
         given += assignments
@@ -95,11 +72,7 @@ class ControlChoice:
         )
 
     def parameters(self, robot: Robot) -> Admittance:
-        """The admittance parameters: the file's or the robot's, then those that are set.
-
-        Raises:
-            ParameterError: If one is missing, unknown or out of range.
-        """
+        """The admittance parameters: the file's or the robot's, then those that are set."""
         table = robot.admittance
         if self.file is not None:
             table = checked_admittance(RobotFile(self.file).root.section("admittance"))
@@ -118,27 +91,18 @@ def split_settings(assignments: Sequence[str]) -> tuple[list[str], list[str]]:
 
 @dataclass(frozen=True, kw_only=True)
 class ReleaseChoice:
-    """A release from rest.
+    """A release from rest."""
 
-    Attributes:
-        deviation: From the target pose. (6,) [m, rad]
-        start: Joint positions of the target pose, None for the robot file's. [rad]
-        duration: How long to watch, None for as long as it takes. [s]
-    """
-
-    deviation: Array
+    deviation: Array  #: From the target pose. (6,) [m, rad]
+    #: Joint positions of the target pose, None for the robot file's. [rad]
     start: tuple[float, ...] | None = None
-    duration: float | None = None
+    duration: float | None = None  #: How long to watch, None for as long as it takes. [s]
 
     @classmethod
     def parsed(
         cls, *, release: Sequence[str], start: str | None = None, duration: float | None = None
     ) -> "ReleaseChoice":
-        """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state.
-
-        Raises:
-            ParameterError: If an axis does not exist or a value is no number.
-        """
+        """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state."""
         return cls(
             deviation=release_deviation(release),
             start=listed(start, "--start") if start is not None else None,
@@ -146,11 +110,7 @@ class ReleaseChoice:
         )
 
     def pose(self, robot: Robot) -> Array:
-        """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]
-
-        Raises:
-            ParameterError: If neither gives one.
-        """
+        """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]"""
         start = self.start or robot.admittance.get("start")
         if start is None:
             raise ParameterError(
@@ -161,22 +121,14 @@ class ReleaseChoice:
 
 
 def released_robot(choice: RobotChoice) -> Robot:
-    """The arm of a release, which no log settles.
-
-    Raises:
-        RobotError: If none is named, or there is none of that name.
-    """
+    """The arm of a release, which no log settles."""
     if choice.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
     return choice.named()
 
 
 def listed(text: str, option: str) -> tuple[float, ...]:
-    """The numbers of ``A,B,C``.
-
-    Raises:
-        ParameterError: If one is no number.
-    """
+    """The numbers of ``A,B,C``."""
     numbers = parsing.numbers(text)
     if numbers is None:
         raise ParameterError(f"{option} {text!r} is not a list of numbers")

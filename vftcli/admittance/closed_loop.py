@@ -30,39 +30,25 @@ from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import known_noise, log_rate
 
-FARTHEST = 3.0
-"""A flange this far from its start has run away. [m]"""
+FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ClosedLoop:
-    """A finished run.
+    """A finished run."""
 
-    Attributes:
-        controller: The controller in the loop.
-        t: Control instants. (T,) [s]
-        estimate: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
-        truth: Wrench of the contacts on the flange, about its origin, base axes. (T, 6) [N, N·m]
-        dragged: Phases. (T, 6)
-        commanded: Deviation X̃ that was commanded. (T, 6) [m, rad]
-        q: Joint positions. (T, n) [rad]
-        moved: Deviation of the flange itself from where it started. (T, 6) [m, rad]
-        reached: Whether the inverse kinematics found the commanded pose. (T,)
-        zero: Zero of the wrench that was removed. (6,) [N, N·m]
-        simulation: The log and truth of the run, None if it ran away.
-    """
-
-    controller: Controller
-    t: Array
-    estimate: Array
+    controller: Controller  #: The controller in the loop.
+    t: Array  #: Control instants. (T,) [s]
+    estimate: Array  #: Wrench that the controller saw, zero removed, base axes. (T, 6) [N, N·m]
+    #: Wrench of the contacts on the flange, about its origin, base axes. (T, 6) [N, N·m]
     truth: Array
-    dragged: Mask
-    commanded: Array
-    q: Array
-    moved: Array
-    reached: Mask
-    zero: Array
-    simulation: Simulation | None
+    dragged: Mask  #: Phases. (T, 6)
+    commanded: Array  #: Deviation X̃ that was commanded. (T, 6) [m, rad]
+    q: Array  #: Joint positions. (T, n) [rad]
+    moved: Array  #: Deviation of the flange itself from where it started. (T, 6) [m, rad]
+    reached: Mask  #: Whether the inverse kinematics found the commanded pose. (T,)
+    zero: Array  #: Zero of the wrench that was removed. (6,) [N, N·m]
+    simulation: Simulation | None  #: The log and truth of the run, None if it ran away.
 
     @property
     def stable(self) -> bool:
@@ -189,8 +175,8 @@ class Loop:
         return Reference(self.q_command[None], speed[None], np.zeros_like(speed)[None])
 
 
+#: In all built-in closed-loop scenarios nothing touches the arm in this span. [s]
 UNLOADED = (0.5, 3.0)
-"""In all built-in closed-loop scenarios nothing touches the arm in this span. [s]"""
 
 
 def run_closed_loop(
@@ -219,10 +205,6 @@ def run_closed_loop(
             None removes nothing. [s]
         force_unstable: Run unstable settings too.
         progress: Told how far the run is.
-
-    Raises:
-        UnstableError: If the controller is unstable.
-        ParameterError: If the period is no multiple of the inner step.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")
@@ -267,11 +249,7 @@ def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
 
 
 def steps_in(interval: float, step: float, what: str) -> int:
-    """How many inner steps an interval is.
-
-    Raises:
-        ParameterError: If it is no whole number of them.
-    """
+    """How many inner steps an interval is."""
     count = round(interval / step)
     if count < 1 or abs(interval / step - count) > 1e-6:
         raise ParameterError(

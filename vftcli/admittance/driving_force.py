@@ -18,17 +18,11 @@ from vftcli.virtual_sensor.zero import without_zero
 
 
 class DrivingForce(NamedTuple):
-    """The wrench that drives a replay.
+    """The wrench that drives a replay."""
 
-    Attributes:
-        wrench: Force on the robot, base axes, about the flange point.
-        source: Where it comes from.
-        remarks: What a reader should know of it.
-    """
-
-    wrench: Wrench
-    source: Remark
-    remarks: tuple[Remark, ...]
+    wrench: Wrench  #: Force on the robot, base axes, about the flange point.
+    source: Remark  #: Where it comes from.
+    remarks: tuple[Remark, ...]  #: What a reader should know of it.
 
 
 def observed_force(reading: SensorReading) -> DrivingForce:
@@ -41,12 +35,7 @@ def observed_force(reading: SensorReading) -> DrivingForce:
 def stored_force(
     recording: Recording, robot: Robot, choice: WrenchChoice, observer: str
 ) -> DrivingForce:
-    """What the virtual sensor makes of an observer's torque that a file of estimates holds.
-
-    Raises:
-        MissingSignalError: If the file holds no torque.
-        ParameterError: If the smoother is asked for, which needs the log itself.
-    """
+    """What the virtual sensor makes of an observer's torque that a file of estimates holds."""
     if choice.solver == SMOOTHER:
         raise ParameterError(
             "--solver smoother takes the log itself, not the torques of a file of estimates; "
@@ -63,11 +52,7 @@ def stored_force(
 
 
 def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> DrivingForce:
-    """The log's own wrench.
-
-    Raises:
-        MissingSignalError: If the log has none, or one that is zero throughout.
-    """
+    """The log's own wrench."""
     frame = recording.wrench_frame
     source = fact("force-of-sensor", frame=str(frame) if frame else "frame not stated")
     wrench = logged_wrench(recording, robot.chain, choice.mounting(robot))
@@ -77,11 +62,7 @@ def sensor_force(recording: Recording, robot: Robot, choice: WrenchChoice) -> Dr
 def truth_force(
     recording: Recording, robot: Robot, choice: WrenchChoice, path: Path
 ) -> DrivingForce:
-    """The wrench of a truth file, on the log's own clock.
-
-    Raises:
-        ReferenceTorqueError: If it holds none, or its clock does not overlap the log's.
-    """
+    """The wrench of a truth file, on the log's own clock."""
     # Few replays have a truth, and reading one loads the references.
     from vftcli.evaluation.reference_file import file_reference
 

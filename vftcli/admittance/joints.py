@@ -12,14 +12,13 @@ from vftcli.signals.packages import needed
 from vftcli.signals.pose import exp_matrix
 
 ITERATIONS = 12
+#: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-6
-"""A pose counts as reached when position and rotation error are below this. [m, rad]"""
+#: λ² of the damped step is this times the error, so that it vanishes where the pose is reached.
 DAMPING = 1e-3
-"""λ² of the damped step is this times the error, so that it vanishes where the pose is reached."""
+#: If the error after three steps is still this share of what it was, the pose is out of reach.
 STALLED = 0.7
-"""If the error after three steps is still this share of what it was, the pose is out of reach."""
-LARGEST_STEP = 0.2
-"""Longest joint step of one iteration. [rad]"""
+LARGEST_STEP = 0.2  #: Longest joint step of one iteration. [rad]
 
 
 class FlangeSolver:
@@ -53,11 +52,7 @@ class FlangeSolver:
         return np.array(place.rotation), np.array(place.translation)
 
     def check_start(self, q: Array) -> Array:
-        """Return a start pose.
-
-        Raises:
-            ParameterError: If it has another number of joints or lies outside the limits.
-        """
+        """Return a start pose."""
         q = np.asarray(q, dtype=np.float64)
         if q.shape != (self.robot.joints,):
             raise ParameterError(
@@ -104,18 +99,12 @@ class FlangeSolver:
 
 @dataclass(frozen=True, kw_only=True)
 class JointPath:
-    """Joint positions along the motions of N controllers.
+    """Joint positions along the motions of N controllers."""
 
-    Attributes:
-        q: Positions; where a pose is out of reach the arm waits at the last it reached.
-            (T, N, n) [rad]
-        reached: Whether the flange pose is reached inside the joint limits. (T, N)
-        speed: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
-    """
-
+    #: Positions; where a pose is out of reach the arm waits at the last it reached. (T, N, n) [rad]
     q: Array
-    reached: Mask
-    speed: Array
+    reached: Mask  #: Whether the flange pose is reached inside the joint limits. (T, N)
+    speed: Array  #: Largest joint speed as a share of its limit, NaN where no limit is known. (N,)
 
 
 def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> JointPath:

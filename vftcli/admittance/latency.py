@@ -11,42 +11,30 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop
 from vftcli.signals.arrays import Array, Mask
 
-STARTED = 5e-3
-"""Displacement of the flange at which it is said to have moved. [m]"""
-
-TURNED = 0.02
-"""Rotation of the flange at which it is said to have turned. [rad]"""
-
+STARTED = 5e-3  #: Displacement of the flange at which it is said to have moved. [m]
+TURNED = 0.02  #: Rotation of the flange at which it is said to have turned. [rad]
+#: Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]
 STILL = (0.005, 0.05)
-"""Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]"""
-
-REST = 1.0
-"""A contact begins where the force had been below the threshold for this long. [s]"""
+REST = 1.0  #: A contact begins where the force had been below the threshold for this long. [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Latency:
-    """One application of a force, all in seconds; None where it did not happen.
+    """One application of a force, all in seconds; None where it did not happen."""
 
-    Attributes:
-        axis: Index of the axis whose true force is the first to pass its threshold.
-        force: When it passes.
-        detection: Time from then until the estimate passes it.
-        motion: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
-        withdrawal: Time from the true force's fall below the threshold to the estimate's.
-        reaction: Time from detection until the flange has moved by as much from where it was then.
-        turn: Time from the estimate's fall below the threshold until the flange goes no farther.
-        rested: Whether the flange was at rest when the force came; a time to a displacement says
-            nothing of one that was moving already.
-    """
-
-    axis: int
-    force: float
-    detection: float | None
+    axis: int  #: Index of the axis whose true force is the first to pass its threshold.
+    force: float  #: When it passes.
+    detection: float | None  #: Time from then until the estimate passes it.
+    #: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
     motion: float | None
+    #: Time from the true force's fall below the threshold to the estimate's.
     withdrawal: float | None
+    #: Time from detection until the flange has moved by as much from where it was then.
     reaction: float | None
+    #: Time from the estimate's fall below the threshold until the flange goes no farther.
     turn: float | None
+    #: Whether the flange was at rest when the force came; a time to a displacement says nothing of
+    #: one that was moving already.
     rested: bool
 
 

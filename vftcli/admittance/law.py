@@ -19,21 +19,13 @@ KINDS = ("traditional", "variable")
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """One controller of a comparison: what its recovery phase is made of. Arrays are (6,).
+    """One controller of a comparison: what its recovery phase is made of. Arrays are (6,)."""
 
-    Attributes:
-        kind: "traditional" or "variable".
-        alpha: α; 1 for the traditional one.
-        rate: 1/v₀; 0 for the traditional one. [s/m, s/rad]
-        damping: Damping of the recovery phase. [N·s/m, N·m·s/rad]
-        parameters: What it was built from.
-    """
-
-    kind: str
-    alpha: Array
-    rate: Array
-    damping: Array
-    parameters: Admittance
+    kind: str  #: "traditional" or "variable".
+    alpha: Array  #: α; 1 for the traditional one.
+    rate: Array  #: 1/v₀; 0 for the traditional one. [s/m, s/rad]
+    damping: Array  #: Damping of the recovery phase. [N·s/m, N·m·s/rad]
+    parameters: Admittance  #: What it was built from.
 
     def __post_init__(self) -> None:
         seal(self, "alpha", "rate", "damping")
@@ -82,16 +74,7 @@ def variable(parameters: Admittance) -> Controller:
 def controllers(
     parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
-    """The controllers of a comparison, the traditional one first.
-
-    Args:
-        parameters: The robot's.
-        kinds: Which kinds; both if empty.
-        alphas: One variable controller for each; the parameters' own α if empty.
-
-    Raises:
-        ParameterError: If a kind is unknown or an α is not positive.
-    """
+    """The controllers of a comparison, the traditional one first."""
     check_kinds(kinds)
     wanted = kinds or KINDS
     found = [traditional(parameters)] if "traditional" in wanted else []

@@ -13,30 +13,20 @@ from vftcli.admittance.thresholds import Phases
 from vftcli.signals.arrays import Array
 from vftcli.signals.intervals import runs_of
 
-PAUSE = 1.0
-"""Drags of one axis that follow each other within this time are one. [s]"""
-
+PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
+#: Return time → share of the deviation at release inside which the axis has to stay.
 SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
-"""Return time → share of the deviation at release inside which the axis has to stay."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drag:
-    """One drag of one axis, from where its force passes the threshold to the next drag.
+    """One drag of one axis, from where its force passes the threshold to the next drag."""
 
-    Attributes:
-        axis: Index of the axis.
-        number: Count of the drags of that axis, from 1.
-        begin: Row of the motion at which the drag phase begins.
-        release: Row from which on the axis recovers.
-        end: Row after the last that belongs to it.
-    """
-
-    axis: int
-    number: int
-    begin: int
-    release: int
-    end: int
+    axis: int  #: Index of the axis.
+    number: int  #: Count of the drags of that axis, from 1.
+    begin: int  #: Row of the motion at which the drag phase begins.
+    release: int  #: Row from which on the axis recovers.
+    end: int  #: Row after the last that belongs to it.
 
 
 def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:

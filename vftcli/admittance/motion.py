@@ -17,18 +17,12 @@ class AxisMotion:
 
     Row k + 1 follows from row k and the force of row k. All components are in base axes; the
     rotation is the vector log(R R_dᵀ).
-
-    Attributes:
-        t: Time; T control periods after the start come T + 1 rows. (T+1,) [s]
-        x: Deviations X̃ from the target pose. (T+1, N, 6) [m, rad]
-        v: Velocities. (T+1, N, 6) [m/s, rad/s]
-        clipped: Whether the speed limit acted in the step before. (T+1, N, 6)
     """
 
-    t: Array
-    x: Array
-    v: Array
-    clipped: Mask
+    t: Array  #: Time; T control periods after the start come T + 1 rows. (T+1,) [s]
+    x: Array  #: Deviations X̃ from the target pose. (T+1, N, 6) [m, rad]
+    v: Array  #: Velocities. (T+1, N, 6) [m/s, rad/s]
+    clipped: Mask  #: Whether the speed limit acted in the step before. (T+1, N, 6)
 
     @property
     def escaped(self) -> Mask:

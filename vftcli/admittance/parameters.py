@@ -10,17 +10,16 @@ from vftcli.signals.arrays import Array, check_shape, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import assignment, numbers
 
+#: The six axes: translation of the flange point along the base axes, rotation about them.
 AXES = ("x", "y", "z", "rx", "ry", "rz")
-"""The six axes: translation of the flange point along the base axes, rotation about them."""
-
+#: Section of an assignment or of a robot file → the axes it speaks of.
 GROUPS: dict[str, tuple[int, ...]] = {
     "admittance": (0, 1, 2, 3, 4, 5),
     "position": (0, 1, 2),
     "rotation": (3, 4, 5),
     **{axis: (k,) for k, axis in enumerate(AXES)},
 }
-"""Section of an assignment or of a robot file → the axes it speaks of."""
-
+#: Parameters with one number an axis.
 PER_AXIS = (
     "mass",
     "damping",
@@ -32,10 +31,10 @@ PER_AXIS = (
     "speed_limit",
     "speed_scale",
 )
-"""Parameters with one number an axis."""
 
 REQUIRED = ("mass", "damping", "stiffness", "alpha", "threshold")
 
+#: The paper's letters, accepted beside the words.
 LETTERS = {
     "m": "mass",
     "b": "damping",
@@ -48,7 +47,6 @@ LETTERS = {
     "v0": "speed_scale",
     "ts": "period",
 }
-"""The paper's letters, accepted beside the words."""
 
 THRESHOLD_MODES = ("hard", "soft", "literal")
 
@@ -59,36 +57,24 @@ class Admittance:
 
     Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad, N·m/rad,
     N·m, rad/s. Every array is (6,), in the order of `AXES`.
-
-    Attributes:
-        mass: M_d.
-        damping: B_d.
-        stiffness: K_d.
-        alpha: α of (47).
-        xi: ξ of (47), which the paper does not print; None takes B_d/(2√(M_d K_d)), the damping
-            ratio of the drag phase.
-        threshold: F_tsd: above it an axis is dragged, below it recovers.
-        hysteresis: Share of the threshold by which the force has to fall below it before an axis
-            that is dragged recovers; 0 is the paper's.
-        speed_limit: Ẋ_tsd; infinite for none.
-        speed_scale: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
-        period: Control period. [s]
-        threshold_mode: What of the force enters, see `vftcli.admittance.thresholds`.
-        source: Where the numbers come from, in words.
     """
 
-    mass: Array
-    damping: Array
-    stiffness: Array
-    alpha: Array
-    threshold: Array
+    mass: Array  #: M_d.
+    damping: Array  #: B_d.
+    stiffness: Array  #: K_d.
+    alpha: Array  #: α of (47).
+    threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
+    #: ξ of (47), which the paper does not print; None takes B_d/(2√(M_d K_d)), the damping ratio of
+    #: the drag phase.
     xi: Array | None = None
+    #: Share of the threshold by which the force has to fall below it before an axis that is dragged
+    #: recovers; 0 is the paper's.
     hysteresis: Array | float = 0.0
-    speed_limit: Array | float = np.inf
-    speed_scale: Array | float = 1.0
-    period: float
-    threshold_mode: str = "hard"
-    source: str = ""
+    speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
+    speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
+    period: float  #: Control period. [s]
+    threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.thresholds`.
+    source: str = ""  #: Where the numbers come from, in words.
 
     def __post_init__(self) -> None:
         for name in PER_AXIS:
@@ -183,8 +169,8 @@ def from_table(
     return replace(found, xi=np.where(np.isnan(xi), found.damping_ratio, xi))
 
 
+#: Keys of ``[admittance]`` that are not one number an axis.
 PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
-"""Keys of ``[admittance]`` that are not one number an axis."""
 
 
 def assign(values: dict[str, Array], section: str, name: str, value: Any) -> None:  # noqa: ANN401
@@ -205,8 +191,8 @@ def assign(values: dict[str, Array], section: str, name: str, value: Any) -> Non
     row[list(axes)] = array
 
 
+#: What holds for an axis that is given no such number; a missing speed limit is none.
 DEFAULTS = {"hysteresis": 0.0, "speed_limit": np.inf, "speed_scale": 1.0}
-"""What holds for an axis that is given no such number; a missing speed limit is none."""
 
 
 def check_complete(
@@ -235,11 +221,7 @@ def check_complete(
 
 
 def number(value: Any, what: str) -> float:  # noqa: ANN401 - TOML is untyped
-    """One number.
-
-    Raises:
-        ParameterError: If it is none.
-    """
+    """One number."""
     try:
         return float(value)
     except (TypeError, ValueError):
@@ -250,9 +232,6 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     """Read ``SECTION.PARAMETER=VALUE`` assignments of the admittance; see `GROUPS`.
 
     ``xi=1`` without a section is ``admittance.xi=1``; the paper's letters are understood.
-
-    Raises:
-        ParameterError: If one is malformed or names nothing there is.
     """
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
@@ -289,11 +268,7 @@ def is_admittance_setting(assignment: str) -> bool:
 
 
 def release_deviation(assignments: Sequence[str]) -> Array:
-    """Deviation of a release from ``axis=value`` assignments. (6,) [m, rad]
-
-    Raises:
-        ParameterError: If an axis is unknown, or a value is no finite number.
-    """
+    """Deviation of a release from ``axis=value`` assignments. (6,) [m, rad]"""
     x = np.zeros(6)
     form = f"AXIS=VALUE with an axis of {', '.join(AXES)}, as x=0.3 [m] or rz=0.5 [rad]"
     for part in ",".join(assignments).split(","):

@@ -29,64 +29,43 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
 
+#: A step in which W rises by more than this share of its value at the phase's start is told.
 RISE = 1e-12
-"""A step in which W rises by more than this share of its value at the phase's start is told."""
-
-LONGEST = 600.0
-"""Longest release that is computed. [s]"""
+LONGEST = 600.0  #: Longest release that is computed. [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lyapunov:
-    """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase.
+    """Energies of the recovery phases along a run. All (T+1, N, 6), NaN in a drag phase."""
 
-    Attributes:
-        corrected: W, which must not rise in a recovery phase into which no force enters. [J]
-        printed: V of (52). [J]
-        rises: Steps in which W rises by more than `RISE` of its value at the phase's start, for
-            each controller; the three axes of a rotation that recover together count together. (N,)
-    """
-
-    corrected: Array
-    printed: Array
+    corrected: Array  #: W, which must not rise in a recovery phase into which no force enters. [J]
+    printed: Array  #: V of (52). [J]
+    #: Steps in which W rises by more than `RISE` of its value at the phase's start, for each
+    #: controller; the three axes of a rotation that recover together count together. (N,)
     rises: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
-    """What every controller would have made of one force record.
+    """What every controller would have made of one force record."""
 
-    Attributes:
-        robot: The arm.
-        parameters: The admittance parameters.
-        controllers: The controllers.
-        verdicts: Their stability, in the same order.
-        source: Where the force comes from.
-        start: Joint positions of the target pose X_d. (n,) [rad]
-        wrench: Force and moment on the robot at each control period, base axes. (T, 6) [N, N·m]
-        phases: Algorithm 1's phases, the same for all controllers.
-        motion: Deviations and velocities, row 0 before the first force.
-        path: Joint positions.
-        logged: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
-        lyapunov: Energies along the run.
-        rows: The comparison, one row a controller, axis and drag.
-        remarks: What a reader should know.
-    """
-
-    robot: Robot
-    parameters: Admittance
-    controllers: tuple[Controller, ...]
-    verdicts: tuple[Verdict, ...]
+    robot: Robot  #: The arm.
+    parameters: Admittance  #: The admittance parameters.
+    controllers: tuple[Controller, ...]  #: The controllers.
+    verdicts: tuple[Verdict, ...]  #: Their stability, in the same order.
+    #: Where the force comes from.
     source: Remark = field(default_factory=lambda: fact("force-of-release"))
-    start: Array
+    start: Array  #: Joint positions of the target pose X_d. (n,) [rad]
+    #: Force and moment on the robot at each control period, base axes. (T, 6) [N, N·m]
     wrench: Array
-    phases: Phases
-    motion: AxisMotion
-    path: JointPath
+    phases: Phases  #: Algorithm 1's phases, the same for all controllers.
+    motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
+    path: JointPath  #: Joint positions.
+    #: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
     logged: Array | None = None
-    lyapunov: Lyapunov
-    rows: tuple[dict[str, Any], ...]
-    remarks: tuple[Remark, ...]
+    lyapunov: Lyapunov  #: Energies along the run.
+    rows: tuple[dict[str, Any], ...]  #: The comparison, one row a controller, axis and drag.
+    remarks: tuple[Remark, ...]  #: What a reader should know.
 
 
 def replay(
@@ -110,11 +89,6 @@ def replay(
         controllers: The controllers.
         source: Where the wrench comes from.
         force_unstable: Run unstable settings too.
-
-    Raises:
-        UnstableError: If a controller is unstable.
-        ParameterError: If the log starts outside the joint limits.
-        ClockError: If nearly all of its time is a gap.
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
@@ -165,11 +139,6 @@ def replay_release(
         start: Joint positions of the target pose.
         duration: How long to watch; None for as long as it takes. [s]
         force_unstable: Run unstable settings too.
-
-    Raises:
-        UnstableError: If a controller is unstable; the lack of a speed limit is let pass where the
-            release is inside the escape bound.
-        ParameterError: If the start pose is outside the joint limits, or `x` is nothing at all.
     """
     if not np.any(x):
         raise ParameterError(

@@ -16,11 +16,10 @@ from vftcli.signals.wrench import Wrench
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
+#: A drag in which the log's arm stays within this distance for so long is told. [s, m]
 RESTING = (2.0, 0.01)
-"""A drag in which the log's arm stays within this distance for so long is told. [s, m]"""
-
+#: A log whose flange stays this near to its first pose replays as it was: no remark. [m]
 STILL = 0.01
-"""A log whose flange stays this near to its first pose replays as it was: no remark. [m]"""
 
 
 def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:

@@ -17,8 +17,8 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, warning
 
+#: Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1.
 DISCRETE_BOUND = 4.0
-"""Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1."""
 
 UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
@@ -28,22 +28,15 @@ class UnstableError(ParameterError):
 
 
 class Verdict(NamedTuple):
-    """Stability of one controller. Arrays are (6,).
+    """Stability of one controller. Arrays are (6,)."""
 
-    Attributes:
-        controller: Whose.
-        drag: 2TsB/M + Ts²K/M of the drag phase.
-        recovery: The same in the recovery phase at the speed limit; infinite without one.
-        escape: Largest deviation from which a release at rest does not escape if there is no speed
-            limit; infinite for the traditional controller. [m, rad]
-        limited: Whether the axis has a speed limit.
-    """
-
-    controller: Controller
-    drag: Array
-    recovery: Array
+    controller: Controller  #: Whose.
+    drag: Array  #: 2TsB/M + Ts²K/M of the drag phase.
+    recovery: Array  #: The same in the recovery phase at the speed limit; infinite without one.
+    #: Largest deviation from which a release at rest does not escape if there is no speed limit;
+    #: infinite for the traditional controller. [m, rad]
     escape: Array
-    limited: Mask
+    limited: Mask  #: Whether the axis has a speed limit.
 
     def complaints(self, safe: Mask | None = None) -> tuple[Remark, ...]:
         """What makes it unstable, with the number that breaks.
@@ -91,9 +84,6 @@ def escape_factor(xi: float) -> float:
     turn back and those that escape comes from infinity along z(z − 2ξu) = u. Followed back to u =
     0, where it attracts its neighbours, it ends at z = y = Y*. Y*(0) = 1/√2, the bound that holds
     for every ξ.
-
-    Args:
-        xi: Damping ratio, at least 0.
     """
     far = 12.0 * min(1.0, 5.0 / max(xi, 1e-12))
     steps = int(max(2000.0, 8.0 * (xi * far) ** 2))  # the path attracts at up to 4ξ²u
@@ -149,9 +139,6 @@ def check_stable(
 
     Returns:
         A verdict for each, and what is wrong with them, also where that is let pass.
-
-    Raises:
-        UnstableError: If one is unstable and `force_unstable` is not set.
     """
     verdicts = tuple(judge(controller) for controller in controllers)
     # Under a hand any deviation can come about; only a release has a size.

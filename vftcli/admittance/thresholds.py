@@ -9,15 +9,10 @@ from vftcli.signals.arrays import Array, Mask
 
 
 class Phases(NamedTuple):
-    """Algorithm 1's phases along a force record.
+    """Algorithm 1's phases along a force record."""
 
-    Attributes:
-        dragged: Whether each axis is in the drag phase. (T, 6)
-        force: Force and moment that enter the law, see `entering_force`. (T, 6) [N, N·m]
-    """
-
-    dragged: Mask
-    force: Array
+    dragged: Mask  #: Whether each axis is in the drag phase. (T, 6)
+    force: Array  #: Force and moment that enter the law, see `entering_force`. (T, 6) [N, N·m]
 
 
 def phases(wrench: Array, parameters: Admittance) -> Phases:

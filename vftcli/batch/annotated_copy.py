@@ -38,45 +38,29 @@ from vftcli.outputs.log.run_record import to_json, versions
 from vftcli.outputs.seals import digest
 from vftcli.signals.errors import LogError, ParameterError
 
-TOGETHER = 16
-"""Episodes that go to a worker together, and into one file of rows."""
-
-
+TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
+#: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
 FEW = 32
-"""Episodes, and files to write, for which no processes are started unasked: that takes seconds."""
-
-HERE = WorkersChoice(workers=0)
-"""This process alone."""
+HERE = WorkersChoice(workers=0)  #: This process alone.
 
 
 @dataclass(frozen=True, kw_only=True)
 class CopyChoice:
-    """How the copy is made.
+    """How the copy is made."""
 
-    Attributes:
-        allow_missing: Whether frames of which nothing can be told are filled with zeros and marked,
-            instead of stopping the run.
-        link: Whether films may be second names of the dataset's files.
-        force: Whether an earlier copy may be replaced.
-    """
-
+    #: Whether frames of which nothing can be told are filled with zeros and marked, instead of
+    #: stopping the run.
     allow_missing: bool = False
-    link: bool = True
-    force: bool = False
+    link: bool = True  #: Whether films may be second names of the dataset's files.
+    force: bool = False  #: Whether an earlier copy may be replaced.
 
 
 class FileTask(NamedTuple):
-    """A data file that is written.
+    """A data file that is written."""
 
-    Attributes:
-        file: The data file.
-        rows: The files in which its episodes' columns are.
-        target: Where it is written.
-    """
-
-    file: DataFile
-    rows: tuple[Path, ...]
-    target: Path
+    file: DataFile  #: The data file.
+    rows: tuple[Path, ...]  #: The files in which its episodes' columns are.
+    target: Path  #: Where it is written.
 
 
 def annotate(
@@ -91,23 +75,8 @@ def annotate(
 ) -> dict[str, Any]:
     """Write a copy of a dataset with the forces of every frame.
 
-    Args:
-        path: The dataset.
-        copy: The folder of the copy.
-        choice: What is asked of every episode.
-        how: How the copy is made.
-        workers: Where the work is done.
-        command: The command as the user typed it.
-        tell: Who is told what the engine does.
-        progress: Who is told what is being done.
-
     Returns:
         What ``meta/vftcli.json`` holds.
-
-    Raises:
-        LogError: If an episode tells nothing and none may be missing, or a link leaves the dataset.
-        OutputError: If the copy cannot be written.
-        ParameterError: If workers are not to see the folders.
     """
     if workers.ship:
         raise ParameterError(
@@ -179,11 +148,7 @@ class Plan:
         return {file.place for file in self.rows}
 
     def groups(self, columns: list[ForceColumn]) -> Iterator[list[EpisodesTask]]:
-        """The episodes in groups that go to a worker together.
-
-        Args:
-            columns: What will be added, which no file may have yet.
-        """
+        """The episodes in groups that go to a worker together."""
         group: list[EpisodesTask] = []
         for file in self._dataset.files():
             self._dataset.check_new(file, columns)
@@ -203,25 +168,15 @@ class Plan:
 
 
 class Made(NamedTuple):
-    """What was told of the episodes.
+    """What was told of the episodes."""
 
-    Attributes:
-        episodes: A record each.
-        robot: The robot of the first that could be done.
-        observer: Its observer.
-    """
-
-    episodes: list[dict[str, Any]]
-    robot: dict[str, Any] | None
-    observer: dict[str, Any] | None
+    episodes: list[dict[str, Any]]  #: A record each.
+    robot: dict[str, Any] | None  #: The robot of the first that could be done.
+    observer: dict[str, Any] | None  #: Its observer.
 
 
 def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
-    """What a task returned.
-
-    Raises:
-        LogError: If it failed.
-    """
+    """What a task returned."""
     if outcome.failure is None:
         return outcome.value
     place = outcome.task.file.place
@@ -231,11 +186,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 def gathered(
     outcomes: Iterable[Outcome[Any]], how: CopyChoice, progress: Callable[[str, float, float], None]
 ) -> Made:
-    """All that is told of the episodes, in the order of their files.
-
-    Raises:
-        LogError: If one tells nothing and none may be missing.
-    """
+    """All that is told of the episodes, in the order of their files."""
     episodes: list[dict[str, Any]] = []
     robot = observer = None
     for outcome in outcomes:
@@ -254,11 +205,7 @@ REMEDY = "--allow-missing writes 0 there, and a column that says so"
 
 
 def refuse_missing(record: Mapping[str, Any]) -> None:
-    """Refuse an episode of which frames are missing.
-
-    Raises:
-        LogError: If some are.
-    """
+    """Refuse an episode of which frames are missing."""
     if record["status"] == "missing":
         # Of DROID every file has the same name.
         reason = record["reason"].removeprefix(Path(record["file"]).name).rstrip(".")
@@ -278,11 +225,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
 
 
 def first_known(made: Made) -> dict[str, Any]:
-    """The names of the joints, of the first episode that tells any; all must have as many.
-
-    Raises:
-        LogError: If no episode could be done, or they are of different arms.
-    """
+    """The names of the joints, of the first episode that tells any; all must have as many."""
     known = [one for one in made.episodes if one["status"] != "missing"]
     if not known:
         count = len(made.episodes)

@@ -30,37 +30,23 @@ from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import FRAMES
 
-USUAL = "kfo-zoh"
-"""The observer where none is named: it needs no sample that comes later."""
-
-SIGN = "what the environment exerts ON the robot"
-"""Sign of all that is added."""
+USUAL = "kfo-zoh"  #: The observer where none is named: it needs no sample that comes later.
+SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ForceChoice:
-    """What is asked of every episode.
+    """What is asked of every episode."""
 
-    Attributes:
-        read: How an episode is read.
-        robot: Which arm made it.
-        observers: The one observer, and its gains.
-        wrench: What is asked of the virtual sensor, None for joint torques alone.
-        sd: Whether the observer's own standard deviation is wanted.
-        contact: Whether it is wanted which frames lie in a contact of the list.
-        anyway: Whether results are wanted even where a finding makes them meaningless.
-
-    Raises:
-        ParameterError: If more than one observer, an episode or an interval is chosen.
-    """
-
-    read: ReadChoice = field(default_factory=ReadChoice)
-    robot: RobotChoice = field(default_factory=RobotChoice)
+    read: ReadChoice = field(default_factory=ReadChoice)  #: How an episode is read.
+    robot: RobotChoice = field(default_factory=RobotChoice)  #: Which arm made it.
+    #: The one observer, and its gains.
     observers: ObserverChoice = field(default_factory=lambda: ObserverChoice(names=(USUAL,)))
+    #: What is asked of the virtual sensor, None for joint torques alone.
     wrench: WrenchChoice | None = None
-    sd: bool = False
-    contact: bool = False
-    anyway: bool = False
+    sd: bool = False  #: Whether the observer's own standard deviation is wanted.
+    contact: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
+    anyway: bool = False  #: Whether results are wanted even where a finding makes them meaningless.
 
     def __post_init__(self) -> None:
         if len(self.observers.names) != 1:
@@ -112,23 +98,14 @@ class ForceChoice:
 
 
 class EpisodesTask(NamedTuple):
-    """Some episodes of one data file.
+    """Some episodes of one data file."""
 
-    Attributes:
-        file: The data file, with these episodes only.
-        rows: Where their columns are put.
-    """
-
-    file: DataFile
-    rows: Path
+    file: DataFile  #: The data file, with these episodes only.
+    rows: Path  #: Where their columns are put.
 
 
 def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]:
     """Estimate the forces of some episodes and put them into a file, unless they are there.
-
-    Args:
-        choice: What is asked.
-        task: Which episodes.
 
     Returns:
         What is told of them: ``episodes``, a record each; ``robot`` and ``observer``, those of the
@@ -165,11 +142,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]
 
 
 def analysed(choice: ForceChoice, asked: AnalysisChoice, path: Path) -> Analysis:
-    """One episode's estimates.
-
-    Raises:
-        VftError: If it cannot be read, or no result means anything.
-    """
+    """One episode's estimates."""
     recording = asked.library.open(path, asked.read)
     check_signals(recording, anyway=choice.anyway)
     made = analyse(*prepared(recording, asked), asked)
@@ -180,12 +153,7 @@ def analysed(choice: ForceChoice, asked: AnalysisChoice, path: Path) -> Analysis
 
 
 def check_signals(recording: Recording, *, anyway: bool) -> None:
-    """See that velocities and efforts are there, and that the efforts were measured.
-
-    Raises:
-        MissingSignalError: If one is not.
-        LogError: If the effort never changes on half of the joints or more.
-    """
+    """See that velocities and efforts are there, and that the efforts were measured."""
     if recording.dq is None:
         raise MissingSignalError(
             f"{recording.name}: no joint velocities. --derive dq makes them of the positions over "
@@ -209,11 +177,7 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
 
 
 def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
-    """The columns of an episode by name, a row a frame, NaN where nothing can be told.
-
-    Raises:
-        ParameterError: If the observer states no standard deviation.
-    """
+    """The columns of an episode by name, a row a frame, NaN where nothing can be told."""
     estimate, t = analysis.estimates[0], analysis.t
     found: dict[str, Array] = {"external_torque": estimate.tau}
     if choice.sd:
@@ -266,14 +230,7 @@ def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> dict[str, An
 def force_columns(
     choice: ForceChoice, names: Sequence[str], *, derived: bool, valid: bool
 ) -> list[ForceColumn]:
-    """The columns that are written.
-
-    Args:
-        choice: What is asked.
-        names: The joints' names.
-        derived: Whether an episode's velocities are derived over the complete episode.
-        valid: Whether frames may be missing, and columns say which.
-    """
+    """The columns that are written."""
     online = choice.is_online and not derived
     made = {
         "observer": choice.observer,

@@ -7,39 +7,25 @@ from pathlib import Path
 
 from vftcli.signals.errors import ParameterError
 
-ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")
-"""tcp://host:8786"""
-
-MEMORY = 1.5e9
-"""What a worker needs of the machine's memory at least. [B]"""
-
-MOST_WORKERS = 8
-"""Workers that are started unasked."""
-
-EXTRA = "pip install 'vftcli[cluster]'"
-"""How Dask comes in."""
+ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
+MEMORY = 1.5e9  #: What a worker needs of the machine's memory at least. [B]
+MOST_WORKERS = 8  #: Workers that are started unasked.
+EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkersChoice:
-    """Where many pieces of work are done.
+    """Where many pieces of work are done."""
 
-    Attributes:
-        workers: How many processes of this machine; 0 for this process alone, None for as many as
-            it has cores and memory for.
-        scheduler: Address of a Dask scheduler that stands, or None.
-        tls: Files of the authority's certificate, the own certificate and its key, or None.
-        memory: Bytes that a worker of this machine may take before it is ended, None for its share.
-        ship: Whether logs are sent to workers that do not see the files, and results sent back.
-
-    Raises:
-        ParameterError: If these contradict one another.
-    """
-
+    #: How many processes of this machine; 0 for this process alone, None for as many as it has
+    #: cores and memory for.
     workers: int | None = None
-    scheduler: str | None = None
+    scheduler: str | None = None  #: Address of a Dask scheduler that stands, or None.
+    #: Files of the authority's certificate, the own certificate and its key, or None.
     tls: tuple[Path, Path, Path] | None = None
+    #: Bytes that a worker of this machine may take before it is ended, None for its share.
     memory: int | None = None
+    #: Whether logs are sent to workers that do not see the files, and results sent back.
     ship: bool = False
 
     def __post_init__(self) -> None:
@@ -78,11 +64,7 @@ class WorkersChoice:
         tls_cert: Path | None = None,
         tls_key: Path | None = None,
     ) -> "WorkersChoice":
-        """The choice that ``--workers``, ``--scheduler`` and what goes with them state.
-
-        Raises:
-            ParameterError: If these contradict one another.
-        """
+        """The choice that ``--workers``, ``--scheduler`` and what goes with them state."""
         given = [path for path in (tls_ca, tls_cert, tls_key) if path is not None]
         if len(given) in {1, 2}:
             raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
@@ -95,11 +77,7 @@ class WorkersChoice:
         )
 
     def check_closed(self, *, anyway: bool) -> None:
-        """Refuse a cluster that does not ask who connects to it, unless the user accepts that.
-
-        Raises:
-            ParameterError: If its address is tcp://.
-        """
+        """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""
         if self.scheduler is not None and self.scheduler.startswith("tcp") and not anyway:
             raise ParameterError(
                 f"--scheduler {self.scheduler}: anyone who reaches a tcp:// cluster can run code "

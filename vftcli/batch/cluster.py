@@ -29,32 +29,18 @@ from vftcli.signals.version import VERSION
 if TYPE_CHECKING:
     from distributed import Client, Future
 
-ANSWER = 10.0
-"""A scheduler has to answer within this time, and to have a worker. [s]"""
-
-SETTLED = 0.5
-"""A worker's nanny knows of it so long after it takes its first task. [s]"""
-
-LOOK = 5.0
-"""How often the workers are counted while nothing ends. [s]"""
-
-SHORT = 15.0
-"""A cluster of this machine that lacks workers for so long is given others. [s]"""
-
-WITHOUT = 60.0
-"""A cluster that has no worker for so long is given up. [s]"""
-
-REPLACED = 10
-"""How often a cluster of this machine is given other workers."""
-
-DEATHS = 3
-"""A task that ended its worker so often is not done again."""
-
+ANSWER = 10.0  #: A scheduler has to answer within this time, and to have a worker. [s]
+SETTLED = 0.5  #: A worker's nanny knows of it so long after it takes its first task. [s]
+LOOK = 5.0  #: How often the workers are counted while nothing ends. [s]
+SHORT = 15.0  #: A cluster of this machine that lacks workers for so long is given others. [s]
+WITHOUT = 60.0  #: A cluster that has no worker for so long is given up. [s]
+REPLACED = 10  #: How often a cluster of this machine is given other workers.
+DEATHS = 3  #: A task that ended its worker so often is not done again.
+#: A worker has one core: threads of a library would wait for each other.
 THREADS = {
     f"{library}_THREADS": "1"
     for library in ("OPENBLAS_NUM", "OMP_NUM", "MKL_NUM", "POLARS_MAX", "RAYON_NUM")
 }
-"""A worker has one core: threads of a library would wait for each other."""
 
 CONFIG: Mapping[str, object] = {
     "distributed.scheduler.worker-saturation": 1.0,  # else a neighbour is blamed for a death
@@ -67,11 +53,9 @@ CONFIG: Mapping[str, object] = {
     "distributed.worker.preload": [__name__],
 }
 
+#: Packages that make the numbers, or write them.
 PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
-"""Packages that make the numbers, or write them."""
-
-HEAD = 4096
-"""Bytes of a file by which workers are asked whether they see the same. [B]"""
+HEAD = 4096  #: Bytes of a file by which workers are asked whether they see the same. [B]
 
 
 def dask_setup(_worker: object) -> None:
@@ -83,11 +67,7 @@ def dask_setup(_worker: object) -> None:
 def connected(
     choice: WorkersChoice, seen: Sequence[str], tell: Callable[[str], None]
 ) -> Iterator["Client"]:
-    """Start a cluster on this machine for a block, or connect to the one that stands.
-
-    Raises:
-        EngineError: If it does not answer, is of other versions, or does not see the files.
-    """
+    """Start a cluster on this machine for a block, or connect to the one that stands."""
     import dask.config
     import distributed  # noqa: F401 - its settings, which are changed here for a block
 
@@ -106,11 +86,7 @@ def connected(
 
 @contextmanager
 def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
-    """A cluster of processes on this machine, behind a certificate of this run.
-
-    Raises:
-        EngineError: If no certificate can be made.
-    """
+    """A cluster of processes on this machine, behind a certificate of this run."""
     from dask.system import CPU_COUNT
     from distributed import Client
     from distributed.security import Security
@@ -139,11 +115,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
 
 @contextmanager
 def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
-    """The cluster whose scheduler has this address, with one worker at least.
-
-    Raises:
-        EngineError: If it does not answer within `ANSWER`, or has no worker then.
-    """
+    """The cluster whose scheduler has this address, with one worker at least."""
     from distributed import Client
     from distributed.security import Security
 
@@ -177,11 +149,7 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
 
 
 def check_versions(client: "Client") -> None:
-    """See that every worker makes the numbers with the same code as this process would.
-
-    Raises:
-        EngineError: If one does not, or lacks it.
-    """
+    """See that every worker makes the numbers with the same code as this process would."""
     here = packages_here()
     for address, there in client.run(packages_here, on_error="return").items():
         if not isinstance(there, dict):
@@ -212,11 +180,7 @@ def packages_here() -> dict[str, str | None]:
 
 
 def check_sight(client: "Client", seen: Sequence[str]) -> None:
-    """See that every worker sees the same files as this process.
-
-    Raises:
-        EngineError: If one does not.
-    """
+    """See that every worker sees the same files as this process."""
     here = heads_of(seen)
     for address, there in client.run(heads_of, seen, on_error="return").items():
         for path, head in here.items():
@@ -241,15 +205,7 @@ def heads_of(paths: Sequence[str]) -> dict[str, str]:
 def outcomes(
     client: "Client", groups: Iterable[Sequence[Task]], work: Work[Task], *, standing: bool
 ) -> Iterator[Outcome[Task]]:
-    """Do the work on a cluster; no more groups are sent than its workers do next.
-
-    Args:
-        client: Who is connected to it.
-        groups: The tasks.
-        work: What is done with each.
-        standing: Whether the cluster's limits are its own: there a neighbour of the task that ended
-            a worker may be blamed, and is tried again.
-    """
+    """Do the work on a cluster; no more groups are sent than its workers do next."""
     sent: dict[Future[Any], Sequence[Task]] = {}
     waiting, again, number = iter(groups), list[Sequence[Task]](), count()
     most, workers = 2 * sum(client.nthreads().values()) + 2, Workers(client)
@@ -312,9 +268,6 @@ class Workers:
     """Sees that a cluster has workers; on this machine as many as it began with.
 
     A worker that dies before its nanny knows of its start is not started again by Dask.
-
-    Args:
-        client: Who is connected to the cluster.
     """
 
     def __init__(self, client: "Client") -> None:
@@ -323,11 +276,7 @@ class Workers:
         self._looked = self._enough = self._some = time.monotonic()
 
     def look(self) -> None:
-        """Count them, but not more often than every `LOOK`, and start those that are missing.
-
-        Raises:
-            EngineError: If there has been none for `WITHOUT`.
-        """
+        """Count them, but not more often than every `LOOK`, and start those that are missing."""
         now = time.monotonic()
         if now - self._looked < LOOK:
             return
@@ -347,11 +296,7 @@ class Workers:
 
 
 def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[Any]]":
-    """Wait until any of these ended, and return those that did.
-
-    Raises:
-        EngineError: If the scheduler is gone, or has had no worker for `WITHOUT`.
-    """
+    """Wait until any of these ended, and return those that did."""
     from concurrent.futures import CancelledError
 
     from distributed import wait

@@ -33,18 +33,6 @@ def run_tasks(
 
     An error of the work is an outcome like any other. A task whose worker dies is done again, three
     times in all. Closing the iterator ends what has not begun.
-
-    Args:
-        groups: The tasks; those of one group go to a worker together, since sending one takes
-            milliseconds. They are taken as workers get free: it may be a generator.
-        work: What is done with each.
-        choice: Where.
-        tell: Who is told in a sentence what the engine does.
-        seen: Files and folders that every worker has to see.
-
-    Raises:
-        EngineError: If the cluster does not answer, is of other versions, or does not see the
-            files.
     """
     if choice.in_process:
         if choice.workers is None:

@@ -16,17 +16,12 @@ from vftcli.outputs.seals import digest
 from vftcli.readers.opening import files_of
 from vftcli.signals.version import VERSION
 
-FILE = "file:"
-"""What goes before the path in the name of a reference."""
+FILE = "file:"  #: What goes before the path in the name of a reference.
 
 
 @cache
 def digest_of(path: Path) -> str:
-    """The sha256 of a file, or of the files in a folder and their names; each is read once.
-
-    Raises:
-        OSError: If it is not there any more.
-    """
+    """The sha256 of a file, or of the files in a folder and their names; each is read once."""
     if not path.is_dir():
         return digest(path)
     lines = (f"{file.relative_to(path).as_posix()} {digest(file)}" for file in files_of(path))
@@ -34,21 +29,13 @@ def digest_of(path: Path) -> str:
 
 
 def content_digest(files: Iterable[Path]) -> str:
-    """The sha256 of a log's file; of several files that of their digests.
-
-    Raises:
-        OSError: If one is not there any more.
-    """
+    """The sha256 of a log's file; of several files that of their digests."""
     each = [digest_of(path) for path in files]
     return each[0] if len(each) == 1 else sha256("\n".join(each))
 
 
 def options_digest(options: Any) -> str:  # noqa: ANN401 - choices of every room
-    """The sha256 of options, of the files they name, and of the program's version.
-
-    Raises:
-        OSError: If such a file is not there.
-    """
+    """The sha256 of options, of the files they name, and of the program's version."""
     named = with_files(options, lambda path: Path(digest_of(path)))
     return sha256(json.dumps([VERSION, plain(named)], sort_keys=True))
 
@@ -64,12 +51,7 @@ def sha256(text: str) -> str:
 
 
 def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN401
-    """Options with every file that they name changed: paths, ``file:PATH``, and robot files.
-
-    Args:
-        value: A choice, or any part of one.
-        change: What is put in the place of each.
-    """
+    """Options with every file that they name changed: paths, ``file:PATH``, and robot files."""
     match value:
         case Path():
             return change(value)

@@ -19,22 +19,12 @@ from vftcli.signals.parsing import check_known
 
 @dataclass(frozen=True, kw_only=True)
 class LogJob:
-    """What is done with every log of a batch.
+    """What is done with every log of a batch."""
 
-    Attributes:
-        do: A key of `WRITERS`.
-        choice: What is asked of each log.
-        anyway: Whether results are wanted even where a finding makes them meaningless.
-        written: What is written of each log besides what always is.
-
-    Raises:
-        ParameterError: If there is no such thing to do.
-    """
-
-    do: str
-    choice: AnalysisChoice
-    anyway: bool = False
-    written: OutputChoice = PLAIN
+    do: str  #: A key of `WRITERS`.
+    choice: AnalysisChoice  #: What is asked of each log.
+    anyway: bool = False  #: Whether results are wanted even where a finding makes them meaningless.
+    written: OutputChoice = PLAIN  #: What is written of each log besides what always is.
 
     def __post_init__(self) -> None:
         check_known(self.do, tuple(WRITERS), f"--do {self.do!r}")
@@ -42,37 +32,21 @@ class LogJob:
 
 @dataclass(frozen=True, kw_only=True)
 class LogTask:
-    """One log of a batch.
+    """One log of a batch."""
 
-    Attributes:
-        job: What is done with it.
-        folder: Where the batch is written, from the root.
-        command: The command line, for the records.
-        path: The log's file or folder, from the root.
-        episode: Its episode, None for a file of one recording.
-        label: What it is called.
-        key: What its result is kept under.
-        sha256: Of its file's bytes; "" for several files.
-        told_path: Its path where the user has it, if it was sent.
-    """
-
-    job: LogJob
-    folder: Path
-    command: str
-    path: Path
-    episode: int | None
-    label: str
-    key: str
-    sha256: str
-    told_path: Path | None = None
+    job: LogJob  #: What is done with it.
+    folder: Path  #: Where the batch is written, from the root.
+    command: str  #: The command line, for the records.
+    path: Path  #: The log's file or folder, from the root.
+    episode: int | None  #: Its episode, None for a file of one recording.
+    label: str  #: What it is called.
+    key: str  #: What its result is kept under.
+    sha256: str  #: Of its file's bytes; "" for several files.
+    told_path: Path | None = None  #: Its path where the user has it, if it was sent.
 
 
 def work_on_log(task: LogTask) -> None:
-    """Analyse a log and write its result, unless it is there.
-
-    Raises:
-        VftError: If it cannot be analysed or written.
-    """
+    """Analyse a log and write its result, unless it is there."""
     folder = BatchFolder(task.folder)
     if folder.row_file(task.key).exists():
         return
@@ -85,11 +59,7 @@ def work_on_log(task: LogTask) -> None:
 
 
 def analysed(task: LogTask) -> Analysis:
-    """The log as its job asks, as the command of that name alone would analyse it.
-
-    Raises:
-        VftError: If it cannot be read or analysed, or is not what it was.
-    """
+    """The log as its job asks, as the command of that name alone would analyse it."""
     begin("reading")
     choice = replace(
         task.job.choice,
@@ -137,10 +107,10 @@ def write_nothing(_folder: Path, _analysis: Analysis, _task: LogTask) -> None:
     """Nothing: the errors are the rows."""
 
 
+#: What is done with a log → what it writes beside its rows.
 WRITERS: dict[str, Callable[[Path, Analysis, LogTask], None]] = {
     "estimate": write_estimates,
     "compare": write_nothing,
     "report": write_page,
     "contacts": write_contacts,
 }
-"""What is done with a log → what it writes beside its rows."""

@@ -11,11 +11,9 @@ from vftcli.signals.errors import VftError
 
 Task = TypeVar("Task")
 
+#: What is done with each task; what it returns is small, and can be pickled.
 Work = Callable[[Task], Any]
-"""What is done with each task; what it returns is small, and can be pickled."""
-
-KILLED = "KilledWorker"
-"""Error type of a task whose worker died each time."""
+KILLED = "KilledWorker"  #: Error type of a task whose worker died each time.
 
 _stage: ContextVar[str] = ContextVar("stage", default="")
 
@@ -25,49 +23,29 @@ class EngineError(VftError):
 
 
 class Failure(NamedTuple):
-    """Why a task was not done.
+    """Why a task was not done."""
 
-    Attributes:
-        stage: What was being done, as the work called it with `begin`.
-        type: Name of the error's class.
-        line: What it says, on one line.
-    """
-
-    stage: str
-    type: str
-    line: str
+    stage: str  #: What was being done, as the work called it with `begin`.
+    type: str  #: Name of the error's class.
+    line: str  #: What it says, on one line.
 
 
 class Effort(NamedTuple):
-    """What a task took, and where.
+    """What a task took, and where."""
 
-    Attributes:
-        started: When it began, on the clock of where it ran. [s since 1970]
-        seconds: Time from then to its end. [s]
-        cpu_seconds: Time of its thread on a processor. [s]
-        place: Host and process.
-    """
-
-    started: float
-    seconds: float
-    cpu_seconds: float
-    place: str
+    started: float  #: When it began, on the clock of where it ran. [s since 1970]
+    seconds: float  #: Time from then to its end. [s]
+    cpu_seconds: float  #: Time of its thread on a processor. [s]
+    place: str  #: Host and process.
 
 
 class Outcome(NamedTuple, Generic[Task]):
-    """How a task ended.
+    """How a task ended."""
 
-    Attributes:
-        task: The task.
-        value: What the work returned, None if it failed.
-        failure: Why it failed, or None.
-        effort: What it took; None of a task whose worker died.
-    """
-
-    task: Task
-    value: Any = None
-    failure: Failure | None = None
-    effort: Effort | None = None
+    task: Task  #: The task.
+    value: Any = None  #: What the work returned, None if it failed.
+    failure: Failure | None = None  #: Why it failed, or None.
+    effort: Effort | None = None  #: What it took; None of a task whose worker died.
 
 
 def begin(stage: str) -> None:

@@ -12,6 +12,7 @@ from vftcli.outputs.believability import grounds, health
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import AXES
 
+#: Columns that are the same in every row of a log.
 OF_LOG: dict[str, Any] = {
     "robot": pl.String,
     "samples": pl.Int64,
@@ -27,8 +28,7 @@ OF_LOG: dict[str, Any] = {
     "hardest_s": pl.Float64,
     "told_N": pl.Float64,
 }
-"""Columns that are the same in every row of a log."""
-
+#: Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below.
 OF_ESTIMATE: dict[str, Any] = {
     "observer": pl.String,
     "joint": pl.Int64,
@@ -38,23 +38,16 @@ OF_ESTIMATE: dict[str, Any] = {
     "rms_N": pl.Float64,
     "p99_N": pl.Float64,
 }
-"""Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below."""
-
-COMPARED = "compared_samples"
-"""Samples of a comparison; `samples` are the log's."""
-
+COMPARED = "compared_samples"  #: Samples of a comparison; `samples` are the log's.
+#: Columns of the errors, as `vftcli compare --json` has them; null without a reference.
 OF_ERROR: dict[str, Any] = {
     COMPARED if name == "samples" else name: kind
     for name, kind in WRENCH_SCHEMA.items()
     if name not in {"recording", *OF_ESTIMATE}
 }
-"""Columns of the errors, as `vftcli compare --json` has them; null without a reference."""
-
+#: Columns of a log's rows.
 SCHEMA: dict[str, Any] = {"key": pl.String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
-"""Columns of a log's rows."""
-
-JOINED = ("observer", "joint", "axis")
-"""By which an estimate and its error belong together."""
+JOINED = ("observer", "joint", "axis")  #: By which an estimate and its error belong together.
 
 
 def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:

@@ -23,63 +23,39 @@ from vftcli.readers.library import absolute, labelled
 if TYPE_CHECKING:
     import polars as pl
 
-SMALL = 300_000
-"""Logs of fewer bytes go to a worker together. [B]"""
-
-TOGETHER = 64
-"""At most so many."""
-
-SHARES = 8
-"""A worker gets at least so many groups, so that all end at about the same time."""
+SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
+TOGETHER = 64  #: At most so many.
+SHARES = 8  #: A worker gets at least so many groups, so that all end at about the same time.
 
 Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True, kw_only=True)
 class BatchPlan:
-    """What a batch is to do.
+    """What a batch is to do."""
 
-    Attributes:
-        logs: The logs.
-        job: What is done with each.
-        folder: Where it is written.
-        workers: Where it is done.
-        command: The command line, for the records.
-        retry_failed: Whether logs that failed in an earlier run are done again.
-        max_failures: How many logs may fail before the rest is left, None for all.
-        force: Whether a batch with other options may be gone on with.
-        tell: Who is told in a sentence what is done.
-        progress: Who is told after each log how many are done.
-    """
-
-    logs: Sequence[LogEntry]
-    job: LogJob
-    folder: Path
-    workers: WorkersChoice
-    command: str
-    retry_failed: bool = False
+    logs: Sequence[LogEntry]  #: The logs.
+    job: LogJob  #: What is done with each.
+    folder: Path  #: Where it is written.
+    workers: WorkersChoice  #: Where it is done.
+    command: str  #: The command line, for the records.
+    retry_failed: bool = False  #: Whether logs that failed in an earlier run are done again.
+    #: How many logs may fail before the rest is left, None for all.
     max_failures: int | None = None
-    force: bool = False
-    tell: Tell = field(repr=False)
+    force: bool = False  #: Whether a batch with other options may be gone on with.
+    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
+    #: Who is told after each log how many are done.
     progress: "Callable[[BatchCount], None]" = field(repr=False)
 
 
 class BatchCount(NamedTuple):
-    """How far a batch is.
+    """How far a batch is."""
 
-    Attributes:
-        logs: How many logs there are.
-        before: How many of them an earlier run did.
-        done: How many this run did.
-        failed: How many failed, in this run or, not tried again, before.
-        seconds: Time since its start. [s]
-    """
-
-    logs: int
-    before: int = 0
-    done: int = 0
-    failed: int = 0
-    seconds: float = 0.0
+    logs: int  #: How many logs there are.
+    before: int = 0  #: How many of them an earlier run did.
+    done: int = 0  #: How many this run did.
+    failed: int = 0  #: How many failed, in this run or, not tried again, before.
+    seconds: float = 0.0  #: Time since its start. [s]
 
     @property
     def left(self) -> int:
@@ -160,11 +136,7 @@ class _Run:
             yield group
 
     def work(self) -> None:
-        """Do what is left of the batch.
-
-        Raises:
-            EngineError: If the cluster does not answer, or cannot do the work.
-        """
+        """Do what is left of the batch."""
         groups = self.grouped(self.waiting())
         first = next(groups, None)
         if first is None:
@@ -315,10 +287,6 @@ def run_batch(plan: BatchPlan) -> "tuple[pl.DataFrame, BatchCount]":
 
     Returns:
         Why logs failed (columns log, key, stage, error, line), and how many did.
-
-    Raises:
-        OutputError: If the folder is another's or cannot be written.
-        EngineError: If the cluster does not answer, or cannot do the work.
     """
     run = _Run(plan)
     record = {"command": plan.command, "do": plan.job.do, "versions": versions()}

@@ -13,22 +13,16 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.readers.opening import files_of
 from vftcli.signals.errors import LogError
 
-LIMIT = 64 * 1024 * 1024
-"""Bytes of a log and of all that its options name that are sent. [B]"""
+LIMIT = 64 * 1024 * 1024  #: Bytes of a log and of all that its options name that are sent. [B]
 
 
 class Parcel(NamedTuple):
-    """A task with the files that it needs.
+    """A task with the files that it needs."""
 
-    Attributes:
-        task: The task; its paths are those of the sender.
-        files: Path at the sender → (name, content); a folder's files have names below its own.
-        failure: Why it cannot be sent, "" where it can.
-    """
-
-    task: LogTask
+    task: LogTask  #: The task; its paths are those of the sender.
+    #: Path at the sender → (name, content); a folder's files have names below its own.
     files: Mapping[str, bytes] = {}
-    failure: str = ""
+    failure: str = ""  #: Why it cannot be sent, "" where it can.
 
 
 def packed(task: LogTask, files: tuple[Path, ...]) -> Parcel:
@@ -59,9 +53,6 @@ def work_on_parcel(parcel: Parcel) -> dict[str, bytes]:
 
     Returns:
         Name in the batch's folder → content, the rows last.
-
-    Raises:
-        VftError: If the log cannot be sent or analysed.
     """
     begin("sending")
     if parcel.failure:

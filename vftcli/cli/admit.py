@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
 
+#: Whose estimate is the force unless another is named: the paper drives its controller with it.
 OBSERVER = "kfo-fe"
-"""Whose estimate is the force unless another is named: the paper drives its controller with it."""
 
 LogOrNone = Annotated[
     Path | None,
@@ -208,11 +208,7 @@ def admit(
 
 
 def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":
-    """What is asked of the log: one observer, and its wrench in base axes.
-
-    Raises:
-        ParameterError: If several observers are named, or another frame of the wrench.
-    """
+    """What is asked of the log: one observer, and its wrench in base axes."""
     from vftcli.readers.library import Library
     from vftcli.signals.errors import ParameterError
     from vftcli.virtual_sensor.choice import WrenchChoice
@@ -293,15 +289,7 @@ def force_of(
     source: ForceOptions,
     stored: str | None,
 ) -> "DrivingForce":
-    """The wrench that drives the replay.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        choice: What is asked of it.
-        source: Whether another force than an observer's is wanted.
-        stored: The observer whose torque the log itself holds, None if it is to be estimated.
-    """
+    """The wrench that drives the replay."""
     from vftcli.admittance import driving_force
     from vftcli.pipeline import analyse
 

@@ -21,14 +21,10 @@ Places = Annotated[
         help="Logs, folders, data sets; an episode is a log.",
     ),
 ]
-EVERY = 2.0
-"""How often a line of progress is printed where nobody watches. [s]"""
-
+EVERY = 2.0  #: How often a line of progress is printed where nobody watches. [s]
+#: What is asked of logs without comparing them with anything.
 WITHOUT_REFERENCE = ("estimate", "contacts")
-"""What is asked of logs without comparing them with anything."""
-
-SOME_FAILED = 3
-"""Exit code where some logs failed, and others did not."""
+SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 
 
 class WorkerOptions(ChoiceBundle["WorkersChoice"]):
@@ -165,8 +161,7 @@ def batch(
         raise typer.Exit(SOME_FAILED if count.done + count.before else 1)
 
 
-MOST_TOLD = 10
-"""Failures that are printed."""
+MOST_TOLD = 10  #: Failures that are printed.
 
 
 def say_passed(names: list[str]) -> None:

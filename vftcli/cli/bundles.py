@@ -17,22 +17,15 @@ import typer
 
 Choice = TypeVar("Choice")
 
-REQUIRED = inspect.Parameter.empty
-"""The default of an option that has to be given."""
+REQUIRED = inspect.Parameter.empty  #: The default of an option that has to be given.
 
 
 class DeclaredOption(NamedTuple):
-    """What a bundle's class says of one option.
+    """What a bundle's class says of one option."""
 
-    Attributes:
-        default: Its value if it is not given, `REQUIRED` if it has to be.
-        typer: How it is typed, and what `--help` says of it.
-        seldom: Whether only `--help-all` shows it.
-    """
-
-    default: object
-    typer: Any
-    seldom: bool = False
+    default: object  #: Its value if it is not given, `REQUIRED` if it has to be.
+    typer: Any  #: How it is typed, and what `--help` says of it.
+    seldom: bool = False  #: Whether only `--help-all` shows it.
 
 
 def option(
@@ -44,16 +37,7 @@ def option(
     seldom: bool = False,
     **limits: float,
 ) -> Any:  # noqa: ANN401
-    """One option of a bundle that takes a value.
-
-    Args:
-        name: As it is typed, with its dashes.
-        metavar: What its value looks like.
-        help: What `--help` says of it: its first sentence, and `--help-all` the whole.
-        default: Its value if it is not given, `REQUIRED` if it has to be.
-        seldom: Whether only `--help-all` shows it.
-        limits: ``min`` and ``max`` of a number, where no room checks it.
-    """
+    """One option of a bundle that takes a value."""
     how: Any = limits
     return DeclaredOption(default, typer.Option(name, metavar=metavar, help=help, **how), seldom)
 
@@ -65,13 +49,9 @@ def flag(name: str, help: str, *, seldom: bool = False) -> Any:  # noqa: ANN401
 
 # No dataclass: making one takes a millisecond, and --help would pay for all of them.
 class Bundle:
-    """Options that belong together, each an attribute.
+    """Options that belong together, each an attribute."""
 
-    Attributes:
-        GROUP: Heading of `--help` under which they stand.
-    """
-
-    GROUP: ClassVar[str] = ""
+    GROUP: ClassVar[str] = ""  #: Heading of `--help` under which they stand.
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
         vars(self).update(values)
@@ -94,21 +74,14 @@ class Bundle:
 
 
 class ChoiceBundle(Bundle, Generic[Choice]):
-    """Options that state a room's choice; their names are the arguments of its `parsed`.
+    """Options that state a room's choice; their names are the arguments of its `parsed`."""
 
-    Attributes:
-        HOME: Where the choice is, as ``room.file:Class``; it is imported when it is made, since
-            `--help` needs none of it.
-    """
-
+    #: Where the choice is, as ``room.file:Class``; it is imported when it is made, since `--help`
+    #: needs none of it.
     HOME: ClassVar[str]
 
     def choice(self) -> Choice:
-        """The choice that the options state, checked.
-
-        Raises:
-            VftError: If a word is not what the room takes.
-        """
+        """The choice that the options state, checked."""
         module, _, name = self.HOME.partition(":")
         made: Choice = getattr(import_module(f"vftcli.{module}"), name).parsed(**self.words())
         return made
@@ -149,14 +122,7 @@ def parameters(
     default: object,
     group: str = "",
 ) -> Iterator[inspect.Parameter]:
-    """The parameters of one argument of a command: itself, or those of the bundle it is.
-
-    Args:
-        name: Its name.
-        kind: Its annotation, or the bundle.
-        default: Its default, or `REQUIRED`.
-        group: Heading of `--help` under which it stands, unless it has its own.
-    """
+    """The parameters of one argument of a command: itself, or those of the bundle it is."""
     if is_bundle(kind):
         for own, what in kind.declared().items():
             under = kind.GROUP or group
@@ -168,8 +134,7 @@ def parameters(
     yield inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kind)
 
 
-SELDOM = " …"
-"""Ending of a heading whose options only `--help-all` shows."""
+SELDOM = " …"  #: Ending of a heading whose options only `--help-all` shows.
 
 
 def heading(group: str, *, seldom: bool) -> str:

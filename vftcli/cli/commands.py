@@ -4,24 +4,18 @@ from typing import NamedTuple
 
 
 class ListedCommand(NamedTuple):
-    """One command: where it is, and its first sentence, so that --help need not load it.
+    """One command: where it is, and its first sentence, so that --help need not load it."""
 
-    Attributes:
-        target: Module of this package, and the function in it.
-        summary: First line of the function's docstring.
-        journey: Heading under which `--help` lists it.
-    """
-
-    target: str
-    summary: str
-    journey: str
+    target: str  #: Module of this package, and the function in it.
+    summary: str  #: First line of the function's docstring.
+    journey: str  #: Heading under which `--help` lists it.
 
 
+#: What one sets out to do: the headings of the commands.
 ASK, PREPARE, STUDY, LOOK_UP = (
     "Ask a log", "Prepare a robot and its logs", "Study further", "Look up"
 )  # fmt: skip
-"""What one sets out to do: the headings of the commands."""
-
+#: Name → the command.
 COMMANDS = {
     "contacts": ListedCommand(
         "contacts:list_contacts",
@@ -129,4 +123,3 @@ COMMANDS = {
         LOOK_UP,
     ),
 }
-"""Name → the command."""

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
 
     from vftcli.outputs.files import OutputFolder
 
-MORE = "Intervals, lags and significance: --details"
-"""What the tables on the terminal leave out."""
+MORE = "Intervals, lags and significance: --details"  #: What the tables on the terminal leave out.
 
 
 class TableOptions(Bundle):
@@ -30,11 +29,7 @@ class TableOptions(Bundle):
 
     @property
     def form(self) -> str:
-        """The one form that is asked for, or "terminal".
-
-        Raises:
-            typer.BadParameter: If several are.
-        """
+        """The one form that is asked for, or "terminal"."""
         asked = [name for name, wanted in self.words().items() if wanted]
         if len(asked) > 1:
             raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in asked)}")
@@ -48,12 +43,7 @@ class DrawnErrors(opt.FigureOptions):
     force: opt.Force = False
 
     def folder(self) -> "OutputFolder | None":
-        """Where the figure goes, None where none is asked for.
-
-        Raises:
-            typer.BadParameter: If only one of --figures and -o is given.
-            VftError: If figures cannot be drawn, or the folder cannot be written.
-        """
+        """Where the figure goes, None where none is asked for."""
         form = self.form()
         if (form is None) != (self.output is None):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")

@@ -20,43 +20,28 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
 from vftcli.signals.parsing import did_you_mean, interval, shown, toml_tables
 
-NAME = "vftcli.toml"
-"""The file that is read unasked where it is in the working folder."""
-
-NONE = "none"
-"""Value of ``--config`` with which no file is read."""
-
+NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
+NONE = "none"  #: Value of ``--config`` with which no file is read.
+#: Options that are only ever typed: what asks before it overwrites shall ask each time.
 TYPED = frozenset({"config", "force", "help", "help-all"})
-"""Options that are only ever typed: what asks before it overwrites shall ask each time."""
-
+#: Command → options that it takes otherwise than the rest: only its own table gives them.
 OTHERWISE = {
     "identify": {"free"},  # the motion without the load that is sought
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"derive"},  # it writes what was logged
 }
-"""Command → options that it takes otherwise than the rest: only its own table gives them."""
-
-LARGEST = 1 << 20
-"""Bytes that such a file has at most."""
-
-FILE = "file:"
-"""What a reference's file begins with."""
+LARGEST = 1 << 20  #: Bytes that such a file has at most.
+FILE = "file:"  #: What a reference's file begins with.
 
 
 class Taken(NamedTuple):
-    """What a command took from a file.
+    """What a command took from a file."""
 
-    Attributes:
-        path: The file, None where none was read.
-        words: The options as they would be typed.
-    """
-
-    path: Path | None = None
-    words: tuple[str, ...] = ()
+    path: Path | None = None  #: The file, None where none was read.
+    words: tuple[str, ...] = ()  #: The options as they would be typed.
 
 
-NOTHING = Taken()
-"""What a command took that read no file."""
+NOTHING = Taken()  #: What a command took that read no file.
 
 _taken: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
 
@@ -99,11 +84,7 @@ def is_configured(command: Any) -> bool:  # noqa: ANN401 - typer carries its own
 
 
 def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
-    """Make what the file holds the defaults of a command.
-
-    Raises:
-        ParameterError: If it cannot be read, or holds an option or a value that there is not.
-    """
+    """Make what the file holds the defaults of a command."""
     unasked = Path(NAME)
     if ctx.resilient_parsing or named == NONE or (named is None and not unasked.is_file()):
         return
@@ -168,11 +149,7 @@ def as_typed(key: str, value: str | bool) -> tuple[str, ...]:
 
 
 def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
-    """What a file holds for a command: what stands on top, then what is in the command's table.
-
-    Raises:
-        ParameterError: If it cannot be read, or holds what is no option of a command.
-    """
+    """What a file holds for a command: what stands on top, then what is in the command's table."""
     top, known = tables_of(path), known_options()
     every = dict.fromkeys(key for options in known.values() for key in options)
     tables = {
@@ -197,11 +174,7 @@ def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
 def check_keys(
     path: Path, whose: str, table: Mapping[str, Any], there: Mapping[str, object]
 ) -> None:
-    """Check that every key of a table is an option.
-
-    Raises:
-        ParameterError: If one is not, with the nearest that is.
-    """
+    """Check that every key of a table is an option."""
     for key in table:
         if key in TYPED:
             raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
@@ -211,11 +184,7 @@ def check_keys(
 
 
 def tables_of(path: Path) -> dict[str, Any]:
-    """What a file holds.
-
-    Raises:
-        ParameterError: If it cannot be read.
-    """
+    """What a file holds."""
     if not (path.is_file() or path.is_fifo()):
         raise ParameterError(f"--config {path}: no such file; vftcli init LOG writes one")
     with path.open("rb") as file:
@@ -254,9 +223,6 @@ def value_of(ctx: Any, option: Any, key: str, value: object, path: Path) -> Any:
 
     Returns:
         None of an option that the file says is not given.
-
-    Raises:
-        ParameterError: If it is not a value of the option.
     """
     if option.is_flag:
         if not isinstance(value, bool):

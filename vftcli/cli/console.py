@@ -27,19 +27,14 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
 
-QUIET, USUAL, DETAILS = range(3)
-"""How much a command says."""
+QUIET, USUAL, DETAILS = range(3)  #: How much a command says.
 
 _level: ContextVar[int] = ContextVar("level", default=USUAL)
 
 
 @contextmanager
 def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
-    """Say as much as is asked for a block.
-
-    Raises:
-        typer.BadParameter: If both are asked for.
-    """
+    """Say as much as is asked for a block."""
     if details and quiet:
         raise typer.BadParameter("choose one of --details, --quiet")
     token = _level.set(DETAILS if details else QUIET if quiet else USUAL)
@@ -49,8 +44,8 @@ def speaking(*, details: bool, quiet: bool) -> Iterator[None]:
         _level.reset(token)
 
 
+#: Remarks that a part of a file was taken which nobody asked for.
 PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
-"""Remarks that a part of a file was taken which nobody asked for."""
 
 
 def command_line() -> str:
@@ -112,12 +107,7 @@ def say_json(value: object) -> None:
 
 
 class LeftOut:
-    """The logs of a command that could not be analysed: one line each, the others go on.
-
-    Args:
-        library: What the logs are called.
-        logs: The logs of the command; of a single one the error itself is the command's.
-    """
+    """The logs of a command that could not be analysed: one line each, the others go on."""
 
     def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
         self._library, self._several = library, len(logs) > 1
@@ -133,14 +123,7 @@ class LeftOut:
         typer.echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
 
     def end(self, done: int) -> None:
-        """Stop with exit code 1 if any was left out.
-
-        Args:
-            done: How many were analysed.
-
-        Raises:
-            typer.Exit: If one was left out.
-        """
+        """Stop with exit code 1 if any was left out."""
         if not self.reasons:
             return
         if not done:
@@ -165,14 +148,7 @@ def say_recording(recording: "Recording") -> None:
 def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
-    """Who examines a command's logs, and says one line on the health of each as soon as it is told.
-
-    Args:
-        library: Where the logs are read; of several each is told by its name.
-        anyway: Whether results are wanted even where a finding makes them meaningless.
-        fitting: Whether the robot must be the log's.
-        on_screen: Whether the result on stdout says how healthy the logs are.
-    """
+    """The examiner of a command's logs: it prints one line on the health of each."""
     from vftcli.doctor.examiner import Examiner
     from vftcli.outputs.examination import health_line
 

@@ -93,12 +93,7 @@ def estimate(
 def begin_reading(
     log: Path, analysis: opt.AnalysisOptions, written: "OutputChoice"
 ) -> "tuple[Library, ReadChoice, Background[Recording]]":
-    """Begin to read a log beside everything else: where from, how, and the recording to come.
-
-    Raises:
-        LogError: If it holds estimates.
-        ParameterError: If the options on how to read it are malformed.
-    """
+    """Begin to read a log beside everything else: where from, how, and the recording to come."""
     from vftcli.readers.ahead import Ahead
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.signals.background import Background
@@ -132,13 +127,6 @@ def write_estimates(
     how: dict[str, Any],
 ) -> "tuple[Analysis, str]":
     """Analyse a log, in one piece or block by block, and write its estimates.
-
-    Args:
-        recording: The log, in blocks if it is long.
-        whole: Reads it in one piece.
-        choice: What is asked of it.
-        output: The folder.
-        how: What else the writers take.
 
     Returns:
         The analysis, and the record that was written.

@@ -20,19 +20,13 @@ from vftcli.cli.config import config_option, forget, is_configured, settle
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean, nearest
 
+#: Headings of the options that commands share, in their order.
 LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
     "The log", "How to estimate", "How to compare", "The wrench", "What to write", "Output"
 )  # fmt: skip
-"""Headings of the options that commands share, in their order."""
-
-OWN = "This command"
-"""Heading of the options that only one command has."""
-
-NARROWEST, WIDEST, LEFT = 72, 100, 33
-"""Columns of a help text, and of its left half at most."""
-
-SHORT = 3
-"""Lines of a paragraph that the short help shows."""
+OWN = "This command"  #: Heading of the options that only one command has.
+NARROWEST, WIDEST, LEFT = 72, 100, 33  #: Columns of a help text, and of its left half at most.
+SHORT = 3  #: Lines of a paragraph that the short help shows.
 
 
 class GroupedCommand(TyperCommand):
@@ -107,12 +101,7 @@ def columns() -> int:
 
 
 def command_help(ctx: Any, *, every: bool) -> str:  # noqa: ANN401
-    """The help of a command: how it is called, what it does, its options by group.
-
-    Args:
-        ctx: typer's context of the call.
-        every: Whether all options are shown and in full, or those wanted most in a sentence each.
-    """
+    """The help of a command: how it is called, what it does, its options by group."""
     command, width = ctx.command, columns()
     usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
     paragraphs = [" ".join(p.split()) for p in (command.help or "").split("\n\n")]
@@ -206,8 +195,7 @@ def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
     return "\n".join([*lines, "", *two_columns(rows, width)]) + "\n"
 
 
-TOPICS = Path(__file__).parent / "topics.toml"
-"""Topic → its summary and its text."""
+TOPICS = Path(__file__).parent / "topics.toml"  #: Topic → its summary and its text.
 
 
 @cache

@@ -33,11 +33,7 @@ class TaskOptions(Bundle):
     cutoff: float = option("--cutoff", "HZ", "Cutoff of the zero-phase filter.", 8.0)
 
     def task(self, name: str, friction: bool = True) -> "Task":
-        """What shall be identified, for a robot of this name whose joints rub or not.
-
-        Raises:
-            ParameterError: If the method does not exist, or the options contradict each other.
-        """
+        """What shall be identified, for a robot of this name whose joints rub or not."""
         from vftcli.identification import Processing, Task
 
         usual = "friction" if self.fit_constants else "auto"
@@ -66,11 +62,7 @@ class WithoutLoad(Bundle):
     free: Words = option(*opt.FREE)
 
     def logs(self, find_payload: bool) -> tuple[Path, ...]:
-        """The logs that are given, one at most.
-
-        Raises:
-            ParameterError: If no load is sought, a span of the log is given, or more than one log.
-        """
+        """The logs that are given, one at most."""
         from vftcli.repetition.choice import FreeChoice
         from vftcli.signals.errors import ParameterError
 

@@ -18,10 +18,6 @@ if TYPE_CHECKING:
 class JacobianLogs:
     """Takes such logs out of those that cannot be analysed.
 
-    Args:
-        left_out: Who is told of the others.
-        choice: What is asked of each log.
-
     Attributes:
         judged: What each of them tells.
     """
@@ -46,11 +42,7 @@ class JacobianLogs:
 
 
 def judged(log: Path, found: "JacobianError", choice: "AnalysisChoice") -> "JacobianJudgement":
-    """What such a log tells of what is asked; what the numbers are is said.
-
-    Raises:
-        VftError: If something is asked that takes positions.
-    """
+    """What such a log tells of what is asked; what the numbers are is said."""
     from vftcli.evaluation.logged_jacobian import judge_jacobian
     from vftcli.readers.jacobian import jacobian_log
 
@@ -71,11 +63,7 @@ def write_by_jacobian(
     force: bool,
     json: bool,
 ) -> None:
-    """Write what there is of such a log, where a wrench or a reference is asked for.
-
-    Raises:
-        VftError: If neither is, or something is asked that takes positions.
-    """
+    """Write what there is of such a log, where a wrench or a reference is asked for."""
     from vftcli.outputs.log.jacobian_files import write_jacobian_folder
     from vftcli.outputs.log.tables import to_terminal
 

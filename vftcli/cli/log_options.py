@@ -9,8 +9,7 @@ if TYPE_CHECKING:
     from vftcli.readers.reader import ReadChoice
     from vftcli.robots.choice import RobotChoice
 
-Words = list[str] | None
-"""The values of an option that may be repeated."""
+Words = list[str] | None  #: The values of an option that may be repeated.
 
 ROBOT = ("--robot", "NAME|FILE", "Profile, FILE.toml, or a URDF, xacro or MJCF.")
 TIP = (

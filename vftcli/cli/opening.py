@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-PAGE, RECORDING = ".html", ".rrd"
-"""Endings of what can be opened, the one that goes before first."""
+PAGE, RECORDING = ".html", ".rrd"  #: Endings of what can be opened, the one that goes before first.
 
 Made = Annotated[
     Path,
@@ -30,14 +29,7 @@ def open_folder(folder: Made) -> None:
 
 
 def open_made(path: Path) -> None:
-    """Open a page in the browser, else a recording in the viewer, and say what was opened.
-
-    Args:
-        path: The page or the recording, or a folder that holds them.
-
-    Raises:
-        OutputError: If there is nothing to open.
-    """
+    """Open a page in the browser, else a recording in the viewer, and say what was opened."""
     from vftcli.cli.console import say
     from vftcli.signals.errors import OutputError
     from vftcli.signals.packages import check_installed

@@ -266,11 +266,7 @@ class ExtraOptions(Bundle):
     )
 
     def choice(self, **others: bool) -> "OutputChoice":
-        """What is written, with what the command's own options ask for.
-
-        Raises:
-            ParameterError: If words are none of ours, or ask for a recording and for none.
-        """
+        """What is written, with what the command's own options ask for."""
         from vftcli.outputs.log.choice import OutputChoice
 
         asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
@@ -362,16 +358,7 @@ class AnalysisOptions(Bundle):
         *,
         on_screen: bool = False,
     ) -> "AnalysisChoice":
-        """The choice that the options state, and those of a reference where the command has them.
-
-        Args:
-            library: Where the command's logs are read.
-            reference: What the estimates are compared with.
-            on_screen: Whether the result on stdout says how healthy the logs are.
-
-        Raises:
-            VftError: If a word is not what its room takes.
-        """
+        """The choice that the options state, a reference's with it where there is one."""
         from vftcli.cli.console import health_of, stages
         from vftcli.cli.memory import give_back
         from vftcli.pipeline import AnalysisChoice

@@ -6,14 +6,9 @@ import time
 
 import typer
 
-QUICK = 1.0
-"""Work that is done within this time shows nothing. [s]"""
-
-EVERY = 1.0
-"""Time after which the line is shown anew, whatever happens. [s]"""
-
-WIDTH = 78
-"""Columns of the line. [characters]"""
+QUICK = 1.0  #: Work that is done within this time shows nothing. [s]
+EVERY = 1.0  #: Time after which the line is shown anew, whatever happens. [s]
+WIDTH = 78  #: Columns of the line. [characters]
 
 
 class Stages:
@@ -72,5 +67,4 @@ class Stages:
             typer.echo(f"\r{self._stage[:room]:<{room}}{tail}", err=True, nl=False)
 
 
-STAGES = Stages()
-"""The one line that a program has."""
+STAGES = Stages()  #: The one line that a program has.

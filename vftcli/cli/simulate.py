@@ -43,10 +43,8 @@ class ExperimentOptions(Bundle):
     )
 
 
-WIDTH = 30
-"""Width of the progress bar. [characters]"""
-QUICK = 1.0
-"""Runs shorter than this show no bar. [s]"""
+WIDTH = 30  #: Width of the progress bar. [characters]
+QUICK = 1.0  #: Runs shorter than this show no bar. [s]
 
 
 @taken_apart

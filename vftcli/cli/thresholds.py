@@ -104,11 +104,7 @@ def contact_thresholds(
 def truth_of(
     run: "ModelledRun", asked: "ReferenceChoice | None"
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
-    """The torque and the wrench that are taken for true along a log, None where nothing says.
-
-    Raises:
-        ReferenceTorqueError: If the reference cannot be made.
-    """
+    """The torque and the wrench that are taken for true along a log, None where nothing says."""
     from vftcli.evaluation.reference_choice import ReferenceSource, make_reference
     from vftcli.repetition.free_motion import FreeMotion
 

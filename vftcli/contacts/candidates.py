@@ -25,55 +25,32 @@ from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.linear_model import SPIKE
 from vftcli.virtual_sensor.smoother.noise import steps
 
+#: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
-"""A push as it may be: standard deviation of force and moment at the flange. [N, N·m]"""
-
+#: Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
-"""Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]"""
-
+#: Stretches in which a long log is searched, and what of the log before each is taken along. [s]
 WARM_UP, STRETCH = 5.0, 10.0
-"""Stretches in which a long log is searched, and what of the log before each is taken along. [s]"""
-
-BETWEEN = 30.0
-"""Mean time from one contact to the next. [s]"""
-
-AT_FIRST = 0.1
-"""Probability that a log begins in contact."""
-
+BETWEEN = 30.0  #: Mean time from one contact to the next. [s]
+AT_FIRST = 0.1  #: Probability that a log begins in contact.
+#: Probability that a contact must reach in one direction of time, and in the other.
 SURE, LIKELY = 0.99, 0.5
-"""Probability that a contact must reach in one direction of time, and in the other."""
-
-GAP = 0.12
-"""Contacts closer than this are one. [s]"""
-
-LEVEL = 4.0
-"""Standard deviations of a joint's torque beyond which it is touched."""
-
+GAP = 0.12  #: Contacts closer than this are one. [s]
+LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
+#: How long it must stay there, and the pause up to which two such stretches are one. [s]
 LASTING, NEAR = 0.05, 0.2
-"""How long it must stay there, and the pause up to which two such stretches are one. [s]"""
-
-MOST_ODDS = 300.0
-"""Log odds are kept within ± this many nats."""
+MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
 
 
 class Search(NamedTuple):
-    """What the filter's two modes believe, of every search and direction of time.
+    """What the filter's two modes believe, of every search and direction of time."""
 
-    Attributes:
-        b: Mean of b in mode 0, 1. (2, S, n)
-        x: Mean of x in mode 1. (S, n)
-        bb: Variance of b in mode 0, 1. (2, S, n)
-        bx: Covariance of b and x in mode 1. (S, n)
-        xx: Variance of x in mode 1. (S, n)
-        odds: ln P(contact)/P(free). (S,)
-    """
-
-    b: Array
-    x: Array
-    bb: Array
-    bx: Array
-    xx: Array
-    odds: Array
+    b: Array  #: Mean of b in mode 0, 1. (2, S, n)
+    x: Array  #: Mean of x in mode 1. (S, n)
+    bb: Array  #: Variance of b in mode 0, 1. (2, S, n)
+    bx: Array  #: Covariance of b and x in mode 1. (S, n)
+    xx: Array  #: Variance of x in mode 1. (S, n)
+    odds: Array  #: ln P(contact)/P(free). (S,)
 
 
 def filtered_contacts(blocks: Blocks, courses: tuple[ErrorCourse, ErrorCourse], J: Array) -> Mask:

@@ -18,22 +18,14 @@ from vftcli.virtual_sensor.detection import TRUE_TORQUE, true_intervals
 
 
 class CheckedContact(NamedTuple):
-    """A contact of a log, and whether the thresholds tell it.
+    """A contact of a log, and whether the thresholds tell it."""
 
-    Attributes:
-        start: When it begins. [s]
-        stop: When it ends. [s]
-        peak_force: Its largest force, NaN where that is not known. [N]
-        delay: From its start to the first alarm; NaN where there is none, or no truth. [s]
-        by: The joint or axis that raises the alarm, "" where there is none.
-        was_on: Whether none begins because one was on already, left over from a contact before.
-    """
-
-    start: float
-    stop: float
-    peak_force: float
-    delay: float
-    by: str
+    start: float  #: When it begins. [s]
+    stop: float  #: When it ends. [s]
+    peak_force: float  #: Its largest force, NaN where that is not known. [N]
+    delay: float  #: From its start to the first alarm; NaN where there is none, or no truth. [s]
+    by: str  #: The joint or axis that raises the alarm, "" where there is none.
+    #: Whether none begins because one was on already, left over from a contact before.
     was_on: bool = False
 
     @property
@@ -44,24 +36,17 @@ class CheckedContact(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class ContactCheck:
-    """What thresholds would have done along a log with contacts.
+    """What thresholds would have done along a log with contacts."""
 
-    Attributes:
-        log: The log.
-        reference: What says where the contacts are, None where nothing does: then the alarms
-            themselves stand for them.
-        contacts: The contacts, in the order of time.
-        false_alarms: Alarms that touch no contact, None where nothing says where they are.
-        untouched_h: Time without contact, NaN likewise. [h]
-        remarks: What a reader of the numbers should know.
-    """
-
-    log: str
+    log: str  #: The log.
+    #: What says where the contacts are, None where nothing does: then the alarms themselves stand
+    #: for them.
     reference: str | None
-    contacts: tuple[CheckedContact, ...]
+    contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
+    #: Alarms that touch no contact, None where nothing says where they are.
     false_alarms: int | None
-    untouched_h: float
-    remarks: tuple[Remark, ...]
+    untouched_h: float  #: Time without contact, NaN likewise. [h]
+    remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
 
     @property
     def caught(self) -> tuple[CheckedContact, ...]:
@@ -106,14 +91,6 @@ def check_contacts(
 
     A contact is caught if a signal passes its threshold while it lasts; one that has stayed beyond
     it since before says nothing of it. Contacts that are over before the settling are left out.
-
-    Args:
-        signals: The log.
-        thresholds: The thresholds.
-        reference: The true torque of every joint; beyond .5 N·m, or five times its own floor, it
-            is a contact. None where nothing tells: then the alarms are listed, with the force that
-            is estimated.
-        wrench: The true wrench, None where the force is not known.
     """
     t = signals.t
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])
@@ -155,15 +132,10 @@ def check_contacts(
 
 
 class RaisedAlarm(NamedTuple):
-    """One signal beyond its threshold.
+    """One signal beyond its threshold."""
 
-    Attributes:
-        by: The joint or axis.
-        span: From when to when.
-    """
-
-    by: str
-    span: ContactInterval
+    by: str  #: The joint or axis.
+    span: ContactInterval  #: From when to when.
 
 
 def checked(contact: ContactInterval, peak: float, alarms: Sequence[RaisedAlarm]) -> CheckedContact:

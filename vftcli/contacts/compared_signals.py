@@ -19,30 +19,21 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import POINTS
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
-GAIN = 10.0
-"""Of the momentum observer. [1/s]"""
+GAIN = 10.0  #: Of the momentum observer. [1/s]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ComparedSignals:
-    """Joint torques and wrench of one log, as they are compared with thresholds.
+    """Joint torques and wrench of one log, as they are compared with thresholds."""
 
-    Attributes:
-        recording: The log.
-        torque: Estimated external torque. (T, n) [N·m]
-        wrench: Force, then moment, NaN where the pose cannot tell them; no column for an arm of
-            fewer than six joints. (T, 6) [N, N·m]
-        of_vendor: Whether the torque is the robot's own estimate, not the observer's.
-        logged_wrench: Whether the wrench is the robot's own, not that of the torque.
-        frame: Axes of the wrench and the point of its moment, in words; "" without a wrench.
-    """
-
-    recording: Recording
-    torque: Array
+    recording: Recording  #: The log.
+    torque: Array  #: Estimated external torque. (T, n) [N·m]
+    #: Force, then moment, NaN where the pose cannot tell them; no column for an arm of fewer than
+    #: six joints. (T, 6) [N, N·m]
     wrench: Array
-    of_vendor: bool
-    logged_wrench: bool
-    frame: str
+    of_vendor: bool  #: Whether the torque is the robot's own estimate, not the observer's.
+    logged_wrench: bool  #: Whether the wrench is the robot's own, not that of the torque.
+    frame: str  #: Axes of the wrench and the point of its moment, in words; "" without a wrench.
 
     def __post_init__(self) -> None:
         seal(self, "torque", "wrench")
@@ -65,10 +56,6 @@ def compared_signals(run: ModelledRun) -> ComparedSignals:
     The wrench is the log's own where the robot made it; one in sensor axes is an instrument's,
     which no threshold of the robot sees. Else it is that of the torque, by least squares in base
     axes about the flange point.
-
-    Raises:
-        MissingSignalError: If the log has neither an estimate nor what the observer needs.
-        RobotError: If the number of joints differs.
     """
     # The robot's own estimate asks for no model, which else would check.
     check_joints(run.recording, run.robot)
@@ -98,11 +85,7 @@ def compared_signals(run: ModelledRun) -> ComparedSignals:
 
 
 def check_alike(signals: Sequence[ComparedSignals]) -> None:
-    """Raise unless all logs hold the same estimates of the same arm.
-
-    Raises:
-        ParameterError: If they do not.
-    """
+    """Raise unless all logs hold the same estimates of the same arm."""
     first = signals[0]
     for other in signals[1:]:
         for what in ("of_vendor", "logged_wrench", "frame"):

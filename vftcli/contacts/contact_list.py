@@ -17,33 +17,21 @@ if TYPE_CHECKING:
     from vftcli.contacts.untouched import Basis
     from vftcli.contacts.windows import ContactPrior
 
-Trust = Literal["good", "fair", "weak"]
-"""How far a row may be believed."""
-
+Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
+#: Evidence and band of a row that is good; a wider band makes it weak.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
-"""Evidence and band of a row that is good; a wider band makes it weak."""
-
-
+#: Where only forces larger than this are told along an axis, the pose is blind to it. [N]
 BLIND = 500.0
-"""Where only forces larger than this are told along an axis, the pose is blind to it. [N]"""
-
-
+#: Columns that a table of contacts has even where it has no row.
 FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
-"""Columns that a table of contacts has even where it has no row."""
 
 
 class ForceCourse(NamedTuple):
-    """How hard a contact pushes from its start to its end, at the place whose force it states.
+    """How hard a contact pushes from its start to its end, at the place whose force it states."""
 
-    Attributes:
-        t: Time. (K,) [s]
-        force: |F|. (K,) [N]
-        band: Half width of its 95 % band. (K,) [N]
-    """
-
-    t: Array
-    force: Array
-    band: Array
+    t: Array  #: Time. (K,) [s]
+    force: Array  #: |F|. (K,) [N]
+    band: Array  #: Half width of its 95 % band. (K,) [N]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -51,61 +39,38 @@ class Contact(Shown):
     """One contact: force and moment ON the robot, base axes, the moment about the flange point.
 
     Bands and standard deviations are calibrated: they hold what the model errs by, too.
-
-    Attributes:
-        number: From 1, in the order of time.
-        start: When it begins. [s]
-        stop: When it ends. [s]
-        peak: When |F| is largest. [s]
-        is_load: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its
-            numbers are then means over the row, not those of a peak.
-        peak_force: |F| at the peak. [N]
-        peak_band: Half width of its 95 % band, what the place may change in it. [N]
-        place_band: Half width of its 95 % band at the place that fits best. [N]
-        wrench: Force and moment at the peak. (6,) [N, N·m]
-        wrench_sd: Standard deviation. (6,) [N, N·m]
-        mean_force: Mean force. (3,) [N]
-        impulse: ∫F dt. (3,) [N·s]
-        anywhere: Smallest and largest |F| over every place that fits, bands included. [N]
-        where: Part of the arm.
-        lead: Evidence of that part's best place less that of every other part. [nats]
-        places: Links that fit; 0 is the flange.
-        evidence: Evidence of the best place less that of nothing. [nats]
-        joint_torque: Torque on each joint at the peak. (n,) [N·m]
-        joint_torque_sd: Its standard deviation. (n,) [N·m]
-        at_rest: Whether no joint moves at the peak.
-        vendor_force: |F| of the log's own torque estimate at the peak, None without one. [N]
-        sensor_force: |F| of the log's own wrench at the peak, None without one. [N]
-        course: |F| from start to end, None where no force is known.
-        inferred: Whether neither free motion nor a reference lets its size be checked.
-        remarks: What limits this row.
     """
 
-    number: int
-    start: float
-    stop: float
-    peak: float
+    number: int  #: From 1, in the order of time.
+    start: float  #: When it begins. [s]
+    stop: float  #: When it ends. [s]
+    peak: float  #: When |F| is largest. [s]
+    #: Whether it lasts so long that it is a load, a wrong payload or a wrong model; its numbers are
+    #: then means over the row, not those of a peak.
     is_load: bool = False
-    peak_force: float | None
-    peak_band: float | None
-    place_band: float | None
-    wrench: Array | None
-    wrench_sd: Array | None
-    mean_force: Array | None
-    impulse: Array | None
+    peak_force: float | None  #: |F| at the peak. [N]
+    peak_band: float | None  #: Half width of its 95 % band, what the place may change in it. [N]
+    place_band: float | None  #: Half width of its 95 % band at the place that fits best. [N]
+    wrench: Array | None  #: Force and moment at the peak. (6,) [N, N·m]
+    wrench_sd: Array | None  #: Standard deviation. (6,) [N, N·m]
+    mean_force: Array | None  #: Mean force. (3,) [N]
+    impulse: Array | None  #: ∫F dt. (3,) [N·s]
+    #: Smallest and largest |F| over every place that fits, bands included. [N]
     anywhere: tuple[float, float] | None
-    where: "ArmPart"
-    lead: float | None
-    places: tuple[int, ...]
-    evidence: float | None
-    joint_torque: Array
-    joint_torque_sd: Array
-    at_rest: bool
+    where: "ArmPart"  #: Part of the arm.
+    lead: float | None  #: Evidence of that part's best place less that of every other part. [nats]
+    places: tuple[int, ...]  #: Links that fit; 0 is the flange.
+    evidence: float | None  #: Evidence of the best place less that of nothing. [nats]
+    joint_torque: Array  #: Torque on each joint at the peak. (n,) [N·m]
+    joint_torque_sd: Array  #: Its standard deviation. (n,) [N·m]
+    at_rest: bool  #: Whether no joint moves at the peak.
+    #: |F| of the log's own torque estimate at the peak, None without one. [N]
     vendor_force: float | None = None
+    #: |F| of the log's own wrench at the peak, None without one. [N]
     sensor_force: float | None = None
-    course: ForceCourse | None = None
-    inferred: bool = False
-    remarks: tuple[Remark, ...] = ()
+    course: ForceCourse | None = None  #: |F| from start to end, None where no force is known.
+    inferred: bool = False  #: Whether neither free motion nor a reference lets its size be checked.
+    remarks: tuple[Remark, ...] = ()  #: What limits this row.
 
     def __post_init__(self) -> None:
         seal(self, "wrench", "wrench_sd", "mean_force", "impulse")
@@ -221,20 +186,13 @@ class Contact(Shown):
 
 
 class CarriedLoad(NamedTuple):
-    """A load that the arm carries and its model lacks; it is in no row.
+    """A load that the arm carries and its model lacks; it is in no row."""
 
-    Attributes:
-        mass: Its mass. [kg]
-        sd: Standard deviation of the mass. [kg]
-        robot: The model's name.
-        payload: The payload of the robot's file that weighs as much, None without one.
-        span: From the arm's first motion to its last, in which it is weighed. [s]
-    """
-
-    mass: float
-    sd: float
-    robot: str
-    payload: str | None
+    mass: float  #: Its mass. [kg]
+    sd: float  #: Standard deviation of the mass. [kg]
+    robot: str  #: The model's name.
+    payload: str | None  #: The payload of the robot's file that weighs as much, None without one.
+    #: From the arm's first motion to its last, in which it is weighed. [s]
     span: tuple[float, float]
 
     def record(self) -> dict[str, Any]:
@@ -249,36 +207,23 @@ class CarriedLoad(NamedTuple):
 
 
 class Unexplained(NamedTuple):
-    """The largest torque that the robot's model does not explain.
+    """The largest torque that the robot's model does not explain."""
 
-    Attributes:
-        torque: Its size. [N·m]
-        joint: Of which joint, from 1.
-        at: When. [s]
-    """
-
-    torque: float
-    joint: int
-    at: float
+    torque: float  #: Its size. [N·m]
+    joint: int  #: Of which joint, from 1.
+    at: float  #: When. [s]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ContactModel(Shown):
-    """What the list rests on.
+    """What the list rests on."""
 
-    Attributes:
-        prior: How the wrench of the contacts moves, None where it was not learned.
-        noise_sd: √R of each joint. (n,) [N·m]
-        error_sd: Standard deviation of the model error. (n,) [N·m]
-        error_time: Its correlation time. (n,) [s]
-        block: Length of a block. [s]
-    """
-
+    #: How the wrench of the contacts moves, None where it was not learned.
     prior: "ContactPrior | None"
-    noise_sd: Array
-    error_sd: Array
-    error_time: Array
-    block: float
+    noise_sd: Array  #: √R of each joint. (n,) [N·m]
+    error_sd: Array  #: Standard deviation of the model error. (n,) [N·m]
+    error_time: Array  #: Its correlation time. (n,) [s]
+    block: float  #: Length of a block. [s]
 
     def __post_init__(self) -> None:
         seal(self, "noise_sd", "error_sd", "error_time")
@@ -286,41 +231,29 @@ class ContactModel(Shown):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ContactList(Shown):
-    """What touched the arm along a log: a sequence of `Contact`.
+    """What touched the arm along a log: a sequence of `Contact`."""
 
-    Attributes:
-        recording: The log's label.
-        duration: How long it is. [s]
-        contacts: The contacts, in the order of time.
-        candidates: What may be contacts, and what may be errors of the model, with less evidence.
-        basis: What tells a contact from an error of the model.
-        free: What is known of free motion, as remarks; none where nothing is.
-        free_seconds: How much of it there is. [s]
-        false_on_free: Contacts listed in the log's own free part, None where it has none.
-        threshold: Evidence that a contact must have, None without. [nats]
-        smallest_force: The smallest force that this log can tell, None without a wrench. [N]
-        unexplained: Where nothing can be listed the largest torque, else None.
-        load: A load that the arm carries and its model lacks, None where none shows.
-        stops: When the arm stopped so abruptly that what follows is no contact. [s]
-        model: What the list rests on.
-        remarks: What limits the list as a whole.
-    """
-
-    recording: str
-    duration: float
-    contacts: tuple[Contact, ...]
+    recording: str  #: The log's label.
+    duration: float  #: How long it is. [s]
+    contacts: tuple[Contact, ...]  #: The contacts, in the order of time.
+    #: What may be contacts, and what may be errors of the model, with less evidence.
     candidates: tuple[Contact, ...] = ()
-    basis: "Basis"
-    free: tuple[Remark, ...]
-    free_seconds: float
+    basis: "Basis"  #: What tells a contact from an error of the model.
+    free: tuple[Remark, ...]  #: What is known of free motion, as remarks; none where nothing is.
+    free_seconds: float  #: How much of it there is. [s]
+    #: Contacts listed in the log's own free part, None where it has none.
     false_on_free: int | None
-    threshold: float | None
+    threshold: float | None  #: Evidence that a contact must have, None without. [nats]
+    #: The smallest force that this log can tell, None without a wrench. [N]
     smallest_force: float | None
+    #: Where nothing can be listed the largest torque, else None.
     unexplained: Unexplained | None = None
+    #: A load that the arm carries and its model lacks, None where none shows.
     load: CarriedLoad | None = None
+    #: When the arm stopped so abruptly that what follows is no contact. [s]
     stops: tuple[float, ...]
-    model: ContactModel
-    remarks: tuple[Remark, ...] = ()
+    model: ContactModel  #: What the list rests on.
+    remarks: tuple[Remark, ...] = ()  #: What limits the list as a whole.
 
     def __getitem__(self, place: int) -> Contact:
         """The contact at a place of the list, from 0; it ends the loop over them all."""

@@ -41,44 +41,24 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.virtual_sensor.smoother.noise import UNSEEN_SHARE
 
-FINE = 0.008
-"""A short contact is measured in blocks of this length: longer ones cut its peak. [s]"""
-
-SHORTEST = 0.5
-"""A log shorter than this tells no contact. [s]"""
-
-SLOWEST = 10.0
-"""Rate below which pushes of some tenths of a second lie between two samples. [Hz]"""
-
+FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
+SHORTEST = 0.5  #: A log shorter than this tells no contact. [s]
+SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
+#: A contact's evidence must be this much above that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
-"""A contact's evidence must be this much above that of any row in the log's own free part."""
-
+#: What lies within so long of either end of the log is no contact: filters begin there. [s]
 AT_ENDS = 0.3
-"""What lies within so long of either end of the log is no contact: filters begin there. [s]"""
-
+#: A payload of the robot's file is named where it weighs as much as a load to this share.
 SAME_MASS = 0.1
-"""A payload of the robot's file is named where it weighs as much as a load to this share."""
-
+#: The arm rests around a contact where no joint is faster than this [rad/s] in 95 % of the samples
+#: from so long [s] before it to so long after it.
 RESTS, AROUND = 0.02, 1.0
-"""The arm rests around a contact where no joint is faster than this [rad/s] in 95 % of the samples
-from so long [s] before it to so long after it."""
 
 
 def list_contacts(
     motion: FreeMotion, bias: WholeLogBias | None = None, *, referenced: bool = False
 ) -> ContactList:
-    """What touched the arm along a log.
-
-    Args:
-        motion: The log, its robot, and what is known of its free motion.
-        bias: The model error of the whole log where it has been fitted already; else it is fitted
-            here if no free motion is known.
-        referenced: Whether a reference stands beside the list, against which a size can be checked.
-
-    Raises:
-        VftError: If a free part that the user names does not exist or holds no samples, or the log
-            holds numbers that are not finite, or is so short that it tells nothing.
-    """
+    """What touched the arm along a log."""
     check_finite(motion.log)
     check_length(motion.log.recording)
     seconds = block_length(motion.log.recording.t)
@@ -95,11 +75,7 @@ def list_contacts(
 
 
 def check_finite(run: ModelledRun) -> None:
-    """Raise unless momentum and torque are known at every sample.
-
-    Raises:
-        ParameterError: If they are not.
-    """
+    """Raise unless momentum and torque are known at every sample."""
     known: Mask = np.asarray(np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1))
     if not known.all():
         raise ParameterError(
@@ -109,11 +85,7 @@ def check_finite(run: ModelledRun) -> None:
 
 
 def check_length(recording: Recording) -> None:
-    """Raise unless a log is longer than its observer takes to settle, and fast enough.
-
-    Raises:
-        ParameterError: If it is not.
-    """
+    """Raise unless a log is longer than its observer takes to settle, and fast enough."""
     if recording.median_step * SLOWEST > 1:
         raise ParameterError(
             f"{recording.name} has {1 / recording.median_step:.2g} samples a second; below "
@@ -251,11 +223,6 @@ def lasts(found: Found, span: Run) -> float:
 
 def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict[int, Contact]:
     """Rows of short contacts, from blocks that cut their peaks less.
-
-    Args:
-        free: Motion that nobody touched.
-        brief: Numbers of the contacts that are short.
-        measurer: What measured all of them.
 
     Returns:
         Number → row; nothing where the log has no shorter blocks.

@@ -13,21 +13,15 @@ from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import DRIVES, SmoothedWrench, smooth_wrench
 
+#: Share of the time since the first motion that contacts must fill together to be a load.
 SHARE = 0.5
-"""Share of the time since the first motion that contacts must fill together to be a load."""
-
+#: Several contacts are one load if their forces add up to more than this share of their sizes:
+#: pushes that follow one another come from different sides.
 ALIKE = 0.95
-"""Several contacts are one load if their forces add up to more than this share of their sizes:
-pushes that follow one another come from different sides."""
-
-MOVES = 0.01
-"""A joint that is faster moves. [rad/s]"""
-
+MOVES = 0.01  #: A joint that is faster moves. [rad/s]
+#: The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]
 AROUND = 1.0
-"""The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]"""
-
-PIECE = 5.0
-"""Length of the pieces whose means tell how far the mean may be off. [s]"""
+PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
 
 
 def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:

@@ -30,78 +30,50 @@ from vftcli.virtual_sensor.smoother.noise import (
     steps,
 )
 
-LEAST_STRETCH = 20
-"""Fewest blocks in a row that a spectrum is learned from."""
-
+LEAST_STRETCH = 20  #: Fewest blocks in a row that a spectrum is learned from.
+#: Share of the free part's blocks in which a joint must move for its reversals to be bridged.
 MOVES = 0.3
-"""Share of the free part's blocks in which a joint must move for its reversals to be bridged."""
-
+#: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
 QUANTILES = (0.9, 2.706), (0.97, 4.709)
-"""Shares of the normalised squares ν²/S, and where χ² of one degree has them."""
-
+#: Smallest model error that is inferred where no free motion is known: this share of F_c, and so
+#: much [N·m]; its correlation time is no shorter where it is this error. [s]
 DRY_SHARE, LEAST_ERROR, LEAST_TIME = 0.2, 0.1, 0.3
-"""Smallest model error that is inferred where no free motion is known: this share of F_c, and so
-much [N·m]; its correlation time is no shorter where it is this error. [s]"""
-
+#: Where nothing was learned the quietest 60 % of the blocks in which a joint moves count as
+#: free; 60 % of a normal variable lie within so many standard deviations.
 QUIET, QUIET_SD = 0.6, 0.8416
-"""Where nothing was learned the quietest 60 % of the blocks in which a joint moves count as
-free; 60 % of a normal variable lie within so many standard deviations."""
-
+#: The block in which a joint comes to rest draws b anew: this share is left of what it was.
 STOP_DECAY = float(np.exp(-5.0))
-"""The block in which a joint comes to rest draws b anew: this share is left of what it was."""
-
+#: What a joint has just done: it stops if it moved for more than half of this time before, and for
+#: this time after a start b changes within `START_TIME`. [s]
 RECENT = 0.1
-"""What a joint has just done: it stops if it moved for more than half of this time before, and for
-this time after a start b changes within `START_TIME`. [s]"""
-
-START_TIME = 0.05
-"""Correlation time of b while a joint breaks away. [s]"""
-
+START_TIME = 0.05  #: Correlation time of b while a joint breaks away. [s]
+#: How often a joint's innovation is a spike within so long [s] of its motion, and at rest.
 SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
-"""How often a joint's innovation is a spike within so long [s] of its motion, and at rest."""
-
-UNKNOWN = 1e9
-"""Variance of the white noise of a block that says nothing. [(N·m)²]"""
+UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorNoise:
-    """What motion that nobody touched shows of each joint.
+    """What motion that nobody touched shows of each joint."""
 
-    Attributes:
-        white: R. (n,) [(N·m)²]
-        variance: s². (n,) [(N·m)²]
-        time: T. (n,) [s]
-        dry: F_c. (n,) [N·m]
-        seen: Whether the free part moved the joint: 1 or 0. (n,)
-        free_seconds: Length of the free part. [s]
-    """
-
-    white: Array
-    variance: Array
-    time: Array
-    dry: Array
-    seen: Array
-    free_seconds: float
+    white: Array  #: R. (n,) [(N·m)²]
+    variance: Array  #: s². (n,) [(N·m)²]
+    time: Array  #: T. (n,) [s]
+    dry: Array  #: F_c. (n,) [N·m]
+    seen: Array  #: Whether the free part moved the joint: 1 or 0. (n,)
+    free_seconds: float  #: Length of the free part. [s]
 
     def __post_init__(self) -> None:
         seal(self, "white", "variance", "time", "dry", "seen")
 
 
 class ErrorCourse(NamedTuple):
-    """How b goes from block to block, and the white noise upon it.
+    """How b goes from block to block, and the white noise upon it."""
 
-    Attributes:
-        decay: Share of b that is kept from the block before. (K, n)
-        added: Variance that is added. (K, n) [(N·m)²]
-        white: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
-        spikes: How often an innovation is a spike. (K, n)
-    """
-
-    decay: Array
-    added: Array
-    white: Array
-    spikes: Array
+    decay: Array  #: Share of b that is kept from the block before. (K, n)
+    added: Array  #: Variance that is added. (K, n) [(N·m)²]
+    white: Array  #: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
+    spikes: Array  #: How often an innovation is a spike. (K, n)
 
     def part(self, chosen: slice) -> "ErrorCourse":
         """Some of the blocks."""

@@ -11,40 +11,24 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import LinkPoses, link_poses
 from vftcli.signals.arrays import Array
 
-ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]
-"""A part of the arm."""
-
-POINTS = 10
-"""Points along each link that a force is tried at."""
-
+ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
+POINTS = 10  #: Points along each link that a force is tried at.
+#: The first link that is tried: on link 1 a force loads one joint, as friction does.
 FIRST_LINK = 2
-"""The first link that is tried: on link 1 a force loads one joint, as friction does."""
-
+#: Lever of the moment that a contact's force may have about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
-"""Lever of the moment that a contact's force may have about the flange or a link's middle. [m]"""
-
-FORCE_PRIOR = 100.0
-"""Standard deviation that a force is given beforehand. [N]"""
-
-ALIKE = 4.0
-"""Points whose score is within this of the best one's fit as well."""
-
+FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
+ALIKE = 4.0  #: Points whose score is within this of the best one's fit as well.
+#: χ² of the best point beyond which a contact is more than a force at a point.
 MORE_THAN_A_FORCE = 20.0
-"""χ² of the best point beyond which a contact is more than a force at a point."""
 
 
 class ContactPlace(NamedTuple):
-    """A place whose contact is weighed.
+    """A place whose contact is weighed."""
 
-    Attributes:
-        link: Number of the link; 0 for the flange.
-        lever: Standard deviation of the moment over that of the force. [m]
-        jacobian: J of its point along the log; columns of joints that do not move it are zero.
-            (K, 6, n)
-    """
-
-    link: int
-    lever: float
+    link: int  #: Number of the link; 0 for the flange.
+    lever: float  #: Standard deviation of the moment over that of the force. [m]
+    #: J of its point along the log; columns of joints that do not move it are zero. (K, 6, n)
     jacobian: Array
 
 
@@ -103,23 +87,14 @@ def arm_parts(joints: int) -> dict[int, ArmPart]:
 
 
 class PointFit(NamedTuple):
-    """A force at a point of a link, as it explains a torque.
+    """A force at a point of a link, as it explains a torque."""
 
-    Attributes:
-        link: The link, from 1; the last one's end is the flange.
-        share: Where along the link, from its joint (0) to the next (1).
-        misfit: χ² of the torque that is left.
-        score: χ² and what the size of the force costs.
-        force: The force in base axes. (3,) [N]
-        band: Half width of the 95 % band of its size. [N]
-    """
-
-    link: int
-    share: float
-    misfit: float
-    score: float
-    force: Array
-    band: float
+    link: int  #: The link, from 1; the last one's end is the flange.
+    share: float  #: Where along the link, from its joint (0) to the next (1).
+    misfit: float  #: χ² of the torque that is left.
+    score: float  #: χ² and what the size of the force costs.
+    force: Array  #: The force in base axes. (3,) [N]
+    band: float  #: Half width of the 95 % band of its size. [N]
 
     @property
     def size(self) -> float:

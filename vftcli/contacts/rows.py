@@ -31,73 +31,46 @@ from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.smoother.noise import resting
 from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
 
+#: What the model's own standard deviations of force and moment are multiplied by: the error of the
+#: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
 WIDENED = np.repeat([1.3, 2.0], 3)
-"""What the model's own standard deviations of force and moment are multiplied by: the error of the
-friction is not Gaussian. Chosen on simulated seeds together, for all logs."""
-
-BESIDE = 0.1
-"""A cut this near to a row may have removed a part of it. [s]"""
-
+BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
+#: What the force's own standard deviation is multiplied by where its size is told: peaks are larger
+#: than the mean that it was learned from, and would be drawn to zero.
 LOOSER = 1.5
-"""What the force's own standard deviation is multiplied by where its size is told: peaks are larger
-than the mean that it was learned from, and would be drawn to zero."""
-
+#: Share of its bend that the peak of a contact may hide that is short for the prior of them all.
 BENT_SHORT = 0.4
-"""Share of its bend that the peak of a contact may hide that is short for the prior of them all."""
-
-NORMAL = 1.96
-"""Half width of a 95 % band in standard deviations."""
-
+NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
+#: A contact's wrench changes within this share of its duration, however slow the others are.
 OWN_TIME = 0.5
-"""A contact's wrench changes within this share of its duration, however slow the others are."""
-
+#: The peak of a contact shorter than this [s] is cut by a log of fewer samples a second [Hz]: a
+#: tap's force lasts some 50 ms.
 SHORT, SLOW = 0.25, 95.0
-"""The peak of a contact shorter than this [s] is cut by a log of fewer samples a second [Hz]: a
-tap's force lasts some 50 ms."""
-
+#: A contact's place is told from the blocks in which its force is above this share of the peak,
+#: within so long [s] of it.
 CORE, CORE_TIME = 0.5, 0.1
-"""A contact's place is told from the blocks in which its force is above this share of the peak,
-within so long [s] of it."""
-
-POINT_MOMENT = 1e-3
-"""Standard deviation of the moment about the point of a point force. [N·m]"""
+POINT_MOMENT = 1e-3  #: Standard deviation of the moment about the point of a point force. [N·m]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measurer:
-    """Measures the contacts of one log.
+    """Measures the contacts of one log."""
 
-    Attributes:
-        run: The log with its robot's model.
-        found: The contacts that were kept.
-        log: The log in blocks; joints at rest may settle anew under a contact.
-        prior: How the wrench of the contacts moves.
-        test: How well free motion lets a wrench be told.
-        quiet: Mean and variance of what the model errs by, bridged across the contacts.
-            (K, n) [N·m], (K, n) [(N·m)²]
-        bent: Share of a peak's bend that may be hidden.
-    """
-
-    run: ModelledRun
-    found: Found
-    log: BlockLog
-    prior: ContactPrior
-    test: SelfTest
+    run: ModelledRun  #: The log with its robot's model.
+    found: Found  #: The contacts that were kept.
+    log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
+    prior: ContactPrior  #: How the wrench of the contacts moves.
+    test: SelfTest  #: How well free motion lets a wrench be told.
+    #: Mean and variance of what the model errs by, bridged across the contacts. (K, n) [N·m], (K,
+    #: n) [(N·m)²]
     quiet: tuple[Array, Array]
-    bent: float = BENT
+    bent: float = BENT  #: Share of a peak's bend that may be hidden.
 
     @classmethod
     def of(
         cls, run: ModelledRun, found: Found, free: Untouched, like: "Measurer | None" = None
     ) -> "Measurer":
-        """Learn what the contacts' wrench is like, and how well free motion lets it be told.
-
-        Args:
-            run: The log with its robot's model.
-            found: The contacts.
-            free: Motion that nobody touched, in blocks as long as the log's.
-            like: A measurer of the same log in longer blocks, whose prior and test are taken.
-        """
+        """Learn what the contacts' wrench is like, and how well free motion lets it be told."""
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = gate_of(len(blocks.t), found.runs)
         course = error_course(free.noise, blocks, gate)._replace(white=found.log.course.white)
@@ -144,11 +117,7 @@ class Measurer:
         return [self.site(i, course) for i, course in enumerate(self.courses)]
 
     def rows(self, sites: Sequence["Site"] | None = None) -> tuple[Contact, ...]:
-        """The contacts, in the order of time, numbered.
-
-        Args:
-            sites: Where each is, as longer blocks tell it; None to see.
-        """
+        """The contacts, in the order of time, numbered."""
         runs, priors = self.found.runs, self.priors
         courses, J = list(self.courses), self.found.places[0].jacobian
         sites = [site._replace(jacobian=J) for site in (self.sites if sites is None else sites)]
@@ -266,17 +235,11 @@ def loosened(prior: ContactPrior) -> ContactPrior:
 
 
 class Site(NamedTuple):
-    """Where a contact is, as far as it can be told.
+    """Where a contact is, as far as it can be told."""
 
-    Attributes:
-        fits: Points that fit, the best first.
-        names: Link → part of the arm.
-        jacobian: J of the point whose wrench is measured, along the log. (K, 6, n)
-    """
-
-    fits: list[PointFit]
-    names: dict[int, ArmPart]
-    jacobian: Array
+    fits: list[PointFit]  #: Points that fit, the best first.
+    names: dict[int, ArmPart]  #: Link → part of the arm.
+    jacobian: Array  #: J of the point whose wrench is measured, along the log. (K, 6, n)
 
     @property
     def parts(self) -> list[ArmPart]:

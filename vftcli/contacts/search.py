@@ -17,29 +17,21 @@ from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
 
+#: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
+#: observer's lag is over, friction has turned. [s]
 LASTING = 1.0
-"""A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
-observer's lag is over, friction has turned. [s]"""
 
 
 class Found(NamedTuple):
-    """What may be contacts along a log.
+    """What may be contacts along a log."""
 
-    Attributes:
-        log: The log in blocks, b strict.
-        places: Where a contact may be.
-        runs: Blocks of every candidate, in the order of time.
-        evidence: Of every candidate at every place. (C, places) [nats]
-        beyond: Of every candidate whether a joint's torque is beyond its threshold in it.
-        prior: How the wrench of the candidates moves.
-    """
-
-    log: BlockLog
-    places: list[ContactPlace]
-    runs: list[Run]
-    evidence: Array
+    log: BlockLog  #: The log in blocks, b strict.
+    places: list[ContactPlace]  #: Where a contact may be.
+    runs: list[Run]  #: Blocks of every candidate, in the order of time.
+    evidence: Array  #: Of every candidate at every place. (C, places) [nats]
+    #: Of every candidate whether a joint's torque is beyond its threshold in it.
     beyond: list[bool]
-    prior: ContactPrior
+    prior: ContactPrior  #: How the wrench of the candidates moves.
 
     @property
     def best(self) -> Array:

@@ -24,25 +24,16 @@ from vftcli.contacts.windows import (
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
 
-START = ContactPrior(0.3, 30.0, 3.0)
-"""The prior that learning starts from."""
-
-TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0
-"""Correlation times that are tried. [s]"""
-
-NEAR = 0.4
-"""How far a window reaches beyond its contact where only the prior is learned. [s]"""
-
-FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)
-"""Smallest and largest standard deviation. [N], [N·m]"""
-
+START = ContactPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
+TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
+NEAR = 0.4  #: How far a window reaches beyond its contact where only the prior is learned. [s]
+FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)  #: Smallest and largest standard deviation. [N], [N·m]
+#: A contact is split where the force is below so many standard deviations for so long [s], and
+#: below this share of the peaks on both sides.
 RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
-"""A contact is split where the force is below so many standard deviations for so long [s], and
-below this share of the peaks on both sides."""
-
+#: A contact is split too where the force falls below this share of the peaks on both sides, if
+#: these point so far apart (cosine) and each side lasts so long [s]: one hand follows another.
 HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
-"""A contact is split too where the force falls below this share of the peaks on both sides, if
-these point so far apart (cosine) and each side lasts so long [s]: one hand follows another."""
 
 
 def smooth_contacts(

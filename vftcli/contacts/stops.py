@@ -4,16 +4,13 @@ import numpy as np
 
 from vftcli.signals.recording import Recording
 
-SHORT = 0.3
-"""Longest row that a stop explains. [s]"""
-
+SHORT = 0.3  #: Longest row that a stop explains. [s]
+#: When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
+#: row, which is known to a block. A knock on an arm that stood still is none of this. [s]
 BEFORE, AROUND, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
-"""When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
-row, which is known to a block. A knock on an arm that stood still is none of this. [s]"""
-
+#: A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
+#: speed before, while the arm rings.
 MOVED, RESTS, LEFT = 0.02, 0.02, 0.05
-"""A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
-speed before, while the arm rings."""
 
 
 def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:

@@ -15,20 +15,14 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.contact import ContactInterval
 
-SETTLING = 2.0
-"""Left out at the start of every log: observers rise from zero. [s]"""
-BLOCK = 1.0
-"""Length of the blocks whose maxima are taken. [s]"""
-APART = 0.5
-"""Passages closer than this are one event. [s]"""
-KNOWN = 0.5
-"""A block counts if at least this share of its samples is known."""
-ENOUGH = 5
-"""Maxima beyond the level that tell a tail; below four its interval has no lower end."""
+SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
+BLOCK = 1.0  #: Length of the blocks whose maxima are taken. [s]
+APART = 0.5  #: Passages closer than this are one event. [s]
+KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
+ENOUGH = 5  #: Maxima beyond the level that tell a tail; below four its interval has no lower end.
+#: Readings in a tail: at least so many where there are, more an hour, of so many blocks one.
 LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
-"""Readings in a tail: at least so many where there are, more an hour, of so many blocks one."""
-NORMAL = 1.96
-"""Half width of a normal's 95 % in standard deviations."""
+NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
 
 
 def block_maxima(t: Array, level: Array) -> Array:
@@ -65,28 +59,18 @@ def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
 
 
 class Threshold(NamedTuple):
-    """A level, and how well it is known.
+    """A level, and how well it is known."""
 
-    Attributes:
-        value: The level. [the signal's unit]
-        interval: 95 % of it: where a level of this rate may lie.
-    """
-
-    value: float
-    interval: tuple[float, float]
+    value: float  #: The level. [the signal's unit]
+    interval: tuple[float, float]  #: 95 % of it: where a level of this rate may lie.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tail:
-    """The exponential tail of one signal of one log.
+    """The exponential tail of one signal of one log."""
 
-    Attributes:
-        maxima: The block maxima, largest first. (B,)
-        count: How many of them, k, lie beyond `start`.
-    """
-
-    maxima: Array
-    count: int
+    maxima: Array  #: The block maxima, largest first. (B,)
+    count: int  #: How many of them, k, lie beyond `start`.
 
     def __post_init__(self) -> None:
         seal(self, "maxima")
@@ -119,9 +103,6 @@ class Tail:
 
         Args:
             rate: False alarms. [1/h]
-
-        Raises:
-            ParameterError: If it is so frequent that every block would hold one.
         """
         if rate <= self.rate:
             step = self.excess * float(np.log(self.rate / rate))

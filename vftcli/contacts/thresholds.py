@@ -26,42 +26,30 @@ from vftcli.signals.wrench import AXES, unit_of
 if TYPE_CHECKING:
     import polars as pl
 
+#: A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates.
 DUE = 3.0
-"""A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates."""
-LEAST = 1e-9
-"""What stands for a threshold of zero, so that a level can be told. [N·m, N]"""
+LEAST = 1e-9  #: What stands for a threshold of zero, so that a level can be told. [N·m, N]
+#: A log of this length has enough readings to tell its own tail. [s]
 LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
-"""A log of this length has enough readings to tell its own tail. [s]"""
-SELDOM = 0.5
-"""A wrench that is known in less than this share of the samples is said to be."""
-
-Select = Callable[[ComparedSignals], Array]
-"""A set of signals that share a rate. (T, k)"""
-
+SELDOM = 0.5  #: A wrench that is known in less than this share of the samples is said to be.
+Select = Callable[[ComparedSignals], Array]  #: A set of signals that share a rate. (T, k)
+#: Name of a set → its signals: false alarms are counted over all signals of a set.
 SETS: dict[str, Select] = {
     "joints": lambda signals: signals.torque,
     "axes": lambda signals: signals.wrench,
     "force": lambda signals: signals.force,
 }
-"""Name of a set → its signals: false alarms are counted over all signals of a set."""
 
 
 class SignalThreshold(NamedTuple):
-    """The threshold of one joint, axis or of the force's size.
+    """The threshold of one joint, axis or of the force's size."""
 
-    Attributes:
-        value: The threshold. [N·m, N]
-        interval: 95 % of it.
-        rate: The false alarms that are this signal's share. [1/h]
-        log: The free log that it comes from: the one that needs the highest.
-        tail: That log's tail; None where the log is too short for one, and its largest reading
-            stands higher than what the others' tails say.
-    """
-
-    value: float
-    interval: tuple[float, float]
-    rate: float
-    log: str
+    value: float  #: The threshold. [N·m, N]
+    interval: tuple[float, float]  #: 95 % of it.
+    rate: float  #: The false alarms that are this signal's share. [1/h]
+    log: str  #: The free log that it comes from: the one that needs the highest.
+    #: That log's tail; None where the log is too short for one, and its largest reading stands
+    #: higher than what the others' tails say.
     tail: Tail | None
 
     @property
@@ -83,26 +71,18 @@ class SignalThreshold(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Thresholds(Shown):
-    """Thresholds of an arm.
+    """Thresholds of an arm."""
 
-    Attributes:
-        rate: False alarms of a whole set, as of any joint. [1/h]
-        joints: One a joint. [N·m]
-        axes: One an axis of the wrench, none for an arm of fewer than six joints; one that is wide
-            is none. [N, N·m]
-        force: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
-        of_vendor: Whether the joints' are of the robot's own estimate.
-        logged_wrench: Whether those of axes and force are of the robot's own wrench.
-        remarks: What a reader of the numbers should know.
-    """
-
-    rate: float
-    joints: tuple[SignalThreshold, ...]
+    rate: float  #: False alarms of a whole set, as of any joint. [1/h]
+    joints: tuple[SignalThreshold, ...]  #: One a joint. [N·m]
+    #: One an axis of the wrench, none for an arm of fewer than six joints; one that is wide is
+    #: none. [N, N·m]
     axes: tuple[SignalThreshold, ...]
+    #: That of the force's size, or none; its rate is `rate` itself; as of an axis. [N]
     force: tuple[SignalThreshold, ...]
-    of_vendor: bool
-    logged_wrench: bool
-    remarks: tuple[Remark, ...] = ()
+    of_vendor: bool  #: Whether the joints' are of the robot's own estimate.
+    logged_wrench: bool  #: Whether those of axes and force are of the robot's own wrench.
+    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def _headline(self) -> str:
         values = joined(one.value for one in self.joints)
@@ -141,12 +121,7 @@ class Thresholds(Shown):
         )
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
-        """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)
-
-        Args:
-            name: A key of `SETS`.
-            signals: A log.
-        """
+        """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)"""
         values = [one.value if name == "joints" else level_of(one) for one in getattr(self, name)]
         if not values:
             return np.zeros((len(signals.t), 0))
@@ -172,10 +147,6 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     Args:
         free: Logs of one arm that nobody touched.
         rate: False alarms of all joints together; of all axes likewise. [1/h]
-
-    Raises:
-        ParameterError: If the rate is no positive number, the logs are of different kinds, or all
-            are too short.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")
@@ -280,23 +251,14 @@ def known_share(signals: ComparedSignals) -> float:
 
 
 class CountedAlarms(NamedTuple):
-    """False alarms of one free log, at thresholds learned without it.
+    """False alarms of one free log, at thresholds learned without it."""
 
-    Attributes:
-        log: The log.
-        hours: Its length without the settling. [h]
-        due: The false alarms of any joint that the rate allows in that time.
-        joints: Those of every joint alone.
-        any_joint: Those of all joints together.
-        any_axis: Those of all axes together.
-    """
-
-    log: str
-    hours: float
-    due: float
-    joints: tuple[int, ...]
-    any_joint: int
-    any_axis: int
+    log: str  #: The log.
+    hours: float  #: Its length without the settling. [h]
+    due: float  #: The false alarms of any joint that the rate allows in that time.
+    joints: tuple[int, ...]  #: Those of every joint alone.
+    any_joint: int  #: Those of all joints together.
+    any_axis: int  #: Those of all axes together.
 
 
 def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:

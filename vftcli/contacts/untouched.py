@@ -39,63 +39,42 @@ from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.series import median_step
 
+#: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
-"""Length of a block [s]; on a clock whose steps differ by this share it holds so many samples."""
-
-GAIN = 30.0
-"""Gain of the momentum observer that a threshold is laid on. [1/s]"""
-
-SETTLED = 0.3
-"""Start of a log that the observer is left. [s]"""
-
+GAIN = 30.0  #: Gain of the momentum observer that a threshold is laid on. [1/s]
+SETTLED = 0.3  #: Start of a log that the observer is left. [s]
+#: Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from.
 MOVING, LEAST_MOVING = 0.01, 50
-"""Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from."""
-
+#: Within so long of a rest a joint's torque may be `NEAR_REST_SHARE` of its dry friction. [s]
 NEAR_REST = 0.3
-"""Within so long of a rest a joint's torque may be `NEAR_REST_SHARE` of its dry friction. [s]"""
-
+#: What tells a contact from an error of the model: motion that is known to be free; the samples
+#: that the fit of the whole log calls free; the drives' dry friction; or nothing.
 Basis = Literal["free motion", "whole log", "friction", "none"]
-"""What tells a contact from an error of the model: motion that is known to be free; the samples
-that the fit of the whole log calls free; the drives' dry friction; or nothing."""
-
+#: What the fit of the whole log says of one that is too short for it.
 SHORT_LOG = {"whole-log-too-short", "whole-log-friction-unclear"}
-"""What the fit of the whole log says of one that is too short for it."""
-
+#: Fewest whole cycles of which free ones can be found: one alone cannot be compared.
 LEAST_CYCLES = 2
-"""Fewest whole cycles of which free ones can be found: one alone cannot be compared."""
-
+#: Length of the contacts that are made up in free motion [s], and how many at most.
 PSEUDO, MOST_PSEUDO = 0.6, 48
-"""Length of the contacts that are made up in free motion [s], and how many at most."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Untouched:
-    """Motion that nobody touched, as a list of contacts needs it.
+    """Motion that nobody touched, as a list of contacts needs it."""
 
-    Attributes:
-        basis: What tells a contact from an error of the model.
-        noise: Noise and model error.
-        level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
-        own: Samples of the log itself that are known to be free. (T,)
-        log: The log, less a load that the free part carries; less the model error of the whole log
-            where the basis is that.
-        runs: Free runs in other logs, less a load that they carry.
-        free: Every free piece, less a load that it carries.
-        pieces: The same in blocks.
-        load: A load that the arm carries in this log and its model lacks, None where none shows.
-        remarks: What it is and how it was found, and a load that it carries.
-    """
-
-    basis: Basis = "free motion"
-    noise: ErrorNoise
-    level: Array
-    own: Mask
+    basis: Basis = "free motion"  #: What tells a contact from an error of the model.
+    noise: ErrorNoise  #: Noise and model error.
+    level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
+    own: Mask  #: Samples of the log itself that are known to be free. (T,)
+    #: The log, less a load that the free part carries; less the model error of the whole log where
+    #: the basis is that.
     log: ModelledRun
-    runs: tuple[ModelledRun, ...]
-    free: tuple[FreePiece, ...]
-    pieces: tuple[Blocks, ...]
+    runs: tuple[ModelledRun, ...]  #: Free runs in other logs, less a load that they carry.
+    free: tuple[FreePiece, ...]  #: Every free piece, less a load that it carries.
+    pieces: tuple[Blocks, ...]  #: The same in blocks.
+    #: A load that the arm carries in this log and its model lacks, None where none shows.
     load: FreeLoad | None
-    remarks: tuple[Remark, ...]
+    remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
 
     def in_blocks(self, seconds: float) -> "Untouched | None":
         """The same in blocks of another length [s], None where no stretch holds enough of them."""
@@ -119,10 +98,6 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     Args:
         motion: The log and what the user says is free.
         seconds: Length of a block. [s]
-
-    Raises:
-        ReferenceTorqueError: If what the user names does not exist.
-        ParameterError: If a given span holds no samples, or the whole log.
     """
     part = free_part(motion)
     if part is None:
@@ -213,10 +188,6 @@ def free_part(motion: FreeMotion) -> FreePart | None:
     """What is free of contact, None where nothing is known to be.
 
     Where in a free run or cycle the log's own motion lies does not matter here: nothing is paired.
-
-    Raises:
-        ReferenceTorqueError: If what the user names does not exist.
-        ParameterError: If a given span holds no samples, or the whole log.
     """
     own, log, choice = motion.within_spans, motion.log, motion.choice
     remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
@@ -306,15 +277,11 @@ def expected_torque(run: ModelledRun, level: Array | None) -> Array:
 
 
 class SelfTest(NamedTuple):
-    """What the smoother reads in free motion where it is told of contacts that are none.
+    """What the smoother reads in free motion where it is told of contacts that are none."""
 
-    Attributes:
-        widening: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
-        smallest_force: |F| that 95 % of the blocks stay below. [N]
-    """
-
+    #: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
     widening: Array
-    smallest_force: float
+    smallest_force: float  #: |F| that 95 % of the blocks stay below. [N]
 
 
 def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:

@@ -16,42 +16,25 @@ from vftcli.signals.linear_model import (
 )
 from vftcli.virtual_sensor.smoother.noise import steps
 
-MARGIN = 1.0
-"""How far a window reaches beyond its contacts on either side. [s]"""
-
-MOST_LANES = 96
-"""Lanes that are worked on at once."""
-
-Run = tuple[int, int]
-"""Number of the first block, and of the one behind the last."""
+MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
+MOST_LANES = 96  #: Lanes that are worked on at once.
+Run = tuple[int, int]  #: Number of the first block, and of the one behind the last.
 
 
 class ContactPrior(NamedTuple):
-    """An Ornstein–Uhlenbeck prior of a contact's wrench in base axes.
+    """An Ornstein–Uhlenbeck prior of a contact's wrench in base axes."""
 
-    Attributes:
-        time: Correlation time τ_w. [s]
-        force: Standard deviation σ_f of each component of the force. [N]
-        moment: That of the moment, σ_m. [N·m]
-    """
-
-    time: float
-    force: float
-    moment: float
+    time: float  #: Correlation time τ_w. [s]
+    force: float  #: Standard deviation σ_f of each component of the force. [N]
+    moment: float  #: That of the moment, σ_m. [N·m]
 
 
 class BlockLog(NamedTuple):
-    """A log in blocks, with what its model errs by.
+    """A log in blocks, with what its model errs by."""
 
-    Attributes:
-        blocks: The blocks.
-        course: How b goes along them.
-        step: Time from the block before. (K,) [s]
-    """
-
-    blocks: Blocks
-    course: ErrorCourse
-    step: Array
+    blocks: Blocks  #: The blocks.
+    course: ErrorCourse  #: How b goes along them.
+    step: Array  #: Time from the block before. (K,) [s]
 
     @classmethod
     def of(cls, blocks: Blocks, course: ErrorCourse) -> "BlockLog":
@@ -60,21 +43,13 @@ class BlockLog(NamedTuple):
 
 
 class Lane(NamedTuple):
-    """One hypothesis on one window.
+    """One hypothesis on one window."""
 
-    Attributes:
-        window: Which blocks.
-        gate: Blocks of the log in which the wrench may differ from zero. (K,)
-        hidden: Blocks of the log that say nothing. (K,)
-        jacobian: J along the log. (K, 6, n)
-        prior: How the wrench may move; None where nothing touches.
-    """
-
-    window: Run
-    gate: Mask
-    hidden: Mask
-    jacobian: Array
-    prior: ContactPrior | None
+    window: Run  #: Which blocks.
+    gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
+    hidden: Mask  #: Blocks of the log that say nothing. (K,)
+    jacobian: Array  #: J along the log. (K, 6, n)
+    prior: ContactPrior | None  #: How the wrench may move; None where nothing touches.
 
 
 def window_of(t: Array, run: Run, margin: float = MARGIN) -> Run:
@@ -155,17 +130,11 @@ def likelihoods(log: BlockLog, lanes: Sequence[Lane]) -> Array:
 
 
 class WindowWrench(NamedTuple):
-    """The wrench in one window, zero with certainty outside its gate.
+    """The wrench in one window, zero with certainty outside its gate."""
 
-    Attributes:
-        first: Number of the window's first block.
-        values: Force and moment in base axes. (k, 6) [N, N·m]
-        covariance: (k, 6, 6)
-    """
-
-    first: int
-    values: Array
-    covariance: Array
+    first: int  #: Number of the window's first block.
+    values: Array  #: Force and moment in base axes. (k, 6) [N, N·m]
+    covariance: Array  #: (k, 6, 6)
 
     def within(self, run: Run) -> "WindowWrench":
         """The wrench in some of its blocks."""

@@ -29,51 +29,34 @@ from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
+#: Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
+#:
+#: Load and contact are left out of it, and a log in which gravity hardly varies is not judged.
 NO_FIT = 0.35
-"""Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
-
-Load and contact are left out of it, and a log in which gravity hardly varies is not judged.
-"""
-DOUBTFUL = 0.15
-"""Misfit from which other arms are compared."""
-ANOTHER = 0.6
-"""Share of the misfit that another profile may leave to be the log's own."""
-GENERATION = 1.5
-"""A load from which another generation of the arm is looked at first. [kg]"""
-MISTAKEN = 0.1
-"""Misfit up to which a cause is believed where nobody said which arm it is."""
+DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
+ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.
+GENERATION = 1.5  #: A load from which another generation of the arm is looked at first. [kg]
+MISTAKEN = 0.1  #: Misfit up to which a cause is believed where nobody said which arm it is.
+#: Share of what one sign leaves that the other may leave at most to be the right one.
 CLEARLY = 0.6
-"""Share of what one sign leaves that the other may leave at most to be the right one."""
-FELT = 0.02
-"""Size of the vendor's torque, relative to the effort, from which it tells its sign."""
+FELT = 0.02  #: Size of the vendor's torque, relative to the effort, from which it tells its sign.
 
 
 class ArmFindings(NamedTuple):
-    """What the model says of a log.
+    """What the model says of a log."""
 
-    Attributes:
-        findings: The remarks.
-        robots: The arms that were compared, best fit first.
-    """
-
-    findings: tuple[Remark, ...]
-    robots: tuple[RobotMatch, ...]
+    findings: tuple[Remark, ...]  #: The remarks.
+    robots: tuple[RobotMatch, ...]  #: The arms that were compared, best fit first.
 
 
+#: Findings after which a joint's effort is no evidence.
 EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
-"""Findings after which a joint's effort is no evidence."""
 
 
 def arm_findings(
     recording: Recording, robot: Robot | None, known: Iterable[Remark] = ()
 ) -> ArmFindings:
-    """Hold a log against its arm, or against the profiles where nobody says which it is.
-
-    Args:
-        recording: The log.
-        robot: The arm that the user names, or None.
-        known: What the signals themselves say: it is not said again as something else.
-    """
+    """Hold a log against its arm, or against the profiles where nobody says which it is."""
     known = tuple(known)
     if MISTIMED & {finding.code for finding in known} and recording.dq is not None:
         # From the positions, so that the velocity hides nothing else.

@@ -9,40 +9,28 @@ from vftcli.doctor.robust import RobustFit, Terms, solve, terms
 from vftcli.doctor.windows import Windows
 from vftcli.signals.arrays import Array
 
-MAX_MASS, MAX_ARM = 12.0, 0.35
-"""Loads beyond these are no loads but another arm. [kg, m]"""
-TELLING = 0.9
-"""Share of the misfit that a load must leave at most, or it only adds freedom."""
+MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
+TELLING = 0.9  #: Share of the misfit that a load must leave at most, or it only adds freedom.
+#: Range of gravity's torque, relative to the effort, from which the poses tell a load.
 VARIED = 0.3
-"""Range of gravity's torque, relative to the effort, from which the poses tell a load."""
+#: A cause shows in a window where it makes this many times what the fit leaves over; it is refuted
+#: there where the log without it leaves less than this share of what is left with it.
 FELT, REFUTED = 4.0, 0.6
-"""A cause shows in a window where it makes this many times what the fit leaves over; it is refuted
-there where the log without it leaves less than this share of what is left with it."""
-LASTING = 0.95
-"""Share of the windows in which a cause that lasts must not be refuted."""
-UPRIGHT = np.array([0.0, 0.0, 1.0])
-"""The robot file's own "up"."""
+LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
+UPRIGHT = np.array([0.0, 0.0, 1.0])  #: The robot file's own "up".
 
 
 @dataclass(frozen=True, kw_only=True)
 class Case:
-    """A log against an arm.
+    """A log against an arm."""
 
-    Attributes:
-        windows: What the arm's model says.
-        given: Mean of the effort, as torque, over each window. (W, n) [N·m]
-        size: Root mean square of the column that was logged. [N·m]
-        constant: Torque per unit of the column that was logged, joint by joint. (n,)
-        up: Where "up" is, in axes whose third is the robot file's own. (3,)
-        rubs: Whether friction is in the effort; a maker's rigid-body model has none.
-    """
-
-    windows: Windows
-    given: Array
-    size: float
-    constant: Array
+    windows: Windows  #: What the arm's model says.
+    given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
+    size: float  #: Root mean square of the column that was logged. [N·m]
+    constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
+    #: Where "up" is, in axes whose third is the robot file's own. (3,)
     up: Array = field(default_factory=lambda: UPRIGHT)
-    rubs: bool = True
+    rubs: bool = True  #: Whether friction is in the effort; a maker's rigid-body model has none.
 
     @cached_property
     def needed(self) -> Array:

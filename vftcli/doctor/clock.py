@@ -9,29 +9,18 @@ from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
-SLOW_RATE = 50.0
-"""Below this rate a contact of a tenth of a second is a handful of samples. [Hz]"""
+SLOW_RATE = 50.0  #: Below this rate a contact of a tenth of a second is a handful of samples. [Hz]
+#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
 JITTER = 0.05
-"""Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong."""
-GAP_STEPS = 4.0
-"""A step this many times the median is a gap."""
-LONG_GAP = 0.1
-"""A gap longer than this can hide a whole contact. [s]"""
-MISSED = (1.6, 3.4)
-"""Steps this many times the median are one or two samples that were missed."""
-SHORT = 2.0
-"""A log shorter than this tells little of noise and nothing of repeated motion. [s]"""
-STALE = 0.003
-"""Share of rows that repeat the one before, from which it is worth telling."""
+GAP_STEPS = 4.0  #: A step this many times the median is a gap.
+LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
+MISSED = (1.6, 3.4)  #: Steps this many times the median are one or two samples that were missed.
+SHORT = 2.0  #: A log shorter than this tells little of noise and nothing of repeated motion. [s]
+STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
 
 
 def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """Findings about the clock, each check independent of the others.
-
-    Args:
-        recording: The log.
-        fit: Its velocities beside its positions: they tell the clock's rate and unit.
-    """
+    """Findings about the clock, each check independent of the others."""
     factor = common_factor(fit) if fit is not None else None
     if factor is not None and (unit := time_unit(factor)):
         # What else is odd about its steps is this.

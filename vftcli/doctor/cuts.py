@@ -22,69 +22,50 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.source import Cut
 
+#: Times its largest torque that no drive gives: the slack is that of drive constants. [1]
 BEYOND = 1.5
-"""Times its largest torque that no drive gives: the slack is that of drive constants. [1]"""
+#: A sample that differs from its neighbours by this share of the joint's largest torque, and by so
+#: many robust deviations of their noise, is none of the arm's. [1, -]
 AWAY, FAR = 0.5, 25.0
-"""A sample that differs from its neighbours by this share of the joint's largest torque, and by so
-many robust deviations of their noise, is none of the arm's. [1, -]"""
-FAST = 0.25
-"""The same for velocities: share of the joint's largest speed. [1]"""
+FAST = 0.25  #: The same for velocities: share of the joint's largest speed. [1]
+#: Such samples come at most so many in a row, within so long; more may be a blow. [-, s]
 FEW, BRIEF = 3, 0.03
-"""Such samples come at most so many in a row, within so long; more may be a blow. [-, s]"""
+#: Bend of a joint's speed across such samples that shows a blow: the arm felt it. [rad/s]
 BLOW = 0.05
-"""Bend of a joint's speed across such samples that shows a blow: the arm felt it. [rad/s]"""
+#: Share of a joint's largest torque from which its effort does not jump to exactly 0. [1]
 ZERO = 0.05
-"""Share of a joint's largest torque from which its effort does not jump to exactly 0. [1]"""
-SLIPPED = 5e-3
-"""Change of position beyond what the velocities say that is a jump. [rad]"""
+SLIPPED = 5e-3  #: Change of position beyond what the velocities say that is a jump. [rad]
+#: A jump by whole turns, up to so many, within this much: a count began anew. [rad, -, rad]
 TURN, TURNS, NEAR = 2 * np.pi, 3, 0.1
-"""A jump by whole turns, up to so many, within this much: a count began anew. [rad, -, rad]"""
+#: A stamp may be off by so much: a sample that a recorder lost or held back is no jump. [s]
 LATE = 0.01
-"""A stamp may be off by so much: a sample that a recorder lost or held back is no jump. [s]"""
-APART = 0.25
-"""Time that is cut on both sides of where two recordings meet. [s]"""
+APART = 0.25  #: Time that is cut on both sides of where two recordings meet. [s]
+#: Time for which rows that all repeat one another are no late packets, and how many times as many
+#: rows they are as the log's usual repeats. [s, -]
 FROZEN, UNUSUAL = 0.25, 10
-"""Time for which rows that all repeat one another are no late packets, and how many times as many
-rows they are as the log's usual repeats. [s, -]"""
-MOVES = 1e-2
-"""Speed at which an arm surely moves. [rad/s]"""
-GAP_STEPS = 4.0
-"""A step of more than this many usual ones is a gap: what lies in it is not known."""
+MOVES = 1e-2  #: Speed at which an arm surely moves. [rad/s]
+GAP_STEPS = 4.0  #: A step of more than this many usual ones is a gap: what lies in it is not known.
+#: Share of gravity's torque that the drives of an arm on its brakes carry at most, and that they
+#: carry at least without. [1]
 LET_GO, HELD = 0.2, 0.5
-"""Share of gravity's torque that the drives of an arm on its brakes carry at most, and that they
-carry at least without. [1]"""
+#: Windows in which that is weighed, and gravity's torque from which on it can be. [s, N·m]
 WEIGHED, HEAVY = 0.5, 10.0
-"""Windows in which that is weighed, and gravity's torque from which on it can be. [s, N·m]"""
+#: Share of a log from which on bad samples, and bad spans, are what the log is like. [1]
 SHARE, MOST = 0.05, 0.5
-"""Share of a log from which on bad samples, and bad spans, are what the log is like. [1]"""
 
 
 class Bad(NamedTuple):
-    """What one rule finds.
+    """What one rule finds."""
 
-    Attributes:
-        code: The finding.
-        samples: The samples, joint by joint. (T, n)
-        sizes: By how much, in the unit of the finding's words; None where it has none. (T, n)
-        most: Share of the log that may be cut for it. [1]
-    """
-
-    code: str
-    samples: Mask
+    code: str  #: The finding.
+    samples: Mask  #: The samples, joint by joint. (T, n)
+    #: By how much, in the unit of the finding's words; None where it has none. (T, n)
     sizes: Array | None = None
-    most: float = SHARE
+    most: float = SHARE  #: Share of the log that may be cut for it. [1]
 
 
 def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
-    """The recording less what no arm can have made; the log itself where it holds none of it.
-
-    Args:
-        recording: The log, its joints those of the robot.
-        robot: The arm, of which the rules take their limits.
-
-    Raises:
-        ExaminationError: While a log goes by block by block, if a block would have to be cut.
-    """
+    """The recording less what no arm can have made; the log itself where it holds none of it."""
     if recording.joints != robot.joints or recording.dq is None or recording.samples < 20:
         return recording
     log = without_turns(recording)
@@ -102,11 +83,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
 
 
 def sound_block(block: Recording, robot: Robot) -> Recording:
-    """A block of a long log as it is.
-
-    Raises:
-        ExaminationError: If samples would have to be cut out of it: its clock is known already.
-    """
+    """A block of a long log as it is."""
     sound = without_bad_samples(block, robot)
     if sound is block:
         return block
@@ -257,17 +234,11 @@ def frozen_rows(recording: Recording) -> Mask:
 
 
 class Slips(NamedTuple):
-    """Changes of position beyond what the velocities say.
+    """Changes of position beyond what the velocities say."""
 
-    Attributes:
-        steps: The steps at which one may be a jump, by the sample before. (K,)
-        sizes: How large they are. (K, n) [rad]
-        jumps: Which are jumps. (K, n)
-    """
-
-    steps: Indices
-    sizes: Array
-    jumps: Mask
+    steps: Indices  #: The steps at which one may be a jump, by the sample before. (K,)
+    sizes: Array  #: How large they are. (K, n) [rad]
+    jumps: Mask  #: Which are jumps. (K, n)
 
 
 def slips_of(recording: Recording) -> Slips:

@@ -12,36 +12,23 @@ import numpy as np
 from vftcli.doctor.case import Case
 from vftcli.doctor.robust import RobustFit, solve, terms
 
+#: Deviation of a factor from 1 that is named; sound logs, real and simulated, stay within .06.
 OFF = 0.08
-"""Deviation of a factor from 1 that is named; sound logs, real and simulated, stay within .06."""
-ALONE = 0.1
-"""The same of one joint, which a load or a wrong forearm moves as well."""
-OTHERS = 0.05
-"""By which the factors of the other joints may be off for one to be the cause."""
-LEAST, MOST = 0.6, 1.7
-"""Factors beyond these are of another unit or of another arm."""
-SURE = 4.0
-"""Standard deviations that a factor has to be off beyond that."""
-KNOWN = 0.05
-"""Standard deviation of a factor that the motion determines."""
-CLEARER = 1.5
-"""How much better than a load a factor must explain a log that some load explains."""
+ALONE = 0.1  #: The same of one joint, which a load or a wrong forearm moves as well.
+OTHERS = 0.05  #: By which the factors of the other joints may be off for one to be the cause.
+LEAST, MOST = 0.6, 1.7  #: Factors beyond these are of another unit or of another arm.
+SURE = 4.0  #: Standard deviations that a factor has to be off beyond that.
+KNOWN = 0.05  #: Standard deviation of a factor that the motion determines.
+CLEARER = 1.5  #: How much better than a load a factor must explain a log that some load explains.
 
 
 class DriveScale(NamedTuple):
-    """A factor that an effort has.
+    """A factor that an effort has."""
 
-    Attributes:
-        joints: The joints that have it, from zero.
-        factor: It: .8 where 80 % of the torque is logged.
-        sd: Its standard deviation.
-        healed: The log with it put right.
-    """
-
-    joints: tuple[int, ...]
-    factor: float
-    sd: float
-    healed: Case
+    joints: tuple[int, ...]  #: The joints that have it, from zero.
+    factor: float  #: It: .8 where 80 % of the torque is logged.
+    sd: float  #: Its standard deviation.
+    healed: Case  #: The log with it put right.
 
 
 def scales(case: Case) -> list[DriveScale]:

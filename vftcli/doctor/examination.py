@@ -17,9 +17,9 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import Shown
 
+#: Findings that an arm's model is another's: what identification is for.
 NO_FIT = frozenset({"other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest"})
-"""Findings that an arm's model is another's: what identification is for."""
-
+#: Findings that make every result meaningless. A load or a contact is never one of them.
 REFUSING = NO_FIT | {
     "effort-sign", "effort-sign-by-work", "joint-sign", "effort-order", "joint-order",
     "torque-without-gravity", "torque-with-gravity", "current-without-gravity",
@@ -28,32 +28,22 @@ REFUSING = NO_FIT | {
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
-"""Findings that make every result meaningless. A load or a contact is never one of them."""
-
-
+#: Findings that an effort is something else, by which its size is explained.
 READINGS = frozenset({
     "current-as-torque", "current-as-turned-torque", "torque-without-gravity",
     "torque-as-current", "torque-as-turned-current", "milliamperes", "effort-sign",
 })  # fmt: skip
-"""Findings that an effort is something else, by which its size is explained."""
-
+#: Findings that every command says: nothing is wrong, and results stand on what is assumed.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
-"""Findings that every command says: nothing is wrong, and results stand on what is assumed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Examination(Shown):
-    """What the doctor found.
+    """What the doctor found."""
 
-    Attributes:
-        recording: The log.
-        findings: Warnings before notes.
-        robots: The arms that were compared with the log, best fit first.
-    """
-
-    recording: Recording
-    findings: tuple[Remark, ...]
-    robots: tuple[RobotMatch, ...]
+    recording: Recording  #: The log.
+    findings: tuple[Remark, ...]  #: Warnings before notes.
+    robots: tuple[RobotMatch, ...]  #: The arms that were compared with the log, best fit first.
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
         """The findings with which no result means anything.

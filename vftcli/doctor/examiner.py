@@ -18,24 +18,20 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 
+#: Signals that nothing but an examination looks at; temperatures where no friction follows them.
 ONLY_EXAMINED = frozenset(
     ("target_q", "target_dq", "target_current", "target_torque", "temperature")
 )
-"""Signals that nothing but an examination looks at; temperatures where no friction follows them."""
 
 
 class Correction(NamedTuple):
-    """What puts an effort right that is not what it is called.
+    """What puts an effort right that is not what it is called."""
 
-    Attributes:
-        kind: What it is, one of `vftcli.signals.recording.EFFORTS`; "" for what it is called.
-        factor: What its values are multiplied with.
-    """
-
-    kind: str
-    factor: float = 1.0
+    kind: str  #: What it is, one of `vftcli.signals.recording.EFFORTS`; "" for what it is called.
+    factor: float = 1.0  #: What its values are multiplied with.
 
 
+#: Finding that an effort is something else → what puts it right.
 CORRECTIONS = {
     "current-as-torque": Correction("torque"),
     "current-as-turned-torque": Correction("torque", -1.0),
@@ -46,7 +42,6 @@ CORRECTIONS = {
     "milliamperes": Correction("current", 1e-3),
     "effort-sign": Correction("", -1.0),
 }
-"""Finding that an effort is something else → what puts it right."""
 
 
 class Examiner:
@@ -135,11 +130,7 @@ class Examiner:
 
 
 def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
-    """The profile that the maker's own model in a log tells, and on what grounds.
-
-    Raises:
-        RobotError: If the log does not settle it.
-    """
+    """The profile that the maker's own model in a log tells, and on what grounds."""
     found, fits = guess_robot(recording)
     if found is None:
         ranked = f": {'; '.join(map(str, fits))}" if fits else ""
@@ -153,15 +144,7 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
 
 
 def refuse(name: str, findings: Iterable[Remark]) -> None:
-    """Raise an error that says the first of some findings with its remedy, if there is one.
-
-    Args:
-        name: The log's.
-        findings: Those that make every result meaningless.
-
-    Raises:
-        ExaminationError: If there is one.
-    """
+    """Raise an error that says the first of some findings with its remedy, if there is one."""
     found = [in_words(finding) for finding in findings]
     if not found:
         return

@@ -7,21 +7,13 @@ from vftcli.signals.remarks import Remark, Where, as_record, filled, sentence, w
 
 
 class FindingWords(NamedTuple):
-    """What a finding says.
+    """What a finding says."""
 
-    Attributes:
-        name: Short name; variants of one finding share it.
-        severity: A note informs; a warning can make results wrong and fails ``--strict``.
-        evidence: What was seen, with numbers.
-        consequence: What it does to the results.
-        remedy: What to do about it.
-    """
-
-    name: str
-    severity: str
-    evidence: str
-    consequence: str
-    remedy: str
+    name: str  #: Short name; variants of one finding share it.
+    severity: str  #: A note informs; a warning can make results wrong and fails ``--strict``.
+    evidence: str  #: What was seen, with numbers.
+    consequence: str  #: What it does to the results.
+    remedy: str  #: What to do about it.
 
     def __str__(self) -> str:
         """The finding on one line."""

@@ -20,46 +20,35 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 
-CLOSE = 1.3
-"""Profiles whose misfits differ by less than this factor are not told apart."""
+CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not told apart.
+#: Misfit up to which a profile fits: the maker's own model, and a measured effort.
+#:
+#: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
-"""Misfit up to which a profile fits: the maker's own model, and a measured effort.
-
-Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
-"""
+#: Misfit to the maker's own model up to which a profile is taken, and how much worse the next is.
+#:
+#: UR10e logs fit their own profile to .1–.26 % and the next 30 times worse; FR3 and Panda are 2
+#: apart.
 GUESSED, APART = 0.012, 5.0
-"""Misfit to the maker's own model up to which a profile is taken, and how much worse the next is.
-
-UR10e logs fit their own profile to .1–.26 % and the next 30 times worse; FR3 and Panda are 2 apart.
-"""
-HEAVY = 5.0
-"""A load from which a measured effort rather is another arm's. [kg]"""
+HEAVY = 5.0  #: A load from which a measured effort rather is another arm's. [kg]
+#: Torques that a model should explain, the most telling first.
 MAKER, RESIDUAL, MEASURED = (
     "the controller's own model",
     "torque less the vendor's residual",
     "measured effort",
 )
-"""Torques that a model should explain, the most telling first."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotMatch:
-    """How well a profile explains a log.
+    """How well a profile explains a log."""
 
-    Attributes:
-        robot: The profile's name.
-        misfit: What it cannot explain, relative to the torques; 0 is perfect.
-        fits: Whether that is as good as the kind of evidence allows.
-        evidence: Which torque was explained, in words.
-        load: Mass of the unknown load that was fitted, 0 if none. [kg]
-        by_maker: Whether the maker's own model was explained rather than a measured effort.
-    """
-
-    robot: str
-    misfit: float
-    fits: bool
-    evidence: str
-    load: float
+    robot: str  #: The profile's name.
+    misfit: float  #: What it cannot explain, relative to the torques; 0 is perfect.
+    fits: bool  #: Whether that is as good as the kind of evidence allows.
+    evidence: str  #: Which torque was explained, in words.
+    load: float  #: Mass of the unknown load that was fitted, 0 if none. [kg]
+    #: Whether the maker's own model was explained rather than a measured effort.
     by_maker: bool = False
 
     def __str__(self) -> str:
@@ -88,12 +77,7 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
 
 
 def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[RobotMatch, ...]:
-    """Robots with as many joints as the log, best fit first.
-
-    Args:
-        recording: The log; it needs velocities.
-        robots: Robots by name.
-    """
+    """Robots with as many joints as the log, best fit first."""
     if not is_judgeable(recording):
         return ()
     fits = []

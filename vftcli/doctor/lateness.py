@@ -24,56 +24,41 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.series import median_step
 
-WINDOW = 0.15
-"""Length of a window; each begins in the middle of the one before. [s]"""
+WINDOW = 0.15  #: Length of a window; each begins in the middle of the one before. [s]
+#: Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s
+#: of its motion, of which no push is the most.
 WINDOWS, BLOCK, LEAST = 320, 16, 60
-"""Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s
-of its motion, of which no push is the most."""
-INSIDE = 12
-"""Instants of a window at which the model is computed."""
-EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01
-"""Lags that are tried, and how far apart they are. [s]"""
-SLOW = 0.01
-"""Speed at which dry friction has its direction. [rad/s]"""
-MOVES = 0.02
-"""Speed of a window from which it tells a lag. [rad/s]"""
-KEPT = 0.8
-"""Share of the differences that a fit is judged by: the rest may be contact."""
+INSIDE = 12  #: Instants of a window at which the model is computed.
+EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01  #: Lags that are tried, and how far apart they are. [s]
+SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
+MOVES = 0.02  #: Speed of a window from which it tells a lag. [rad/s]
+KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be contact.
+#: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
-"""Growths of a lag that are tried, from one end of what is looked at to the other. [s]"""
-COARSE = 3
-"""One in so many lags tells whether any growth is worth a closer look."""
-LONG = 60.0
-"""What is looked at of a long log: a clock that is .5 % off loses 300 ms in it. [s]"""
+COARSE = 3  #: One in so many lags tells whether any growth is worth a closer look.
+LONG = 60.0  #: What is looked at of a long log: a clock that is .5 % off loses 300 ms in it. [s]
+#: How much better a lag that grows explains the joints than a steady one; 1.00 on sound logs.
 STEADY = 1.1
-"""How much better a lag that grows explains the joints than a steady one; 1.00 on sound logs."""
-LEAST_RATE = 30.0
-"""Sample rate below which no lag of that size can be told. [Hz]"""
+LEAST_RATE = 30.0  #: Sample rate below which no lag of that size can be told. [Hz]
+#: Lag that is told. Friction that builds up behind a turn looks like 20 ms on real logs, and a
+#: simulation whose torque belongs to the step before like 30. [s]
 LATE = 0.035
-"""Lag that is told. Friction that builds up behind a turn looks like 20 ms on real logs, and a
-simulation whose torque belongs to the step before like 30. [s]"""
-BETTER = 1.45
-"""How much better a lag explains the joints, in the mean."""
+BETTER = 1.45  #: How much better a lag explains the joints, in the mean.
+#: Share and number of the joints whose own best lag is nearer to it than this share of it; half of
+#: the arm's have to tell one.
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
-"""Share and number of the joints whose own best lag is nearer to it than this share of it; half of
-the arm's have to tell one."""
+#: Findings that the logged velocity is another motion's.
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
     | {"velocity-of-another-kind", "velocity-order", "velocity-lag", "velocity-filtered"}
     | {"velocity-held", "stuck-velocity"}
 )
-"""Findings that the logged velocity is another motion's."""
+#: Findings with which no effort can be called late.
 LAGLESS = MISTIMED | {"stuck-position", "stuck-effort"}
-"""Findings with which no effort can be called late."""
 
 
 def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """An effort that is logged later than the motion, or earlier, or by a clock of its own.
-
-    Args:
-        recording: The log; its velocities are sound.
-        robot: An arm that explains its torques.
-    """
+    """An effort that is logged later than the motion, or earlier, or by a clock of its own."""
     late = lateness_of(recording, robot)
     if late is None:
         return
@@ -103,25 +88,15 @@ def is_agreed(alike: Mask) -> bool:
 
 
 class Lateness(NamedTuple):
-    """Pairs of neighbouring windows of a log, with what explains the change between them.
+    """Pairs of neighbouring windows of a log, with what explains the change between them."""
 
-    Attributes:
-        lags: Lags that are tried. (L,) [s]
-        step: Sample time. [s]
-        starts: First samples of the two windows of each pair. (W, 2)
-        when: When each pair is, from the log's first moment. (W,) [s]
-        model: What the change of a joint's torque is made of. (W, n, 4)
-        moves: Pairs in which a joint moves. (W, n)
-        effort: Means of the effort over the window that begins at each sample. (T', n)
-    """
-
-    lags: Array
-    step: float
-    starts: NDArray[np.intp]
-    when: Array
-    model: Array
-    moves: Mask
-    effort: Array
+    lags: Array  #: Lags that are tried. (L,) [s]
+    step: float  #: Sample time. [s]
+    starts: NDArray[np.intp]  #: First samples of the two windows of each pair. (W, 2)
+    when: Array  #: When each pair is, from the log's first moment. (W,) [s]
+    model: Array  #: What the change of a joint's torque is made of. (W, n, 4)
+    moves: Mask  #: Pairs in which a joint moves. (W, n)
+    effort: Array  #: Means of the effort over the window that begins at each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
         """What the model leaves of each joint's effort at every lag; NaN at rest. (n, L)
@@ -142,11 +117,7 @@ class Lateness(NamedTuple):
         return rest
 
     def drift(self, known: NDArray[np.intp]) -> Remark | None:
-        """The finding that the effort's lag grows from one end to the other, None if it does not.
-
-        Args:
-            known: Joints that tell a lag, from zero.
-        """
+        """The finding that the effort's lag grows along the log, None if it does not."""
         span = float(self.when[-1])
         coarse = self._replace(lags=self.lags[::COARSE])
         tried = (0.0, -DRIFTS[1], DRIFTS[1])

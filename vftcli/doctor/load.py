@@ -15,40 +15,30 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, warning
 
-REST = 2e-3
-"""Speed below which a joint counts as resting. [rad/s]"""
-MISMATCH = 4.0
-"""Difference at rest, on two joints, that stiction hardly explains. [N·m]"""
-USUAL_CONSTANT = 10.0
-"""Torque per current near which every UR's large drives lie. [N·m/A]"""
+REST = 2e-3  #: Speed below which a joint counts as resting. [rad/s]
+MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
+USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
+#: Torque per current of UR's five joint sizes, e-Series and CB3: the controllers' own tables.
+#:
+#: [N·m/A]
 JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
-"""Torque per current of UR's five joint sizes, e-Series and CB3: the controllers' own tables.
-
-[N·m/A]
-"""
-SAME = 0.02
-"""Constants of one joint size scatter by this much from firmware to firmware."""
+SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
+#: A load from which it is worth telling, as a hand or gripper is; and one that nobody overlooks.
+#:
+#: Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg. [kg]
 HAND, LOAD = 0.4, 1.2
-"""A load from which it is worth telling, as a hand or gripper is; and one that nobody overlooks.
-
-Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg. [kg]
-"""
-SURE = 4.0
-"""Standard deviations that a load has to be."""
-EXPLAINED, PARTLY = 0.5, 0.8
-"""Share of the misfit that such loads may leave."""
+SURE = 4.0  #: Standard deviations that a load has to be.
+EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
+#: Share of the misfit that a load which changes may leave, and by how much it must [-, kg].
+#:
+#: Sound logs leave .7 and more, pushes of some seconds among them; 1.5 kg picked up half-way .2–.6.
 CHANGED, CHANGE = 0.6, 0.7
-"""Share of the misfit that a load which changes may leave, and by how much it must [-, kg].
-
-Sound logs leave .7 and more, pushes of some seconds among them; 1.5 kg picked up half-way .2–.6.
-"""
+#: Share that a change in the middle must leave for others to be tried, and between which shares of
+#: the log: what lasts for less than a third of it may be a push.
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
-"""Share that a change in the middle must leave for others to be tried, and between which shares of
-the log: what lasts for less than a third of it may be a push."""
-DECLARED = 0.1
-"""A declared payload, or a difference from the mounted one, that is none. [kg]"""
+DECLARED = 0.1  #: A declared payload, or a difference from the mounted one, that is none. [kg]
+#: Relative difference between the log's own drive constants and the profile's that is reported.
 RATIO = 0.05
-"""Relative difference between the log's own drive constants and the profile's that is reported."""
 
 
 def drive_constants(recording: Recording) -> Array | None:
@@ -84,13 +74,7 @@ def resting(recording: Recording) -> Mask:
 
 
 def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Remark]:
-    """A load that the drives carry and neither the robot file nor the log knows of.
-
-    Args:
-        recording: The log.
-        robot: The arm with what its file mounts.
-        case: The log against it, whatever else is wrong put right.
-    """
+    """A load that the drives carry and neither the robot file nor the log knows of."""
     if (changed := load_change(case)) is not None:
         yield changed
         return

@@ -6,8 +6,7 @@ from vftcli.doctor.case import Case
 from vftcli.doctor.robust import KEPT
 from vftcli.signals.arrays import Array
 
-SUSPECT = 0.35
-"""Misfit of a joint from which its sign and its place are tried."""
+SUSPECT = 0.35  #: Misfit of a joint from which its sign and its place are tried.
 
 
 def crossed_rests(case: Case) -> Array:

@@ -10,26 +10,17 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 
-KEPT = 0.7
-"""Share of the windows that a fit is made from and judged by: the rest may be contact."""
-ROUNDS = 4
-"""Rounds of fitting and trimming; the kept windows no longer change by then."""
-OVERLAP = 2.0
-"""Windows that overlap by half count half."""
+KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
+OVERLAP = 2.0  #: Windows that overlap by half count half.
 
 
 class Terms(NamedTuple):
-    """What may explain a torque, column by column.
+    """What may explain a torque, column by column."""
 
-    Attributes:
-        columns: Torque per unit of each coefficient. (W, n, k)
-        positive: Coefficients that only make sense above zero, as friction's do. (k,)
-        prior: Standard deviation that a coefficient has before any data; inf for none. (k,)
-    """
-
-    columns: Array
-    positive: Mask
-    prior: Array
+    columns: Array  #: Torque per unit of each coefficient. (W, n, k)
+    positive: Mask  #: Coefficients that only make sense above zero, as friction's do. (k,)
+    prior: Array  #: Standard deviation that a coefficient has before any data; inf for none. (k,)
 
     def beside(self, other: "Terms") -> "Terms":
         """These terms and others."""
@@ -48,19 +39,12 @@ def terms(columns: Array, *, positive: bool = False, prior: Array | None = None)
 
 
 class RobustFit(NamedTuple):
-    """A fit.
+    """A fit."""
 
-    Attributes:
-        values: Coefficients. (k,)
-        sd: Their standard deviations by the scatter of the kept windows. (k,)
-        rest: What they leave over, of all windows. (W, n) [N·m]
-        kept: Windows that the fit was made from. (W,)
-    """
-
-    values: Array
-    sd: Array
-    rest: Array
-    kept: Mask
+    values: Array  #: Coefficients. (k,)
+    sd: Array  #: Their standard deviations by the scatter of the kept windows. (k,)
+    rest: Array  #: What they leave over, of all windows. (W, n) [N·m]
+    kept: Mask  #: Windows that the fit was made from. (W,)
 
     @property
     def size(self) -> float:

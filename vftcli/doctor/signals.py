@@ -13,32 +13,25 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 
-MOVING = 1e-3
-"""Speed from which a joint counts as moving. [rad/s]"""
-TRAVEL = 0.05
-"""Travel from which a joint's own data tell anything. [rad]"""
+MOVING = 1e-3  #: Speed from which a joint counts as moving. [rad/s]
+TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
+#: Net share of work from which a joint's effort counts as inverted.
+#:
+#: Joints hand energy to one another through gravity, so a single joint may well give some back.
 STRONG = -0.4
-"""Net share of work from which a joint's effort counts as inverted.
-
-Joints hand energy to one another through gravity, so a single joint may well give some back.
-"""
-ALONE = -0.85
-"""The same for a joint whose neighbours' effort is sound."""
-ABSURD, FARTHEST = 1e9, 1e18
-"""No measurement is this large, in whatever unit, and no time. [-, s]"""
+ALONE = -0.85  #: The same for a joint whose neighbours' effort is sound.
+ABSURD, FARTHEST = 1e9, 1e18  #: No measurement is this large, in whatever unit, and no time. [-, s]
+#: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
-"""Sample times between which every recorder's lies, read in whatever unit. [s]"""
-SOME = 5000
-"""Samples that tell how large a signal usually is."""
+SOME = 5000  #: Samples that tell how large a signal usually is.
+#: Share of the samples at which a signal runs straight on, from which it is interpolated; change of
+#: its slope that is none, relative to it; and share of values that have to change to judge by.
+#:
+#: No measured effort runs straight: its noise bends it at nearly every sample.
 STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
-"""Share of the samples at which a signal runs straight on, from which it is interpolated; change of
-its slope that is none, relative to it; and share of values that have to change to judge by.
-
-No measured effort runs straight: its noise bends it at nearly every sample."""
+#: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
-"""Two turns and a little: no joint of these arms goes further from its zero. [rad]"""
-LARGE_CURRENT = 60.0
-"""No joint of these arms draws this much; readings in mA do. [A]"""
+LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA do. [A]
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
@@ -57,12 +50,7 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
 
 
 def signal_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """Findings about the signals, each check independent of the others.
-
-    Args:
-        recording: The log.
-        fit: Its velocities beside its positions.
-    """
+    """Findings about the signals, each check independent of the others."""
     if recording.dq is None:
         yield warning("no-velocity")
     if all(getattr(recording, name) is None for name in EFFORTS):
@@ -105,14 +93,11 @@ def interpolated(recording: Recording) -> Iterator[Remark]:
 
 
 class Bends(NamedTuple):
-    """Where a signal's columns bend.
+    """Where a signal's columns bend."""
 
-    Attributes:
-        straight: Share of the samples at which moving columns do not; 0 where hardly one moves.
-        rows: Whether any column bends at a sample, from the second to the last but one. (T - 2,)
-    """
-
+    #: Share of the samples at which moving columns do not; 0 where hardly one moves.
     straight: float
+    #: Whether any column bends at a sample, from the second to the last but one. (T - 2,)
     rows: Mask
 
 

@@ -17,47 +17,33 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
-LONG = 0.5
-"""Time for which a signal has to repeat itself. [s]"""
-MANY = 10
-"""Steps for which it has to."""
+LONG = 0.5  #: Time for which a signal has to repeat itself. [s]
+MANY = 10  #: Steps for which it has to.
+#: Way within that time by which a joint surely moves: 20 mrad/s, beyond any offset of a velocity at
+#: rest. [rad]
 WAY = 0.01
-"""Way within that time by which a joint surely moves: 20 mrad/s, beyond any offset of a velocity at
-rest. [rad]"""
+#: A signal's stuck stretch is this many times as long as nearly all its other repeats.
 UNUSUAL = 10.0
-"""A signal's stuck stretch is this many times as long as nearly all its other repeats."""
+#: Deviation of a speed from a straight line of time, beyond which its effort has to change. [rad/s]
+#:
+#: Without noise a constant acceleration takes a constant torque.
 BENT = 0.005
-"""Deviation of a speed from a straight line of time, beyond which its effort has to change. [rad/s]
-
-Without noise a constant acceleration takes a constant torque.
-"""
-TRAVEL = 0.05
-"""Travel of a joint whose effort cannot be zero throughout. [rad]"""
+TRAVEL = 0.05  #: Travel of a joint whose effort cannot be zero throughout. [rad]
+#: Steps of the positions that are worth telling: a velocity from them is off by 0.02 rad/s at
+#: 100 Hz. [rad]
 COARSE = 2e-4
-"""Steps of the positions that are worth telling: a velocity from them is off by 0.02 rad/s at
-100 Hz. [rad]"""
-SOME = 2000
-"""Samples that tell most of what a column is like."""
-STILL = 1e-3
-"""Travel below which a joint stands. [rad]"""
-ONCE = 0.2
-"""Share of a log that no effort stays at its limit in one go."""
-CLIPPED = 0.1
-"""Time at the very extreme from which an effort is clipped. [s]"""
+SOME = 2000  #: Samples that tell most of what a column is like.
+STILL = 1e-3  #: Travel below which a joint stands. [rad]
+ONCE = 0.2  #: Share of a log that no effort stays at its limit in one go.
+CLIPPED = 0.1  #: Time at the very extreme from which an effort is clipped. [s]
 
 
 class Stretch(NamedTuple):
-    """Samples in which one joint's signal repeats itself.
+    """Samples in which one joint's signal repeats itself."""
 
-    Attributes:
-        joint: Index of the joint.
-        first: Index of its first sample.
-        last: Index of its last sample.
-    """
-
-    joint: int
-    first: int
-    last: int
+    joint: int  #: Index of the joint.
+    first: int  #: Index of its first sample.
+    last: int  #: Index of its last sample.
 
 
 def stuck_findings(recording: Recording) -> Iterator[Remark]:
@@ -94,13 +80,13 @@ def still_joints(recording: Recording) -> Iterator[Remark]:
         yield fact("still-joints" if still.size > 1 else "still-joint", on_joints(still))
 
 
+#: Signals that may be stuck, and what that is called.
 STUCK = {
     "q": "stuck-position",
     "dq": "stuck-velocity",
     "current": "stuck-effort",
     "torque": "stuck-effort",
 }
-"""Signals that may be stuck, and what that is called."""
 
 
 def stuck_signals(recording: Recording) -> Iterator[tuple[str, str, list[Stretch]]]:

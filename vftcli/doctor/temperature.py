@@ -14,27 +14,19 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning
 
+#: What a joint rubs less for each kelvin: UR's five joint sizes .011–.022 between 28 and 45 °C.
 PER_KELVIN = 0.015
-"""What a joint rubs less for each kelvin: UR's five joint sizes .011–.022 between 28 and 45 °C."""
+#: Distance from the temperature of the model from which a joint rubs 8–15 % otherwise. [K]
 FAR = 7.0
-"""Distance from the temperature of the model from which a joint rubs 8–15 % otherwise. [K]"""
-ASSUMED = 10.0
-"""The same where the robot file does not say the temperature of its friction. [K]"""
+ASSUMED = 10.0  #: The same where the robot file does not say the temperature of its friction. [K]
+#: Where the law stands on measurements (28 to 46 °C), and 15 to 20 K beyond. [°C]
 HOLDS = (15.0, 65.0)
-"""Where the law stands on measurements (28 to 46 °C), and 15 to 20 K beyond. [°C]"""
-NOTICED = 0.2
-"""Friction that is worth a finding. [N·m]"""
-MOVING = 0.02
-"""Speed from which a joint's friction is that of motion. [rad/s]"""
+NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
+MOVING = 0.02  #: Speed from which a joint's friction is that of motion. [rad/s]
 
 
 def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """Whether the log's joints are as warm as those of the model, and whether the log says.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-    """
+    """Whether the log's joints are as warm as those of the model, and whether the log says."""
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)
@@ -75,21 +67,13 @@ def untold_temperature(
 
 
 class Distance(NamedTuple):
-    """A joint that was not as warm as its friction was taken for.
+    """A joint that was not as warm as its friction was taken for."""
 
-    Attributes:
-        joint: The joint, from zero.
-        code: The finding it is.
-        seen: Its temperature in motion, the end that is farther away. [°C]
-        reference: That of the model. [°C]
-        wrong: What its friction is off by, at its median speed. [N·m]
-    """
-
-    joint: int
-    code: str
-    seen: float
-    reference: float
-    wrong: float
+    joint: int  #: The joint, from zero.
+    code: str  #: The finding it is.
+    seen: float  #: Its temperature in motion, the end that is farther away. [°C]
+    reference: float  #: That of the model. [°C]
+    wrong: float  #: What its friction is off by, at its median speed. [N·m]
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:

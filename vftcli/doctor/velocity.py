@@ -18,85 +18,66 @@ from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 
+#: Length of a window: short beside motion, long beside the noise of single samples and an arm's
+#: vibration. [s]
 WINDOW = 0.2
-"""Length of a window: short beside motion, long beside the noise of single samples and an arm's
-vibration. [s]"""
+#: Steps of a window of a slow log, and of a fast one, which is thinned.
 LEAST_STEPS, MOST_STEPS = 8, 40
-"""Steps of a window of a slow log, and of a fast one, which is thinned."""
+#: Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
+#: steps of a window then.
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
-"""Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
-steps of a window then."""
+#: Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
+#: log is cut into, and how many tell anything.
 WINDOWS, WANTED, LEAST = 600, 12, 8
-"""Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
-log is cut into, and how many tell anything."""
+#: Windows that a joint's motion has to be spread over, and its turns: one or two tell no error.
 SPREAD, TURNS = 5.0, 3.0
-"""Windows that a joint's motion has to be spread over, and its turns: one or two tell no error."""
-TRAVEL = 0.05
-"""Travel from which a joint's own data tell anything. [rad]"""
+TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
+#: Share of the turns of a position that the logged velocity has to show to tell its lag by them.
 TELLING = 0.1
-"""Share of the turns of a position that the logged velocity has to show to tell its lag by them."""
+#: Deviation of the gain from 1 that is told; sound logs, real and simulated, stay within 0.004.
 GAIN = 0.02
-"""Deviation of the gain from 1 that is told; sound logs, real and simulated, stay within 0.004."""
-SURE = 4.0
-"""Standard errors by which a deviation has to exceed its limit as well."""
+SURE = 4.0  #: Standard errors by which a deviation has to exceed its limit as well.
+#: Lag that is told, or a sample time where that is longer: a robot's own velocity filter takes
+#: 2–3 ms, a host's stamps up to 6. [s]
 LATE = 0.008
-"""Lag that is told, or a sample time where that is longer: a robot's own velocity filter takes
-2–3 ms, a host's stamps up to 6. [s]"""
+#: What another joint's position may leave open beside what the joint's own leaves with a lag, and
+#: how far the gain of the joint's own may be off for that to count.
 ANOTHER, ALIKE = 0.25, 0.3
-"""What another joint's position may leave open beside what the joint's own leaves with a lag, and
-how far the gain of the joint's own may be off for that to count."""
-OPEN = 0.1
-"""Share of a velocity that its own position may leave open for its gain to count."""
-DAMPED_MOST = 0.15
-"""Gain below which a velocity is no late one but of another size."""
+OPEN = 0.1  #: Share of a velocity that its own position may leave open for its gain to count.
+DAMPED_MOST = 0.15  #: Gain below which a velocity is no late one but of another size.
+#: Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065.
 DAMPED = 0.01
-"""Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065."""
-WIDE = 0.15
-"""Deviation from a factor between units by which it still is that factor."""
+WIDE = 0.15  #: Deviation from a factor between units by which it still is that factor.
+#: Degrees in a radian; by which a factor still is that: gears of 50 and 51 are common.
 DEGREES, CLOSE = 180 / np.pi, 0.06
-"""Degrees in a radian; by which a factor still is that: gears of 50 and 51 are common."""
+#: Gain, or its inverse, from which a velocity is another quantity: no filter and no clock of a
+#: robot is so far off.
 BEYOND = 1.5
-"""Gain, or its inverse, from which a velocity is another quantity: no filter and no clock of a
-robot is so far off."""
+#: Gain from which a gear, and no clock, makes the velocities too large: arms have 30 to 160.
 GEARED = 10.0
-"""Gain from which a gear, and no clock, makes the velocities too large: arms have 30 to 160."""
+#: Ticks a second → the unit of the stamps that were read as seconds.
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
-"""Ticks a second → the unit of the stamps that were read as seconds."""
+#: Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
+#: are those of half the rate, and sound logs repeat up to a third.
 HELD = 0.55
-"""Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
-are those of half the rate, and sound logs repeat up to a third."""
-STEPS, BLOCK = 8000, 500
-"""Steps that are looked at, at most, in blocks."""
-MOVES = 0.02
-"""Speed from which a velocity that repeats itself is held rather than small. [rad/s]"""
-CRUISE = 0.2
-"""A velocity that repeats itself for longer may be a constant one. [s]"""
+STEPS, BLOCK = 8000, 500  #: Steps that are looked at, at most, in blocks.
+MOVES = 0.02  #: Speed from which a velocity that repeats itself is held rather than small. [rad/s]
+CRUISE = 0.2  #: A velocity that repeats itself for longer may be a constant one. [s]
 
 
 class VelocityFit(NamedTuple):
-    """The logged velocities as gain and lag of the positions' derivative; NaN where at rest.
+    """The logged velocities as gain and lag of the positions' derivative; NaN where at rest."""
 
-    Attributes:
-        gain: Logged velocity over the derivative of the position, a. (n,)
-        lag: How much later the logged velocity is, τ. (n,) [s]
-        gain_error: Standard error of the gain. (n,)
-        lag_error: Standard error of the lag. (n,) [s]
-        open: Share of the logged velocity that the fit leaves open, by its square. (n,)
-        amplitude: Size of the logged velocity over that of the derivative. (n,)
-        rate: Typical rate of change of the motion, rms v̇ over rms v. (n,) [1/s]
-        factor: Every logged velocity over every position's derivative: row i by column j. (n, n)
-        share: What is left open of the velocity then, by its square. (n, n)
-    """
-
-    gain: Array
-    lag: Array
-    gain_error: Array
-    lag_error: Array
-    open: Array
-    amplitude: Array
-    rate: Array
+    gain: Array  #: Logged velocity over the derivative of the position, a. (n,)
+    lag: Array  #: How much later the logged velocity is, τ. (n,) [s]
+    gain_error: Array  #: Standard error of the gain. (n,)
+    lag_error: Array  #: Standard error of the lag. (n,) [s]
+    open: Array  #: Share of the logged velocity that the fit leaves open, by its square. (n,)
+    amplitude: Array  #: Size of the logged velocity over that of the derivative. (n,)
+    rate: Array  #: Typical rate of change of the motion, rms v̇ over rms v. (n,) [1/s]
+    #: Every logged velocity over every position's derivative: row i by column j. (n, n)
     factor: Array
-    share: Array
+    share: Array  #: What is left open of the velocity then, by its square. (n, n)
 
     @property
     def known(self) -> Mask:
@@ -176,19 +157,12 @@ def spread_of(v: Array) -> Array:
 
 
 class WeighedWindows(NamedTuple):
-    """Means over windows by Hann's weights, joint by joint.
+    """Means over windows by Hann's weights, joint by joint."""
 
-    Attributes:
-        by_position: v, the derivative of the position. (W, n) [rad/s]
-        by_velocity: The logged velocity. (W, n) [rad/s]
-        slope: −v̇ by the position. (W, n) [rad/s²]
-        logged_slope: −q̈ by the logged velocity. (W, n) [rad/s²]
-    """
-
-    by_position: Array
-    by_velocity: Array
-    slope: Array
-    logged_slope: Array
+    by_position: Array  #: v, the derivative of the position. (W, n) [rad/s]
+    by_velocity: Array  #: The logged velocity. (W, n) [rad/s]
+    slope: Array  #: −v̇ by the position. (W, n) [rad/s²]
+    logged_slope: Array  #: −q̈ by the logged velocity. (W, n) [rad/s²]
 
 
 def weighed_windows(recording: Recording) -> WeighedWindows:

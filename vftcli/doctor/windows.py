@@ -24,43 +24,28 @@ from vftcli.signals.recording import Recording
 IntArray = NDArray[np.intp]
 
 WINDOW = 0.3
-WINDOWS = 200
-"""Length of a window [s], and how many are looked at at most."""
+WINDOWS = 200  #: Length of a window [s], and how many are looked at at most.
+#: Instants of a window at which the model is asked: 50 ms apart nothing of it is missed.
 POINTS = 7
-"""Instants of a window at which the model is asked: 50 ms apart nothing of it is missed."""
-GRAVITY = [0, 3, 6]
-"""Those of them at which gravity is asked: between them it bends little."""
-SIMPSON = np.array([1.0, 4.0, 1.0]) / 6
-"""Their weights in the mean."""
-SLOW = 0.01
-"""Speed at which dry friction has its direction. [rad/s]"""
+GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it bends little.
+SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
+SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
+#: Mass [kg] and first moment [kg·m] that a load may well have, before the log says anything.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
-"""Mass [kg] and first moment [kg·m] that a load may well have, before the log says anything."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Windows:
-    """Windows of a log, and what a robot's model says of them.
+    """Windows of a log, and what a robot's model says of them."""
 
-    Attributes:
-        recording: The log.
-        chain: The arm with its payload.
-        first: First sample of each window. (W,)
-        last: Last sample of each window. (W,)
-        q: Positions at a few instants of each window. (W, K, n) [rad]
-        dq: Velocities there. (W, K, n) [rad/s]
-        t: Those instants. (W, K) [s]
-        motion: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
-    """
-
-    recording: Recording
-    chain: Chain
-    first: IntArray
-    last: IntArray
-    t: Array
-    q: Array
-    dq: Array
-    motion: Array
+    recording: Recording  #: The log.
+    chain: Chain  #: The arm with its payload.
+    first: IntArray  #: First sample of each window. (W,)
+    last: IntArray  #: Last sample of each window. (W,)
+    t: Array  #: Those instants. (W, K) [s]
+    q: Array  #: Positions at a few instants of each window. (W, K, n) [rad]
+    dq: Array  #: Velocities there. (W, K, n) [rad/s]
+    motion: Array  #: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
 
     def exchanged(self, i: int, j: int, most: int) -> "Windows":
         """At most so many windows, all signals of two joints in them exchanged."""

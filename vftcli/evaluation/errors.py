@@ -16,6 +16,11 @@ from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
 
+#: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
+#:
+#: `coverage_95` is the share of samples within the estimate's 95 % band, where it has one;
+#: `missing` the share without an answer, which counts as the answer 0, so that nothing hides by
+#: failing.
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "observer": pl.String,
@@ -37,17 +42,10 @@ SCHEMA: dict[str, type[pl.DataType]] = {
     "missing": pl.Float64,
     "samples": pl.Int64,
 }
-"""Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
 
-`coverage_95` is the share of samples within the estimate's 95 % band, where it has one; `missing`
-the share without an answer, which counts as the answer 0, so that nothing hides by failing.
-"""
-
-TRUSTED_SHARE = 0.5
-"""A joint's reference is trusted if at least this share of its samples is."""
-
+TRUSTED_SHARE = 0.5  #: A joint's reference is trusted if at least this share of its samples is.
+#: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30 %.
 LEAST = 10
-"""Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30 %."""
 
 
 def rmse(estimate: Array, reference: Array) -> Array:
@@ -76,36 +74,24 @@ def correlation(x: Array, y: Array) -> float:
 
 
 class Scored(NamedTuple):
-    """Estimates of one joint against one reference, over the samples where that is known.
+    """Estimates of one joint against one reference, over the samples where that is known."""
 
-    Attributes:
-        names: The observers' names.
-        joint: Joint number, from 1.
-        estimates: One column an observer, 0 where it has no answer. (T, m) [N·m]
-        missing: Samples of each observer without an answer. (m,)
-        reference: (T,) [N·m]
-        moving: Whether the joint moves, so that the reference may be relied on. (T,)
-        floor: The reference's own error, NaN where it is not known. [N·m]
-        paired: Bootstrap draws of the mean squared errors, one column an observer, all in the same
-            blocks: for comparing observers.
-        own: The same of each observer in blocks of its own length, so that its interval does not
-            depend on who else is asked.
-        lag: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
-        within: Samples whose error lies within each observer's 95 % band. (m,)
-        banded: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
-    """
-
-    names: tuple[str, ...]
-    joint: int
-    estimates: Array
-    missing: Array
-    reference: Array
-    moving: Mask
-    floor: float
+    names: tuple[str, ...]  #: The observers' names.
+    joint: int  #: Joint number, from 1.
+    estimates: Array  #: One column an observer, 0 where it has no answer. (T, m) [N·m]
+    missing: Array  #: Samples of each observer without an answer. (m,)
+    reference: Array  #: (T,) [N·m]
+    moving: Mask  #: Whether the joint moves, so that the reference may be relied on. (T,)
+    floor: float  #: The reference's own error, NaN where it is not known. [N·m]
+    #: Bootstrap draws of the mean squared errors, one column an observer, all in the same blocks:
+    #: for comparing observers.
     paired: Resampled
+    #: The same of each observer in blocks of its own length, so that its interval does not depend
+    #: on who else is asked.
     own: tuple[Resampled, ...]
-    lag: Array
-    within: Array
+    lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
+    within: Array  #: Samples whose error lies within each observer's 95 % band. (m,)
+    #: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
     banded: Array
 
     @property
@@ -140,11 +126,7 @@ def evaluate(
 
 
 def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> Iterator[Scored]:
-    """Estimates and reference joint by joint, resampled, with their lags.
-
-    Raises:
-        ShapeError: If an estimate and the reference have different shapes.
-    """
+    """Estimates and reference joint by joint, resampled, with their lags."""
     for estimate in estimates:
         if estimate.tau.shape != reference.tau.shape:
             raise ShapeError(

@@ -8,41 +8,24 @@ from numpy.typing import NDArray
 from vftcli.signals.arrays import Array
 from vftcli.signals.lag import sliding
 
-REPETITIONS = 1000
-"""Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them."""
-
-SEED = 20250811
-"""Seed of every bootstrap: the same log gives the same interval."""
-
+REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
+SEED = 20250811  #: Seed of every bootstrap: the same log gives the same interval.
+#: Blocks a repetition is put together from, at most: more change nothing but the time it takes.
 MOST_BLOCKS = 300
-"""Blocks a repetition is put together from, at most: more change nothing but the time it takes."""
-
+#: Blocks a repetition is put together from, at least, however long errors remember.
 LEAST_BLOCKS = 10
-"""Blocks a repetition is put together from, at least, however long errors remember."""
-
-MEMORY = 5.0
-"""Length of a block in correlation times of the squared error."""
-
+MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
+#: Largest share taken off: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
-"""Largest share taken off: the upper end of an interval is at most five times the RMSE."""
-
-LEVEL = 0.95
-"""Coverage of the intervals."""
-
-FIRST_LAGS = 1024
-"""Lags over which an autocorrelation is looked at first. [samples]"""
+LEVEL = 0.95  #: Coverage of the intervals.
+FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
 
 
 class Resampled(NamedTuple):
-    """Mean squares of resampled errors.
+    """Mean squares of resampled errors."""
 
-    Attributes:
-        draws: One mean square a repetition and column. (B, m)
-        blocks: How many blocks each repetition has: the effective number of independent pieces.
-    """
-
-    draws: Array
-    blocks: int
+    draws: Array  #: One mean square a repetition and column. (B, m)
+    blocks: int  #: How many blocks each repetition has: the effective number of independent pieces.
 
 
 def resample(squares: Array, length: int) -> Resampled:

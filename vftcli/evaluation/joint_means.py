@@ -7,16 +7,12 @@ import polars as pl
 
 
 class JointMeans(NamedTuple):
-    """Means over the joints of one log.
+    """Means over the joints of one log."""
 
-    Attributes:
-        errors: Observer → mean RMSE; those of which one is known, in the table's order. [N·m]
-        floor: Mean of the reference's own error, NaN where it is not known. [N·m]
-        without: Joints that are left out, because the reference is not to be trusted there.
-    """
-
+    #: Observer → mean RMSE; those of which one is known, in the table's order. [N·m]
     errors: dict[str, float]
-    floor: float
+    floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
+    #: Joints that are left out, because the reference is not to be trusted there.
     without: tuple[int, ...]
 
     @property
@@ -34,9 +30,6 @@ def joint_means(errors: pl.DataFrame) -> JointMeans:
     """The mean RMSE of every observer, over the joints with a reference to be trusted.
 
     Where none can, over all: a mean is wanted, and every joint of it is marked.
-
-    Args:
-        errors: The tidy error table of one log; rows without a joint count for nothing.
     """
     rows = errors.filter(pl.col("joint").is_not_null())
     joints = set(rows["joint"])

@@ -29,29 +29,18 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
 class Judgement(NamedTuple):
-    """How the estimates of one log compare with a reference; fields of `vftcli.Analysis`.
+    """How the estimates of one log compare with a reference; fields of `vftcli.Analysis`."""
 
-    Attributes:
-        reference: What they are judged by.
-        errors: The tidy error table (`vftcli.evaluation.SCHEMA`).
-        virtual_sensor: The wrenches, with the reference's beside them; None without wrenches.
-    """
-
-    reference: ExternalTorque
-    errors: pl.DataFrame
+    reference: ExternalTorque  #: What they are judged by.
+    errors: pl.DataFrame  #: The tidy error table (`vftcli.evaluation.SCHEMA`).
+    #: The wrenches, with the reference's beside them; None without wrenches.
     virtual_sensor: SensorReading | None
 
 
 def with_measured_gap(
     remarks: Sequence[Remark], errors: pl.DataFrame, tunings: Mapping[str, Tuning]
 ) -> tuple[Remark, ...]:
-    """Remarks in which what the paper's gains cost is measured, where both sides of it ran.
-
-    Args:
-        remarks: What there is to say of the run; what was expected of the gains gives way.
-        errors: The errors of the run's observers.
-        tunings: What their gains mean, by name; they are those of the robot's file.
-    """
+    """Remarks in which what the paper's gains cost is measured, where both sides of it ran."""
     means = joint_means(errors).errors
     delays = {name: tunings[name].delay for name in PAPER if name in means}
     if not delays or BEST not in means:
@@ -106,12 +95,6 @@ def reference_wrench(
 
     A sensor's and a file's wrench are taken as they are; any other reference is a torque, and goes
     through least squares. Samples in which the pose cannot tell a wrench are masked alike.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        reference: The reference.
-        sensor: Frame and mounting of the estimates.
     """
     torque = reference.torque
     # Plain least squares whatever the estimates' solver is: a reference is not to be smoothed.

@@ -20,8 +20,8 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wr
 from vftcli.virtual_sensor.vendor import RESEMBLES, fit_axes
 
 VENDOR, SENSOR = "vendor", "sensor"
+#: The frame of such a wrench: axes and point are those of the log's Jacobian, whatever they are.
 AXES_OF_LOG = "jacobian"
-"""The frame of such a wrench: axes and point are those of the log's Jacobian, whatever they are."""
 
 
 class Compared(NamedTuple):
@@ -33,38 +33,20 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianJudgement:
-    """What a log of torques and a Jacobian tells.
+    """What a log of torques and a Jacobian tells."""
 
-    Attributes:
-        log: The log.
-        vendor: The vendor's torques, and their wrench through the Jacobian.
-        sensor: The sensor's wrench, and its torques, or None where nothing is compared.
-        errors: The tidy error table, None where nothing is compared.
-        remarks: What the numbers are.
-    """
-
-    log: JacobianLog
-    vendor: Compared
+    log: JacobianLog  #: The log.
+    vendor: Compared  #: The vendor's torques, and their wrench through the Jacobian.
+    #: The sensor's wrench, and its torques, or None where nothing is compared.
     sensor: Compared | None
-    errors: pl.DataFrame | None
-    remarks: tuple[Remark, ...]
+    errors: pl.DataFrame | None  #: The tidy error table, None where nothing is compared.
+    remarks: tuple[Remark, ...]  #: What the numbers are.
 
 
 def judge_jacobian(
     log: JacobianLog, asked: WrenchChoice | None, reference: str | None
 ) -> JacobianJudgement:
-    """Solve the vendor's torques for a wrench and, if asked, compare it with the sensor's.
-
-    Args:
-        log: The log.
-        asked: What is asked of the wrench; only unloaded spans can be. None for joint rows alone.
-        reference: "sensor", or None.
-
-    Raises:
-        ParameterError: If a frame, pose or solver is asked for, which take positions.
-        ReferenceTorqueError: If another reference is.
-        MissingSignalError: If the log has no sensor to compare with.
-    """
+    """Solve the vendor's torques for a wrench and, if asked, compare it with the sensor's."""
     zero = asked.zero if asked is not None else ZeroChoice()
     if asked is not None and asked != WrenchChoice(zero=ZeroChoice(spans=zero.spans)):
         raise ParameterError(
@@ -105,11 +87,7 @@ def judge_jacobian(
 
 
 def sensor_of(log: JacobianLog, ours: Wrench, zero: ZeroChoice) -> tuple[Compared, Remark]:
-    """The sensor's wrench in the Jacobian's axes, their order and signs fitted, and as torques.
-
-    Raises:
-        MissingSignalError: If the log has none.
-    """
+    """The sensor's wrench in the Jacobian's axes, their order and signs fitted, and as torques."""
     if log.wrench is None:
         raise MissingSignalError(
             f"{log.name}: the log has no wrench of a sensor to compare with. Name its columns with "
@@ -132,11 +110,7 @@ def sensor_of(log: JacobianLog, ours: Wrench, zero: ZeroChoice) -> tuple[Compare
 
 
 def unloaded(log: JacobianLog, values: Array, zero: ZeroChoice) -> Array:
-    """A wrench less its mean over the first unloaded span, where one is given. (T, 6)
-
-    Raises:
-        ParameterError: If no sample is in the span.
-    """
+    """A wrench less its mean over the first unloaded span, where one is given. (T, 6)"""
     if not zero.spans:
         return values
     start, stop = zero.spans[0]

@@ -11,22 +11,15 @@ from vftcli.evaluation.intervals import Resampled
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
-POOLED = "pooled"
-"""Name of the pooled rows in the column `recording`."""
+POOLED = "pooled"  #: Name of the pooled rows in the column `recording`.
 
 
 class PoolMember(NamedTuple):
-    """One log's estimates and what they are judged by.
+    """One log's estimates and what they are judged by."""
 
-    Attributes:
-        robot: The arm's name.
-        estimates: One an observer.
-        reference: On the same clock.
-    """
-
-    robot: str
-    estimates: Sequence[ExternalTorque]
-    reference: ExternalTorque
+    robot: str  #: The arm's name.
+    estimates: Sequence[ExternalTorque]  #: One an observer.
+    reference: ExternalTorque  #: On the same clock.
 
 
 def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:

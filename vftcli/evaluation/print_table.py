@@ -11,47 +11,34 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, fact
 
+#: Errors that differ by less than this share are one filter's, computed in two ways.
 SAME_FILTER = 1e-6
-"""Errors that differ by less than this share are one filter's, computed in two ways."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Published:
-    """An RMSE table from print.
+    """An RMSE table from print."""
 
-    Attributes:
-        title: What it is.
-        source: Where it stands.
-        rmse: Observer's name here → printed RMSE of each joint. [N·m]
-        reasons: Why a computation need not give these numbers: each gives a remark, or None if it
-            does not apply to what was run.
-    """
-
-    title: str
-    source: str
+    title: str  #: What it is.
+    source: str  #: Where it stands.
+    #: Observer's name here → printed RMSE of each joint. [N·m]
     rmse: Mapping[str, tuple[float, ...]]
+    #: Why a computation need not give these numbers: each gives a remark, or None if it does not
+    #: apply to what was run.
     reasons: tuple[Callable[["Comparison"], Remark | None], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """Printed numbers beside computed ones.
+    """Printed numbers beside computed ones."""
 
-    Attributes:
-        published: The printed table.
-        recording: The log's name.
-        ours: Observer → computed RMSE of each joint, NaN where it is not known. (n,) [N·m]
-        floor: The reference's own error. (n,) [N·m]
-        observers: The observers that ran, by name.
-        tunings: What their gains mean at the log's sample time, by name.
-    """
-
-    published: Published
-    recording: str
+    published: Published  #: The printed table.
+    recording: str  #: The log's name.
+    #: Observer → computed RMSE of each joint, NaN where it is not known. (n,) [N·m]
     ours: Mapping[str, Array]
-    floor: Array
-    observers: Mapping[str, Observer]
-    tunings: Mapping[str, Tuning]
+    floor: Array  #: The reference's own error. (n,) [N·m]
+    observers: Mapping[str, Observer]  #: The observers that ran, by name.
+    tunings: Mapping[str, Tuning]  #: What their gains mean at the log's sample time, by name.
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -147,16 +134,11 @@ TABLE_1 = Published(
     reasons=(one_filter, kalman_delay, alike_at_floor),
 )
 
-TABLES = {"table1": TABLE_1}
-"""Name at the command line → printed table."""
+TABLES = {"table1": TABLE_1}  #: Name at the command line → printed table.
 
 
 def check_published(name: str, reference: str | None) -> None:
-    """Raise unless there is such a table and a reference to make errors with.
-
-    Raises:
-        ParameterError: If either is missing.
-    """
+    """Raise unless there is such a table and a reference to make errors with."""
     if name not in TABLES:
         raise ParameterError(f"no published table {name!r}; there is {', '.join(TABLES)}")
     if reference is None:
@@ -171,17 +153,7 @@ def compare_with(
     observers: Sequence[Observer],
     tunings: Mapping[str, Tuning],
 ) -> Comparison:
-    """Set a printed table beside computed errors.
-
-    Args:
-        name: A key of `TABLES`.
-        errors: The tidy error table of one log.
-        observers: The observers that ran.
-        tunings: What their gains mean, by name.
-
-    Raises:
-        ParameterError: If the table is of an arm with another number of joints.
-    """
+    """Set a printed table beside computed errors."""
     published = TABLES[name]
     rows = errors.filter(pl.col("joint").is_not_null())
     joints = int(str(rows["joint"].max()))

@@ -19,15 +19,11 @@ from vftcli.virtual_sensor.log_wrench import logged_wrench
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceLoad:
-    """What estimates are judged by, on the log's clock.
+    """What estimates are judged by, on the log's clock."""
 
-    Attributes:
-        torque: The reference torque of every joint.
-        wrench: The wrench it was made from, in base axes about the flange point, as force on the
-            robot; None where the reference is a torque to begin with.
-    """
-
-    torque: ExternalTorque
+    torque: ExternalTorque  #: The reference torque of every joint.
+    #: The wrench it was made from, in base axes about the flange point, as force on the robot; None
+    #: where the reference is a torque to begin with.
     wrench: Wrench | None = None
 
 
@@ -49,11 +45,7 @@ def zero_reference(log: ModelledRun) -> ReferenceLoad:
 
 
 def vendor_reference(recording: Recording) -> ReferenceLoad:
-    """The vendor's own estimate in the log, torque on the robot; its error is not known.
-
-    Raises:
-        MissingSignalError: If the log has no external torque.
-    """
+    """The vendor's own estimate in the log, torque on the robot; its error is not known."""
     tau = recording.require("tau_ext")
     remarks = (caution("reference-vendor"),)
     return ReferenceLoad(
@@ -62,17 +54,7 @@ def vendor_reference(recording: Recording) -> ReferenceLoad:
 
 
 def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
-    """τ_ext = J_Fᵀ w of the wrench that the log holds.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        mounting: Where tool and sensor sit on the flange.
-
-    Raises:
-        MissingSignalError: If the log has no wrench, or one that is all zeros.
-        ParameterError: If the wrench's frame is not one there is.
-    """
+    """τ_ext = J_Fᵀ w of the wrench that the log holds."""
     check_joints(recording, robot)
     wrench = logged_wrench(recording, robot.chain, mounting)
     remarks = (caution("reference-sensor"), *wrench.remarks)

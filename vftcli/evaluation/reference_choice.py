@@ -16,26 +16,21 @@ from vftcli.repetition.two_cycle import two_cycle_reference
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 
-FILE = "file:"
-"""The one reference whose name holds a path."""
+FILE = "file:"  #: The one reference whose name holds a path.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceChoice:
     """Which reference a user asks for; checked when it is made, before any log is read.
 
-    Attributes:
-        name: A key of `REFERENCES`, or ``file:PATH``.
-        columns: The column description of a reference file, None to recognise its columns.
-        contacts: Whether each observer's contacts are judged by the reference's too.
-
     Raises:
         ReferenceTorqueError: If there is no such reference.
     """
 
-    name: str
+    name: str  #: A key of `REFERENCES`, or ``file:PATH``.
+    #: The column description of a reference file, None to recognise its columns.
     columns: str | None = None
-    contacts: bool = False
+    contacts: bool = False  #: Whether each observer's contacts are judged by the reference's too.
 
     def __post_init__(self) -> None:
         if self.path is None and self.name not in REFERENCES:
@@ -57,17 +52,13 @@ class ReferenceChoice:
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceSource:
-    """All that a reference can be made from.
+    """All that a reference can be made from."""
 
-    Attributes:
-        motion: The log that is compared, its robot, and its free motion.
-        mounting: Where tool and sensor sit on the flange.
-    """
-
-    motion: FreeMotion
-    mounting: Mounting = NOTHING
+    motion: FreeMotion  #: The log that is compared, its robot, and its free motion.
+    mounting: Mounting = NOTHING  #: Where tool and sensor sit on the flange.
 
 
+#: Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it.
 REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
     "zero": lambda source: zero_reference(source.motion.log),
     "vendor": lambda source: vendor_reference(source.motion.log.recording),
@@ -76,15 +67,10 @@ REFERENCES: dict[str, Callable[[ReferenceSource], ReferenceLoad]] = {
         source.motion.log.recording, source.motion.log.robot, source.mounting
     ),
 }
-"""Name at the command line → what makes it; ``file:PATH`` is the one name with a path in it."""
 
 
 def make_reference(source: ReferenceSource, choice: ReferenceChoice) -> ReferenceLoad:
-    """The reference that is asked for, on the log's clock.
-
-    Raises:
-        ReferenceTorqueError: If it cannot be made from the log.
-    """
+    """The reference that is asked for, on the log's clock."""
     if choice.path is not None:
         log, mounting = source.motion.log, source.mounting
         return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)

@@ -30,17 +30,6 @@ def file_reference(
 
     A file without torques gives those of its wrench, Jᵀ w. A wrench is taken to be in base axes
     about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
-
-    Args:
-        path: The table: t, and one torque column a joint, or six columns of a wrench, or both.
-        recording: The log it belongs to.
-        robot: The arm.
-        mounting: Where tool and sensor sit, for a wrench in their frames.
-        columns: Description of the table's columns, None to recognise them.
-
-    Raises:
-        ReferenceTorqueError: If the joints differ or the clocks do not overlap.
-        LogError: If the table cannot be read.
     """
     table = read_reference(path, columns)
     # The recording counts from its first sample, a reference file from the same zero as the log.
@@ -81,9 +70,6 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
         columns: Its values. (M, k)
         recording: The log.
         path: The file, for the error.
-
-    Raises:
-        ReferenceTorqueError: If the two clocks do not overlap.
     """
     # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
     slack = 0.5 * recording.median_step

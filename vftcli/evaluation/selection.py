@@ -13,53 +13,34 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import median_step
 
-STEP_TIME = 3.0
-"""Length of the step that response times are read from. [s]"""
-
-REACHED = 0.9
-"""Share of a step at which it counts as seen."""
-
+STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
+REACHED = 0.9  #: Share of a step at which it counts as seen.
+#: Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]
 FAST = 5.0
-"""Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]"""
 
 
 class Facts(NamedTuple):
-    """What one observer does on one log.
+    """What one observer does on one log."""
 
-    Attributes:
-        name: The observer.
-        response: Time until 90 % of a step is seen, the slowest joint. [s]
-        delay: Delay behind a slow ramp, the slowest joint. [s]
-        noise: Noise of the estimate, mean of joints: the drive torque's white noise through the
-            observer's own response. [N·m]
-        passed: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
-        rmse: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
-        parameter_count: Numbers to tune.
-    """
-
-    name: str
-    response: float
-    delay: float
+    name: str  #: The observer.
+    response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
+    delay: float  #: Delay behind a slow ramp, the slowest joint. [s]
+    #: Noise of the estimate, mean of joints: the drive torque's white noise through the observer's
+    #: own response. [N·m]
     noise: float
+    #: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
     passed: float
-    rmse: float
-    parameter_count: int
+    rmse: float  #: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
+    parameter_count: int  #: Numbers to tune.
 
 
 class Advice(NamedTuple):
-    """One guideline and what this log says of it.
+    """One guideline and what this log says of it."""
 
-    Attributes:
-        purpose: What the observer is wanted for.
-        criterion: What decides.
-        best: The observers that are best by it, alike within 2 %.
-        paper: What the paper advises.
-    """
-
-    purpose: str
-    criterion: str
-    best: tuple[str, ...]
-    paper: str
+    purpose: str  #: What the observer is wanted for.
+    criterion: str  #: What decides.
+    best: tuple[str, ...]  #: The observers that are best by it, alike within 2 %.
+    paper: str  #: What the paper advises.
 
 
 def facts(
@@ -68,14 +49,7 @@ def facts(
     run: ModelledRun,
     errors: pl.DataFrame | None,
 ) -> tuple[Facts, ...]:
-    """The facts of every observer that has a response of its own.
-
-    Args:
-        observers: The observers that ran.
-        tunings: What their gains mean, by name.
-        run: The log; the noise is that of its μ.
-        errors: The tidy error table, or None.
-    """
+    """The facts of every observer that has a response of its own."""
     step = median_step(run.recording.t)
     return tuple(
         facts_of(observer, tunings[observer.name], run.noise, step, errors)

@@ -10,6 +10,7 @@ from vftcli.evaluation.intervals import LEVEL, block_lengths, resample
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 
+#: Columns of the significance table: RMSE of `observer` less that of `other`, 95 % interval, p.
 SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "joint": pl.Int64,
@@ -20,10 +21,7 @@ SCHEMA: dict[str, type[pl.DataType]] = {
     "high_Nm": pl.Float64,
     "p": pl.Float64,
 }
-"""Columns of the significance table: RMSE of `observer` less that of `other`, 95 % interval, p."""
-
-SAME = 1e-9
-"""RMSEs that differ by less than this share are the same number twice."""
+SAME = 1e-9  #: RMSEs that differ by less than this share are the same number twice.
 
 
 def paired_significance(

@@ -14,44 +14,33 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.remarks import Remark, Where, warning
 
+#: Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]
 CUTOFF = 2.0
-"""Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]"""
+#: Multiple of a joint's median open torque from which it stands out.
+#:
+#: Free UR10e logs reach more on joints whose friction is missed for a moment (13.8), but below
+#: their dry friction; logs of hands, and simulated pushes, reach 17–100.
 STANDING_OUT = 8.0
-"""Multiple of a joint's median open torque from which it stands out.
-
-Free UR10e logs reach more on joints whose friction is missed for a moment (13.8), but below their
-dry friction; logs of hands, and simulated pushes, reach 17–100.
-"""
+#: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
+#: reach 1.15, logs of hands 1.8–7.
 OF_FRICTION = 1.5
-"""Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
-reach 1.15, logs of hands 1.8–7."""
+#: Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]
 LEAST = 2.0
-"""Torque below which nothing is called a contact: an arm of link torques leaves 1.8 open. [N·m]"""
+#: Multiple of its limit from which open torque is plainly no model error: a free UR10 reaches
+#: 1.14, hands and pushes 2.1 and more.
 PLAIN = 1.5
-"""Multiple of its limit from which open torque is plainly no model error: a free UR10 reaches
-1.14, hands and pushes 2.1 and more."""
-SHORTEST = 2.0
-"""Shorter logs have no quiet level. [s]"""
+SHORTEST = 2.0  #: Shorter logs have no quiet level. [s]
 
 
 class ShownContact(NamedTuple):
-    """A contact that a log shows.
+    """A contact that a log shows."""
 
-    Attributes:
-        joint: The joint that shows it most, from zero.
-        start: When it begins. [s]
-        stop: When it ends. [s]
-        torque: The largest torque that is open. [N·m]
-        quiet: The joint's quiet level. [N·m]
-        excess: The largest torque that is open, over its limit.
-    """
-
-    joint: int
-    start: float
-    stop: float
-    torque: float
-    quiet: float
-    excess: float
+    joint: int  #: The joint that shows it most, from zero.
+    start: float  #: When it begins. [s]
+    stop: float  #: When it ends. [s]
+    torque: float  #: The largest torque that is open. [N·m]
+    quiet: float  #: The joint's quiet level. [N·m]
+    excess: float  #: The largest torque that is open, over its limit.
 
 
 def touches(run: ModelledRun) -> tuple[ShownContact, ...]:

@@ -12,6 +12,10 @@ from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 
+#: Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
+#:
+#: `band_share` is the share of the samples with a 95 % band that holds the reference, `missing`
+#: that without an answer where the pose can tell one, which counts as the answer 0.
 WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     **SCHEMA,
     "axis": pl.String,
@@ -20,11 +24,6 @@ WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
     "max_N": pl.Float64,
     "band_share": pl.Float64,
 }
-"""Columns where wrenches are compared: `axis` fx…mz, `joint` null; forces fill rmse_N.
-
-`band_share` is the share of the samples with a 95 % band that holds the reference, `missing` that
-without an answer where the pose can tell one, which counts as the answer 0.
-"""
 
 
 def evaluate_wrenches(
@@ -83,6 +82,10 @@ def with_wrenches(errors: pl.DataFrame, recording: str, sensed: SensorReading) -
     return pl.concat([errors, rows], how="diagonal")
 
 
+#: Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench" or "list".
+#:
+#: One to one: of the true contacts some are found; of those missed some are merged, which run into
+#: others. Rows that are neither credited nor false alarms are splits.
 CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "observer": pl.String,
@@ -99,11 +102,6 @@ CONTACT_SCHEMA: dict[str, type[pl.DataType]] = {
     "detection_delay_s": pl.Float64,
     "longest_delay_s": pl.Float64,
 }
-"""Columns where contacts are judged: one row an observer; `signal` is "torque", "wrench" or "list".
-
-One to one: of the true contacts some are found; of those missed some are merged, which run into
-others. Rows that are neither credited nor false alarms are splits.
-"""
 
 
 def with_contacts(

@@ -9,28 +9,19 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import torque_regressor
 from vftcli.signals.arrays import Array
 
-PROBES = 400
-"""Random states at which the structure is found."""
-
+PROBES = 400  #: Random states at which the structure is found.
+#: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
 RANK_TOLERANCE = 1e-8
-"""Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15."""
-
+#: A parameter whose standard deviation is more than this share of its size is not determined.
 DOUBTFUL = 0.3
-"""A parameter whose standard deviation is more than this share of its size is not determined."""
 
 
 class Grouping(NamedTuple):
-    """Which unknowns stand for themselves, and what each carries along.
+    """Which unknowns stand for themselves, and what each carries along."""
 
-    Attributes:
-        independent: Places of the independent unknowns. (b,)
-        dependent: Places of the others. (d,)
-        carried: β: how much of each dependent unknown an independent one carries. (b, d)
-    """
-
-    independent: tuple[int, ...]
-    dependent: tuple[int, ...]
-    carried: Array
+    independent: tuple[int, ...]  #: Places of the independent unknowns. (b,)
+    dependent: tuple[int, ...]  #: Places of the others. (d,)
+    carried: Array  #: β: how much of each dependent unknown an independent one carries. (b, d)
 
     def values(self, x: Array) -> Array:
         """Base parameters of a full parameter vector: x₁ + β x₂. (b,)"""
@@ -56,10 +47,6 @@ def group_parameters(chain: Chain, rotor: bool) -> Grouping:
     The regressor of random states, seeded, is decomposed with column pivoting; R = [R₁ R₂] gives
     β = R₁⁻¹ R₂ (M. Gautier, "Numerical calculation of the base inertial parameters of robots",
     J. Robotic Systems 8(4), 1991).
-
-    Args:
-        chain: The arm's geometry.
-        rotor: Whether rotor inertias are unknowns.
     """
     from scipy.linalg import qr
 
@@ -86,19 +73,12 @@ def with_friction(grouping: Grouping, layout: ParameterColumns) -> Grouping:
 
 
 class BaseParameters(NamedTuple):
-    """Estimated base parameters.
+    """Estimated base parameters."""
 
-    Attributes:
-        names: What each is the sum of.
-        values: Estimates. (b,)
-        sd: Standard deviations; infinite where the data says nothing. (b,)
-        determined: Whether the data determines it, by `DOUBTFUL`. (b,)
-    """
-
-    names: tuple[str, ...]
-    values: Array
-    sd: Array
-    determined: tuple[bool, ...]
+    names: tuple[str, ...]  #: What each is the sum of.
+    values: Array  #: Estimates. (b,)
+    sd: Array  #: Standard deviations; infinite where the data says nothing. (b,)
+    determined: tuple[bool, ...]  #: Whether the data determines it, by `DOUBTFUL`. (b,)
 
     def rows(self) -> list[tuple[str, float, float, bool]]:
         """Name, estimate, standard deviation and whether it is determined, one row each."""

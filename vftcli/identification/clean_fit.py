@@ -23,35 +23,22 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
-LOAD_EXPLAINS = 0.8
-"""Share of what the profile misses that a load must explain to be suspected."""
-
-UNKNOWN_LOAD = 0.5
-"""Smallest load that is suspected. [kg]"""
-
+LOAD_EXPLAINS = 0.8  #: Share of what the profile misses that a load must explain to be suspected.
+UNKNOWN_LOAD = 0.5  #: Smallest load that is suspected. [kg]
+#: A joint carries the arm's weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
-"""A joint carries the arm's weight if its gravity torque varies by this share of the largest."""
-
+#: Times what free links leave from which on the profile's links are another arm's: of right ones
+#: 1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12.
 OTHER_LINKS = 3.0
-"""Times what free links leave from which on the profile's links are another arm's: of right ones
-1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12."""
-
+#: The fits, the weights of every sample (M, n) a log, and remarks.
 CleanFit = tuple[list[JointFit | None], list[Array], list[Remark]]
-"""The fits, the weights of every sample (M, n) a log, and remarks."""
 
 
 def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     """Fit friction, leave out contacts, and fit again without them.
 
-    Args:
-        data: The training logs.
-        strict: Whether links that do not explain the torque are an error, not a remark.
-
     Returns:
         The fits, the weights of every sample (M, n) a log, and remarks.
-
-    Raises:
-        IdentificationError: If the model misses most of the torque: another robot.
     """
     weights = [m.usable.astype(float) for m in data.motions]
     fits = fit_frictions(data, weights)

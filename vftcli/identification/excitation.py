@@ -13,47 +13,26 @@ from vftcli.signals.intervals import intervals, near
 from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.series import median_step
 
-SLOW = 0.02
-"""A joint must move faster than this to identify anything. [rad/s]"""
-
-ENOUGH = 1.0
-"""Time it must do so, and for both ways to count the time each way. [s]"""
-
-TOUCH = 7.0
-"""Residual that counts as contact, in robust standard deviations of its joint."""
-
-STICTION_SPEED = 0.05
-"""Speed near which a joint may stick. [rad/s]"""
-
-TOUCH_TIME = 0.15
-"""Time it must last. [s]"""
-
-TOUCH_MARGIN = 0.3
-"""Time left out before and after. [s]"""
-
+SLOW = 0.02  #: A joint must move faster than this to identify anything. [rad/s]
+ENOUGH = 1.0  #: Time it must do so, and for both ways to count the time each way. [s]
+TOUCH = 7.0  #: Residual that counts as contact, in robust standard deviations of its joint.
+STICTION_SPEED = 0.05  #: Speed near which a joint may stick. [rad/s]
+TOUCH_TIME = 0.15  #: Time it must last. [s]
+TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
+#: Share of the torque's variation that the profile's links and fitted friction must explain in the
+#: joints that carry weight; with the right robot it is 0.99 or more.
 WRONG = 0.95
-"""Share of the torque's variation that the profile's links and fitted friction must explain in the
-joints that carry weight; with the right robot it is 0.99 or more."""
 
 
 class Excitation(NamedTuple):
-    """Which joints the training logs excite.
+    """Which joints the training logs excite."""
 
-    Attributes:
-        moves: Whether a joint moves at all. (n,)
-        reverses: Whether it moves both ways. (n,)
-    """
-
-    moves: Mask
-    reverses: Mask
+    moves: Mask  #: Whether a joint moves at all. (n,)
+    reverses: Mask  #: Whether it moves both ways. (n,)
 
 
 def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
-    """Find which joints move, and which both ways.
-
-    Raises:
-        IdentificationError: If no joint moves: a log at rest identifies nothing.
-    """
+    """Find which joints move, and which both ways."""
     times = np.zeros((2, motions[0].dq.shape[1]))
     for motion in motions:
         if motion.samples < 2:
@@ -74,19 +53,12 @@ def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
 
 
 class ContactSpan(NamedTuple):
-    """A stretch in which something seems to touch the arm.
+    """A stretch in which something seems to touch the arm."""
 
-    Attributes:
-        start: First instant. [s]
-        stop: Last instant. [s]
-        joint: Joint with the largest residual, from 1.
-        size: Its residual there. [N·m]
-    """
-
-    start: float
-    stop: float
-    joint: int
-    size: float
+    start: float  #: First instant. [s]
+    stop: float  #: Last instant. [s]
+    joint: int  #: Joint with the largest residual, from 1.
+    size: float  #: Its residual there. [N·m]
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:

@@ -23,6 +23,7 @@ from vftcli.signals.filters import low_pass
 PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
+#: Sets of friction terms that compete, simplest first.
 CANDIDATES: tuple[tuple[str, ...], ...] = (
     ("coulomb", "offset"),
     PLAIN,
@@ -35,95 +36,61 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     (*CURVED, "stribeck"),
     (*CURVED, "stribeck", "load_coulomb"),
 )
-"""Sets of friction terms that compete, simplest first."""
-
+#: Presliding lengths that compete with none, one for the whole arm. [rad]
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-"""Presliding lengths that compete with none, one for the whole arm. [rad]"""
-
+#: What may stand beside the points of a bent line.
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
-"""What may stand beside the points of a bent line."""
-
+#: Terms whose negative value would push the joint along.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
-"""Terms whose negative value would push the joint along."""
-
+#: Terms that are bounded at zero in the fit of a joint for which no candidate is friction.
 BOUNDED = ("coulomb", "viscous")
-"""Terms that are bounded at zero in the fit of a joint for which no candidate is friction."""
 
+#: Velocities are turned where both terms push, so that the bound leaves this many times the power,
+#: by more than this share of the joint's largest torque: of right ones a model's error pushes by up
+#: to .7 % of it, while friction is 2 % (a Panda's wrist) to 20 % (a UR's).
 TURNED, PUSH = 2.0, 0.02
-"""Velocities are turned where both terms push, so that the bound leaves this many times the power,
-by more than this share of the joint's largest torque: of right ones a model's error pushes by up to
-.7 % of it, while friction is 2 % (a Panda's wrist) to 20 % (a UR's)."""
 
-SLIDING = 3e-3
-"""Smoothing of the sign where presliding says what happens around rest. [rad/s]"""
-
+SLIDING = 3e-3  #: Smoothing of the sign where presliding says what happens around rest. [rad/s]
+#: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
-"""Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]"""
-
-MARGIN = 1.01
-"""A simpler model within this factor of the best cross-validated error is preferred."""
-
+MARGIN = 1.01  #: A simpler model within this factor of the best cross-validated error is preferred.
+#: A shorter presliding length within this factor of the best is preferred, and none to all.
 LENGTH_MARGIN = 1.02
-"""A shorter presliding length within this factor of the best is preferred, and none to all."""
-
-LIGHT = 1.0
-"""Spread of the gravity torque below which growth with load cannot be told. [N·m]"""
+LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be told. [N·m]
 
 
 class ShapeChoice(NamedTuple):
-    """One candidate's cross-validated error.
+    """One candidate's cross-validated error."""
 
-    Attributes:
-        joint: Joint, from 1.
-        shape: The candidate.
-        error: RMS on the stretches left out. [N·m]
-        chosen: Whether it was taken.
-    """
-
-    joint: int
-    shape: Shape
-    error: float
-    chosen: bool = False
+    joint: int  #: Joint, from 1.
+    shape: Shape  #: The candidate.
+    error: float  #: RMS on the stretches left out. [N·m]
+    chosen: bool = False  #: Whether it was taken.
 
 
 class PreslidingChoice(NamedTuple):
-    """The presliding length of an arm.
+    """The presliding length of an arm."""
 
-    Attributes:
-        length: The chosen one, 0 for none. [rad]
-        errors: Cross-validated error of every length over that of none, root of the mean square
-            over the joints.
-    """
-
-    length: float
+    length: float  #: The chosen one, 0 for none. [rad]
+    #: Cross-validated error of every length over that of none, root of the mean square over the
+    #: joints.
     errors: dict[float, float]
 
 
 class JointData(NamedTuple):
-    """What one joint's fit is made from, over all training logs.
+    """What one joint's fit is made from, over all training logs."""
 
-    Attributes:
-        y: Torque that friction and rotor shall explain. (M,) [N·m]
-        fixed: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque
-            where the drive constant is. (M, f)
-        weights: 0 where nothing is told, 1 elsewhere. (M,)
-        sources: Friction columns of each log.
-        load_spread: Spread of the gravity torque. [N·m]
-        reverses: Whether the joint moves both ways.
-        speed_limit: Speed up to which its friction may not fall. [rad/s]
-        torque_limit: The joint's largest torque, 0 where that is not known. [N·m]
-        profile: Torque of the profile's friction and rotor; None where they do not compete. (M,)
-            [N·m]
-    """
-
-    y: Array
+    y: Array  #: Torque that friction and rotor shall explain. (M,) [N·m]
+    #: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque where
+    #: the drive constant is. (M, f)
     fixed: Array
-    weights: Array
-    sources: Sequence[FrictionColumns]
-    load_spread: float
-    reverses: bool
-    speed_limit: float
-    torque_limit: float = 0.0
+    weights: Array  #: 0 where nothing is told, 1 elsewhere. (M,)
+    sources: Sequence[FrictionColumns]  #: Friction columns of each log.
+    load_spread: float  #: Spread of the gravity torque. [N·m]
+    reverses: bool  #: Whether the joint moves both ways.
+    speed_limit: float  #: Speed up to which its friction may not fall. [rad/s]
+    torque_limit: float = 0.0  #: The joint's largest torque, 0 where that is not known. [N·m]
+    #: Torque of the profile's friction and rotor; None where they do not compete. (M,) [N·m]
     profile: Array | None = None
 
     @property
@@ -160,9 +127,6 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
     It is chosen in the band in which an observer listens: what the play operator leaves at a
     reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
     taken, which forgets soonest that it started undeflected.
-
-    Args:
-        joints: Every joint that moves, from 0, with its equations.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # Of a joint that goes one way the play operator is a constant.
@@ -279,11 +243,6 @@ def bounded_shape(j: int, shape: Shape, data: JointData) -> tuple[Shape, bool]:
     """A shape less the terms at zero, Coulomb and viscous friction bounded there in the fit.
 
     Also whether velocities seem turned, see `TURNED`.
-
-    Args:
-        j: Joint, from 0.
-        shape: A shape with both terms.
-        data: Its equations.
     """
     powers: dict[Shape, float] = {}
     for without in ((), *((term,) for term in BOUNDED), BOUNDED):

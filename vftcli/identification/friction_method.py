@@ -25,20 +25,12 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, Where, caution
 
+#: Slope of measured over expected torque below which a current does not follow its torque.
 LEAST_SLOPE = 0.05
-"""Slope of measured over expected torque below which a current does not follow its torque."""
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
-    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table.
-
-    Args:
-        data: The training logs.
-        fitted: What `fit_without_contacts` gives for them, None to ask it.
-
-    Raises:
-        IdentificationError: If nothing is left to be found, or the links are another robot's.
-    """
+    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
     if not (data.rubs or data.rotor):
         raise IdentificationError(
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
@@ -89,9 +81,6 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 
     Torque was made from currents with the profile's K. Where the rigid body's torque comes out as
     scale times what it must be, the true K is K / scale, and so are all coefficients beside it.
-
-    Raises:
-        IdentificationError: If the current does not follow the torque.
     """
     scale, scale_sd = float(values[-1]), float(sd[-1])
     if scale <= LEAST_SLOPE:

@@ -16,46 +16,30 @@ from vftcli.robots.profile import FRICTION_KEYS
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 
-SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)
-"""Velocities over which the sign may be smoothed. [rad/s]"""
-
+SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
+#: Velocities over which a Stribeck term may fade. [rad/s]
 STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
-"""Velocities over which a Stribeck term may fade. [rad/s]"""
-
-
+#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]
 LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
-"""Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]"""
-
-
+#: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
 BENDS = (0.01, 0.5, 1.5, 3.2)
-"""Speeds of the points between which UR's controllers draw friction as a line. [rad/s]"""
-
+#: Share of the way between two points that a motion must cover to tell the faster one.
 SPANNED = 0.3
-"""Share of the way between two points that a motion must cover to tell the faster one."""
-
-POINT = "point"
-"""How the terms of a bent line begin: point1 is the torque at its first speed."""
+POINT = "point"  #: How the terms of a bent line begin: point1 is the torque at its first speed.
 
 
 class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its nonlinear numbers.
+    """The structure of one joint's friction: which terms, and its nonlinear numbers."""
 
-    Attributes:
-        terms: Keys of the robot file whose values are coefficients, in order; those that begin with
-            `POINT` are the torques of a bent line.
-        smoothing: Velocity over which the sign is smoothed. [rad/s]
-        stribeck_velocity: Velocity over which the Stribeck term fades. [rad/s]
-        logarithmic_velocity: Velocity from which the logarithmic term flattens. [rad/s]
-        presliding_length: Way over which the teeth of the gear give before they slide. [rad]
-        speeds: Speeds of the bent line's points. [rad/s]
-    """
-
+    #: Keys of the robot file whose values are coefficients, in order; those that begin with `POINT`
+    #: are the torques of a bent line.
     terms: tuple[str, ...]
-    smoothing: float = SMOOTHING
-    stribeck_velocity: float = 0.05
-    logarithmic_velocity: float = 1.0
+    smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
+    stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
+    logarithmic_velocity: float = 1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
+    #: Way over which the teeth of the gear give before they slide. [rad]
     presliding_length: float = 0.0
-    speeds: tuple[float, ...] = ()
+    speeds: tuple[float, ...] = ()  #: Speeds of the bent line's points. [rad/s]
 
     @property
     def model(self) -> str:

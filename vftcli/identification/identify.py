@@ -37,36 +37,27 @@ from vftcli.signals.errors import IdentificationError, ParameterError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
+#: Name at the command line → method.
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
     "base": whole_arm,
     "targets": targets_method,
 }
-"""Name at the command line → method."""
-
+#: Name of the choice between "friction" and "base" by what the profile's links leave.
 AUTO = "auto"
-"""Name of the choice between "friction" and "base" by what the profile's links leave."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What shall be identified.
+    """What shall be identified."""
 
-    Attributes:
-        method: A name in `METHODS`, `AUTO`, or None for a payload alone.
-        name: Name of the new robot.
-        find_payload: Whether a load on the flange is sought.
-        fit_constants: Whether the friction method also fits drive constants.
-        friction: Whether the joints have friction to be fitted; a simulator's may have none.
-        processing: Filters and decimation.
-    """
-
-    method: str | None = "friction"
-    name: str = ""
-    find_payload: bool = False
-    fit_constants: bool = False
+    method: str | None = "friction"  #: A name in `METHODS`, `AUTO`, or None for a payload alone.
+    name: str = ""  #: Name of the new robot.
+    find_payload: bool = False  #: Whether a load on the flange is sought.
+    fit_constants: bool = False  #: Whether the friction method also fits drive constants.
+    #: Whether the joints have friction to be fitted; a simulator's may have none.
     friction: bool = True
-    processing: Processing = field(default_factory=Processing)
+    processing: Processing = field(default_factory=Processing)  #: Filters and decimation.
 
     def __post_init__(self) -> None:
         if self.method is not None and self.method not in (*METHODS, AUTO):

@@ -9,34 +9,22 @@ import numpy as np
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
+#: Residuals beyond this many robust standard deviations weigh less (Huber). On normal noise that
+#: is 1.2 % of the samples.
 HUBER = 2.5
-"""Residuals beyond this many robust standard deviations weigh less (Huber). On normal noise that
-is 1.2 % of the samples."""
-
-PASSES = 6
-"""Reweighting passes."""
-
+PASSES = 6  #: Reweighting passes.
+#: Eigenvalues of scaled normal equations below this share of the largest tell nothing.
 NULL = 1e-12
-"""Eigenvalues of scaled normal equations below this share of the largest tell nothing."""
-
-FOLDS = 5
-"""Contiguous stretches of the log for cross-validation."""
+FOLDS = 5  #: Contiguous stretches of the log for cross-validation.
 
 
 class ColumnFit(NamedTuple):
-    """A fitted column.
+    """A fitted column."""
 
-    Attributes:
-        values: Coefficients. (k,)
-        sd: Their standard deviations, the residual's correlation along time counted. (k,)
-        residual: What is not explained. (M,)
-        weights: Final weights, 0 … 1. (M,)
-    """
-
-    values: Array
-    sd: Array
-    residual: Array
-    weights: Array
+    values: Array  #: Coefficients. (k,)
+    sd: Array  #: Their standard deviations, the residual's correlation along time counted. (k,)
+    residual: Array  #: What is not explained. (M,)
+    weights: Array  #: Final weights, 0 … 1. (M,)
 
 
 def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
@@ -46,9 +34,6 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
         A: Columns. (M, k)
         y: What they shall explain. (M,)
         weights: Weights to start from, 0 for samples that tell nothing. (M,)
-
-    Raises:
-        IdentificationError: If fewer samples tell something than there are unknowns.
     """
     if np.count_nonzero(weights) <= 2 * A.shape[1]:
         raise IdentificationError(
@@ -68,17 +53,11 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
 
 
 class Normal(NamedTuple):
-    """Normal equations: all that least squares needs of any number of rows.
+    """Normal equations: all that least squares needs of any number of rows."""
 
-    Attributes:
-        gram: AᵀA. (k, k)
-        right: Aᵀy. (k,)
-        square: yᵀy.
-    """
-
-    gram: Array
-    right: Array
-    square: float
+    gram: Array  #: AᵀA. (k, k)
+    right: Array  #: Aᵀy. (k,)
+    square: float  #: yᵀy.
 
     def minus(self, other: "Normal") -> "Normal":
         """The normal equations without some of the rows: least squares of all stretches but one."""
@@ -158,10 +137,6 @@ def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
 
     Of several logs that tell something each is left out whole: another log is what a model is for.
     A single one is cut into fifths. Rows of logs that tell nothing are never left out.
-
-    Args:
-        lengths: Rows of each log.
-        told: Whether a log tells something.
     """
     edges = np.cumsum([0, *lengths])
     rows = [

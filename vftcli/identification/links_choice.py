@@ -16,8 +16,8 @@ from vftcli.identification.whole_arm import whole_arm
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import caution
 
+#: Share of a joint's torque that its profile's links must leave before others are sought.
 MATTERS = 0.02
-"""Share of a joint's torque that its profile's links must leave before others are sought."""
 
 
 def chosen_method(data: Training) -> tuple[str, MethodResult]:
@@ -25,9 +25,6 @@ def chosen_method(data: Training) -> tuple[str, MethodResult]:
 
     The links are identified too where they leave `OTHER_LINKS` times what free ones leave, the logs
     tell them, and nothing suggests a load or another arm.
-
-    Raises:
-        IdentificationError: If the logs suggest another arm or an unknown load.
     """
     fits, weights, remarks = fit_without_contacts(data, strict=True)
     kept = friction_method(data, (fits, weights, remarks))

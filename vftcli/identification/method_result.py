@@ -18,31 +18,21 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
+#: Standard deviation over value up to which a number counts as determined by the logs.
 DETERMINED = 0.3
-"""Standard deviation over value up to which a number counts as determined by the logs."""
-
+#: Standard deviations from the profile's rotor inertia from which on what was found is taken.
 REFUTED = 3.0
-"""Standard deviations from the profile's rotor inertia from which on what was found is taken."""
 
 
 class MethodResult(NamedTuple):
-    """What a method found.
+    """What a method found."""
 
-    Attributes:
-        robot: The identified robot.
-        numbers: Its identified numbers.
-        shape_choices: Friction candidates.
-        base: Base parameters, if the method has them.
-        remarks: What the reader of the numbers should know.
-        is_narrow: Whether the motion tells the links too little.
-    """
-
-    robot: Robot
-    numbers: list[Number]
-    shape_choices: list[ShapeChoice]
-    base: BaseParameters | None
-    remarks: list[Remark]
-    is_narrow: bool = False
+    robot: Robot  #: The identified robot.
+    numbers: list[Number]  #: Its identified numbers.
+    shape_choices: list[ShapeChoice]  #: Friction candidates.
+    base: BaseParameters | None  #: Base parameters, if the method has them.
+    remarks: list[Remark]  #: What the reader of the numbers should know.
+    is_narrow: bool = False  #: Whether the motion tells the links too little.
 
 
 def friction_numbers(
@@ -73,11 +63,7 @@ def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
 
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
-    """A remark if the friction found would push joint j (from 0) at some speed, or falls.
-
-    Raises:
-        IdentificationError: If it pushes at all speeds: sign or unit are wrong.
-    """
+    """A remark if the friction found would push joint j (from 0) at some speed, or falls."""
     speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in data.motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(m.tau[:, j]) for m in data.motions)

@@ -27,35 +27,17 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import resample_columns
 
-STATIC = 4
-"""Parameters that gravity tells: mass and three first moments."""
-
-SAME_MOTION = 5e-3
-"""Position difference up to which two logs are the same motion. [rad rms]"""
-
-COARSE, FINE = 0.05, 5e-4
-"""Steps in which the shift between two logs is sought. [s]"""
-
-DWELL = 0.5
-"""Shortest rest that counts as a pose. [s]"""
-
+STATIC = 4  #: Parameters that gravity tells: mass and three first moments.
+SAME_MOTION = 5e-3  #: Position difference up to which two logs are the same motion. [rad rms]
+COARSE, FINE = 0.05, 5e-4  #: Steps in which the shift between two logs is sought. [s]
+DWELL = 0.5  #: Shortest rest that counts as a pose. [s]
+#: A pose is held while no joint moves further than `STILL` [rad] within `WINDOW` [s].
 WINDOW, STILL = 0.2, 1e-3
-"""A pose is held while no joint moves further than `STILL` [rad] within `WINDOW` [s]."""
-
-POSES = 4
-"""Fewest different poses for mass and centre of mass."""
-
-APART = 0.1
-"""Poses are different if a joint is this far elsewhere. [rad]"""
-
-MOST_NAMED = 4
-"""Logs that are called by their names; there may be thousands of episodes."""
-
-STRETCHES = 12
-"""Stretches of a motion whose errors are taken as each other's strangers."""
-
-REACH = 1.0
-"""A load's centre of mass further than this from the flange cannot be. [m]"""
+POSES = 4  #: Fewest different poses for mass and centre of mass.
+APART = 0.1  #: Poses are different if a joint is this far elsewhere. [rad]
+MOST_NAMED = 4  #: Logs that are called by their names; there may be thousands of episodes.
+STRETCHES = 12  #: Stretches of a motion whose errors are taken as each other's strangers.
+REACH = 1.0  #: A load's centre of mass further than this from the flange cannot be. [m]
 
 
 def names_of(recordings: Sequence[Recording]) -> str:
@@ -72,23 +54,14 @@ class TooFewPosesError(IdentificationError):
 
 
 class LoadFit(NamedTuple):
-    """An identified load.
+    """An identified load."""
 
-    Attributes:
-        payload: The load on the flange, as a point mass.
-        mass_sd: Standard deviation of the mass. [kg]
-        com_sd: Standard deviations of the centre of mass in flange axes. (3,) [m]
-        residual: RMS torque left in each joint. (n,) [N·m]
-        loaded: The logs that carry it.
-        origin: How it was found.
-    """
-
-    payload: Payload
-    mass_sd: float
-    com_sd: Array
-    residual: Array
-    loaded: tuple[Recording, ...]
-    origin: Remark
+    payload: Payload  #: The load on the flange, as a point mass.
+    mass_sd: float  #: Standard deviation of the mass. [kg]
+    com_sd: Array  #: Standard deviations of the centre of mass in flange axes. (3,) [m]
+    residual: Array  #: RMS torque left in each joint. (n,) [N·m]
+    loaded: tuple[Recording, ...]  #: The logs that carry it.
+    origin: Remark  #: How it was found.
 
     def carried_by(self, recording: Recording) -> bool:
         """Whether a log carries it. Logs are told apart as objects: their names may be equal."""
@@ -96,27 +69,17 @@ class LoadFit(NamedTuple):
 
 
 class LoadSolution(NamedTuple):
-    """Mass and first moments in the last link's frame, before they are known to be a load's.
+    """Mass and first moments in the last link's frame, before they are known to be a load's."""
 
-    Attributes:
-        x: The solution. (4,) [kg, kg·m]
-        sd: Its standard deviations. (4,)
-        residual: RMS left in each joint. (n,) [N·m]
-    """
-
-    x: Array
-    sd: Array
-    residual: Array
+    x: Array  #: The solution. (4,) [kg, kg·m]
+    sd: Array  #: Its standard deviations. (4,)
+    residual: Array  #: RMS left in each joint. (n,) [N·m]
 
 
 def load_at_flange(
     found: LoadSolution, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
-    """A solution as a load in flange axes.
-
-    Raises:
-        IdentificationError: If the mass is not positive, uncertain, or lies out of reach.
-    """
+    """A solution as a load in flange axes."""
     names, mass, sd = names_of(loaded), float(found.x[0]), float(found.sd[0])
     if mass <= 0 or sd > 0.5 * mass:
         raise IdentificationError(
@@ -140,10 +103,6 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
 
     The torque difference at the same phase is the load's, since friction and model errors are
     alike in both, but for friction that grows with the load: that is fitted along.
-
-    Raises:
-        NotSameMotionError: If the logs are not the same motion.
-        IdentificationError: If they differ by no load.
     """
     loaded = second
     solution, origin = solve_pair(second, first, robot)
@@ -293,11 +252,7 @@ def gain_covariance(A: Array, left: Array, y: Array, usable: Array, gain: float)
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] that turns the motion's clock into the other log's, and what is left. [rad rms]
-
-    Raises:
-        NotSameMotionError: If positions differ by more than `SAME_MOTION`.
-    """
+    """Shift [s] that turns the motion's clock into the other log's, and what is left. [rad rms]"""
 
     def distance(shift: float) -> float:
         at = motion.t + shift
@@ -328,10 +283,6 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     Stiction hides in every pose; its size is what the residual shows, and many poses average it.
     What the model misses of an arm, and what a day does to its drives, is alike in all poses of a
     log: of several logs, how they differ is part of the standard deviations.
-
-    Raises:
-        TooFewPosesError: If there are too few different poses.
-        IdentificationError: If the poses determine no load.
     """
     each = [resting_poses([recording], robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))

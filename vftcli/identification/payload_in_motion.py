@@ -35,31 +35,21 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
 
-LOOKED_AT = 400
-"""Samples of a motion, at most, by which its different poses are counted."""
-
+LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
+#: What a weighing needs: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
+#: of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
 LONG = 10.0
-"""What a weighing needs: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
-of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]"""
-
+#: Weighings with the load on the arm: the third moves mass and centre by less than .1 %.
 ROUNDS = 3
-"""Weighings with the load on the arm: the third moves mass and centre by less than .1 %."""
 
 
 class MotionWeighing(NamedTuple):
-    """What a motion says of a load.
+    """What a motion says of a load."""
 
-    Attributes:
-        x: Mass and first moment in flange axes. (4,) [kg, kg·m]
-        covariance: Of these. (4, 4)
-        residual: RMS left in each joint. (n,) [N·m]
-        share: What is left of the torque beside weight and friction of the arm, by its power.
-    """
-
-    x: Array
-    covariance: Array
-    residual: Array
-    share: float
+    x: Array  #: Mass and first moment in flange axes. (4,) [kg, kg·m]
+    covariance: Array  #: Of these. (4, 4)
+    residual: Array  #: RMS left in each joint. (n,) [N·m]
+    share: float  #: What is left of the torque beside weight and friction of the arm, by its power.
 
     @property
     def least(self) -> float:
@@ -77,9 +67,6 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
 
     The columns of `vftcli.repetition.free_load` know of a load's weight alone: with what was found
     on the arm the motion is weighed again, so that the load's inertia does not count as weight.
-
-    Raises:
-        IdentificationError: If the arm hardly moves, or too short, or no load shows.
     """
     names = names_of(recordings)
     q = np.concatenate([recording.q for recording in recordings])
@@ -124,9 +111,6 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
     Args:
         runs: Logs that carry it.
         carried: Mass and first moment of what their models carry of it. (4,) [kg, kg·m]
-
-    Raises:
-        IdentificationError: If the logs are too short.
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:

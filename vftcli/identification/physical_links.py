@@ -21,25 +21,18 @@ from vftcli.robots.regressor import LINK, TENSOR
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
+#: Weights of the distance to the profile, from hardly any pull to the profile itself.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
-"""Weights of the distance to the profile, from hardly any pull to the profile itself."""
-
-MARGIN = 1.01
-"""Factor of the least misfit within which a pull predicts as well as the best one."""
-
+MARGIN = 1.01  #: Factor of the least misfit within which a pull predicts as well as the best one.
+#: Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
+#: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
-"""Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
-P = (1 + δ) P₀ is 2 δ² for small δ."""
-
-STEPS = 100
-"""Newton steps at most; a dozen or two are usual."""
-
+STEPS = 100  #: Newton steps at most; a dozen or two are usual.
+#: Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one standard
+#: deviation of one parameter, so that the rest to go is nothing.
 SETTLED = 1e-3
-"""Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one standard
-deviation of one parameter, so that the rest to go is nothing."""
-
+#: A profile's link is made at least this thick, so that a distance to it exists. [m]
 SMALLEST_RADIUS = 1e-3
-"""A profile's link is made at least this thick, so that a distance to it exists. [m]"""
 
 
 def basis() -> Array:
@@ -95,21 +88,13 @@ def thicken_links(phi: Array) -> Array:
 
 
 class Problem(NamedTuple):
-    """½‖R x − z‖² + weight · distance(x, start), over physical x.
+    """½‖R x − z‖² + weight · distance(x, start), over physical x."""
 
-    Attributes:
-        R: Triangle of the stacked equations. (size, size)
-        z: Its right-hand side. (size,)
-        start: The profile, physical. (size,)
-        layout: The unknowns.
-        weight: Weight of the distance.
-    """
-
-    R: Array
-    z: Array
-    start: Array
-    layout: ParameterColumns
-    weight: float
+    R: Array  #: Triangle of the stacked equations. (size, size)
+    z: Array  #: Its right-hand side. (size,)
+    start: Array  #: The profile, physical. (size,)
+    layout: ParameterColumns  #: The unknowns.
+    weight: float  #: Weight of the distance.
 
     def value(self, x: Array) -> float:
         """The cost; infinite outside the physical models."""
@@ -148,11 +133,7 @@ class Problem(NamedTuple):
 
 
 def solve(problem: Problem, x: Array) -> Array:
-    """Damped Newton from a physical x; every iterate is physical. (size,)
-
-    Raises:
-        IdentificationError: If it does not settle.
-    """
+    """Damped Newton from a physical x; every iterate is physical. (size,)"""
     cost = problem.value(x)
     for _ in range(STEPS):
         step, decrement = problem.step(x)

@@ -20,22 +20,16 @@ from vftcli.signals.series import gaps_of
 
 @dataclass(frozen=True, kw_only=True)
 class Processing:
-    """How signals are prepared. Everything a joint's torque is made of goes through one filter.
+    """How signals are prepared. Everything a joint's torque is made of goes through one filter."""
 
-    Attributes:
-        cutoff: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends
-            there. [Hz]
-        oversampling: Samples kept per period of the cutoff when the filtered log is decimated.
-        still: Speed below which a joint counts as at rest. [rad/s]
-        rest: Length of a stop from which on it identifies nothing, because of stiction. [s]
-        gap: Steps longer than this many median steps are left out.
-    """
-
+    #: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
     cutoff: float = 8.0
+    #: Samples kept per period of the cutoff when the filtered log is decimated.
     oversampling: float = 6.0
-    still: float = 1e-3
+    still: float = 1e-3  #: Speed below which a joint counts as at rest. [rad/s]
+    #: Length of a stop from which on it identifies nothing, because of stiction. [s]
     rest: float = 0.3
-    gap: float = 10.0
+    gap: float = 10.0  #: Steps longer than this many median steps are left out.
 
     def __post_init__(self) -> None:
         if not 0.0 < self.cutoff < 1e4:
@@ -65,29 +59,18 @@ class Processing:
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedLog:
-    """A log prepared for identification: M samples from the first to the last that moves.
+    """A log prepared for identification: M samples from the first to the last that moves."""
 
-    Attributes:
-        recording: The log.
-        processing: How it was prepared.
-        kept: Which samples of the log these are. (M,)
-        t: Time. (M,) [s]
-        q: Positions. (M, n) [rad]
-        dq: Velocities. (M, n) [rad/s]
-        ddq: Accelerations. (M, n) [rad/s²]
-        tau: Drive torque, friction included. (M, n) [N·m]
-        usable: Whether a sample of a joint tells anything: the joint is not in a long stop and
-            the sample lies in no gap of the clock. (M, n)
-    """
-
-    recording: Recording
-    processing: Processing
-    kept: NDArray[np.int64]
-    t: Array
-    q: Array
-    dq: Array
-    ddq: Array
-    tau: Array
+    recording: Recording  #: The log.
+    processing: Processing  #: How it was prepared.
+    kept: NDArray[np.int64]  #: Which samples of the log these are. (M,)
+    t: Array  #: Time. (M,) [s]
+    q: Array  #: Positions. (M, n) [rad]
+    dq: Array  #: Velocities. (M, n) [rad/s]
+    ddq: Array  #: Accelerations. (M, n) [rad/s²]
+    tau: Array  #: Drive torque, friction included. (M, n) [N·m]
+    #: Whether a sample of a joint tells anything: the joint is not in a long stop and the sample
+    #: lies in no gap of the clock. (M, n)
     usable: Mask
 
     @property

@@ -20,15 +20,7 @@ def with_provenance(
     trained: Sequence[Recording],
     load: LoadFit | None,
 ) -> Robot:
-    """The identified robot under its own name, its document telling the source of every number.
-
-    Args:
-        found: What was identified.
-        name: The robot's name; "" makes one from the profile's.
-        logs: Every log that was used.
-        trained: Those the arm was identified from.
-        load: The load that was found, or None.
-    """
+    """The identified robot under its own name, its document telling the source of every number."""
     profile = found.profile
     named = replace(
         found.robot,

@@ -12,6 +12,8 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark
 
+#: One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
+#: counts the logs from 1, training first: two files of one name stay two logs.
 RESIDUALS = pl.Schema(
     {
         "log": pl.String,
@@ -23,9 +25,7 @@ RESIDUALS = pl.Schema(
         "samples": pl.Int64,
     }
 )
-"""One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
-counts the logs from 1, training first: two files of one name stay two logs."""
-
+#: One row a number: its value, standard deviation, and what the profile said.
 PARAMETERS = pl.Schema(
     {
         "joint": pl.Int64,
@@ -37,18 +37,15 @@ PARAMETERS = pl.Schema(
         "determined": pl.Boolean,
     }
 )
-"""One row a number: its value, standard deviation, and what the profile said."""
-
+#: One row a friction candidate: its cross-validated error.
 SHAPE_CHOICES = pl.Schema(
     {"joint": pl.Int64, "friction": pl.String, "cv_rms_Nm": pl.Float64, "chosen": pl.Boolean}
 )
-"""One row a friction candidate: its cross-validated error."""
-
+#: One row a base parameter, or a friction coefficient estimated along with them.
 BASE = pl.Schema(
     {"parameter": pl.String, "value": pl.Float64, "sd": pl.Float64, "determined": pl.Boolean}
 )
-"""One row a base parameter, or a friction coefficient estimated along with them."""
-
+#: Parameter → its unit.
 UNITS = {
     "torque_constant": "N·m/A",
     "rotor_inertia": "kg·m²",
@@ -66,7 +63,6 @@ UNITS = {
     "com_y": "m",
     "com_z": "m",
 }
-"""Parameter → its unit."""
 
 
 def root_mean_square(x: Array) -> Array:
@@ -76,25 +72,15 @@ def root_mean_square(x: Array) -> Array:
 
 
 class Number(NamedTuple):
-    """One identified number; a row of `PARAMETERS`.
+    """One identified number; a row of `PARAMETERS`."""
 
-    Attributes:
-        joint: Joint, from 1; the last one for a load on the flange.
-        parameter: Its key in the robot file, one of `UNITS`.
-        value: The estimate.
-        sd: Its standard deviation.
-        unit: Unit of value, sd and profile.
-        profile: What the profile says, nan where it says nothing.
-        determined: Whether the logs determine it; a value that they do not is not written.
-    """
-
-    joint: int
-    parameter: str
-    value: float
-    sd: float
-    unit: str
-    profile: float
-    determined: bool
+    joint: int  #: Joint, from 1; the last one for a load on the flange.
+    parameter: str  #: Its key in the robot file, one of `UNITS`.
+    value: float  #: The estimate.
+    sd: float  #: Its standard deviation.
+    unit: str  #: Unit of value, sd and profile.
+    profile: float  #: What the profile says, nan where it says nothing.
+    determined: bool  #: Whether the logs determine it; a value that they do not is not written.
 
 
 def number(
@@ -106,21 +92,13 @@ def number(
 
 
 class Trace(NamedTuple):
-    """Measured and predicted torque of one log, filtered alike.
+    """Measured and predicted torque of one log, filtered alike."""
 
-    Attributes:
-        motion: The prepared log.
-        role: "train" or "held-out".
-        measured: Drive torque, by the identified drive constants. (M, n) [N·m]
-        predicted: What the identified robot expects. (M, n) [N·m]
-        before: RMS of what the profile does not explain. (n,) [N·m]
-    """
-
-    motion: PreparedLog
-    role: str
-    measured: Array
-    predicted: Array
-    before: Array
+    motion: PreparedLog  #: The prepared log.
+    role: str  #: "train" or "held-out".
+    measured: Array  #: Drive torque, by the identified drive constants. (M, n) [N·m]
+    predicted: Array  #: What the identified robot expects. (M, n) [N·m]
+    before: Array  #: RMS of what the profile does not explain. (n,) [N·m]
 
     @property
     def residual(self) -> Array:
@@ -145,28 +123,17 @@ class Trace(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Identification:
-    """A robot made from logs, with the account of how.
+    """A robot made from logs, with the account of how."""
 
-    Attributes:
-        robot: The identified robot; its document carries the sources.
-        profile: The robot it started from.
-        method: Name of the method.
-        residuals: RMS per log, model and joint (`RESIDUALS`).
-        parameters: Identified numbers (`PARAMETERS`).
-        shape_choices: Friction candidates (`SHAPE_CHOICES`), empty where none competed.
-        base: Base parameters (`BASE`), None for methods that have none.
-        traces: Measured and predicted torque of every log.
-        processing: Filters, differentiation, decimation and band, by name.
-        remarks: What the reader should know.
-    """
-
-    robot: Robot
-    profile: Robot
-    method: str
-    residuals: pl.DataFrame
-    parameters: pl.DataFrame
+    robot: Robot  #: The identified robot; its document carries the sources.
+    profile: Robot  #: The robot it started from.
+    method: str  #: Name of the method.
+    residuals: pl.DataFrame  #: RMS per log, model and joint (`RESIDUALS`).
+    parameters: pl.DataFrame  #: Identified numbers (`PARAMETERS`).
+    #: Friction candidates (`SHAPE_CHOICES`), empty where none competed.
     shape_choices: pl.DataFrame
-    base: pl.DataFrame | None
-    traces: tuple[Trace, ...]
+    base: pl.DataFrame | None  #: Base parameters (`BASE`), None for methods that have none.
+    traces: tuple[Trace, ...]  #: Measured and predicted torque of every log.
+    #: Filters, differentiation, decimation and band, by name.
     processing: Mapping[str, Any] = field(default_factory=dict)
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: What the reader should know.

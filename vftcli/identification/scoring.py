@@ -19,29 +19,16 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resample_columns
 
-EXPLAINS = 0.4
-"""Share of a residual that a cause must explain to be named."""
-
-HEAVY = 0.3
-"""Smallest load that is remarked on. [kg]"""
-
-ENOUGH = 50
-"""Samples in motion that a remark on friction needs."""
-
-WORSE = 1.5
-"""A held-out joint whose residual is this many times the training's is remarked on."""
-
+EXPLAINS = 0.4  #: Share of a residual that a cause must explain to be named.
+HEAVY = 0.3  #: Smallest load that is remarked on. [kg]
+ENOUGH = 50  #: Samples in motion that a remark on friction needs.
+WORSE = 1.5  #: A held-out joint whose residual is this many times the training's is remarked on.
+#: A model that leaves this many times what the profile leaves of a log has made it worse.
 BEHIND = 1.01
-"""A model that leaves this many times what the profile leaves of a log has made it worse."""
-
-NEAR = 0.01
-"""Largest joint distance at which two samples are the same place. [rad]"""
-
-SLOWNESS = 0.1
-"""Velocity difference that counts as much as that distance, as a time. [s]"""
-
+NEAR = 0.01  #: Largest joint distance at which two samples are the same place. [rad]
+SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
+#: Share of a log's samples on another's trajectory from which on it repeats that trajectory.
 REPEATED = 0.8
-"""Share of a log's samples on another's trajectory from which on it repeats that trajectory."""
 
 
 def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
@@ -69,12 +56,7 @@ def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
 
 
 def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing) -> Trace:
-    """Measured torque of a log beside what the identified robot and the profile expect.
-
-    Raises:
-        MissingSignalError: If velocities or efforts are missing.
-        RobotError: If the number of joints differs.
-    """
+    """Measured torque of a log beside what the identified robot and the profile expect."""
     motion = prepare(log, profile, processing)
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))

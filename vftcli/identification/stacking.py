@@ -26,17 +26,11 @@ from vftcli.signals.arrays import Array, Mask
 
 
 class ParameterColumns(NamedTuple):
-    """Which unknown stands where.
+    """Which unknown stands where."""
 
-    Attributes:
-        chain: The arm's geometry.
-        rotor: Whether rotor inertias are unknowns: where torque is measured before the gear.
-        shapes: Friction structure of each joint.
-    """
-
-    chain: Chain
-    rotor: bool
-    shapes: tuple[Shape, ...]
+    chain: Chain  #: The arm's geometry.
+    rotor: bool  #: Whether rotor inertias are unknowns: where torque is measured before the gear.
+    shapes: tuple[Shape, ...]  #: Friction structure of each joint.
 
     @property
     def inertial(self) -> int:
@@ -86,31 +80,19 @@ class ParameterColumns(NamedTuple):
 
 
 class WeightedLog(NamedTuple):
-    """One training log, ready to be stacked.
+    """One training log, ready to be stacked."""
 
-    Attributes:
-        motion: The prepared log.
-        columns: Its friction columns.
-        weights: Weight of every sample and joint, 0 … 1. (M, n)
-    """
-
-    motion: PreparedLog
-    columns: FrictionColumns
-    weights: Array
+    motion: PreparedLog  #: The prepared log.
+    columns: FrictionColumns  #: Its friction columns.
+    weights: Array  #: Weight of every sample and joint, 0 … 1. (M, n)
 
 
 class Triangles(NamedTuple):
-    """The stacked, weighted equations A x ≈ y of the whole logs, as R factors of [A y].
+    """The stacked, weighted equations A x ≈ y of the whole logs, as R factors of [A y]."""
 
-    Attributes:
-        layout: The unknowns.
-        parts: R factor of each cross-validation stretch. (size+1, size+1) each
-        correlation: Samples that count as one, by the residual's correlation along time.
-    """
-
-    layout: ParameterColumns
-    parts: tuple[Array, ...]
-    correlation: float
+    layout: ParameterColumns  #: The unknowns.
+    parts: tuple[Array, ...]  #: R factor of each cross-validation stretch. (size+1, size+1) each
+    correlation: float  #: Samples that count as one, by the residual's correlation along time.
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
         """R (size, size) and the right-hand side (size,) of all stretches but one."""
@@ -130,8 +112,7 @@ def triangle(rows: Array) -> Array:
     return R
 
 
-REWEIGHTINGS = 3
-"""Passes of reweighting; each evaluates the regressor twice."""
+REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
 
 
 def residuals(layout: ParameterColumns, data: WeightedLog, x: Array) -> Array:
@@ -201,8 +182,8 @@ def weighted_rows(
         yield flat[told]
 
 
+#: Singular values below this share of the largest are left at the start (columns scaled).
 TRUNCATION = 1e-3
-"""Singular values below this share of the largest are left at the start (columns scaled)."""
 
 
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:

@@ -21,8 +21,8 @@ from vftcli.identification.training import Training
 from vftcli.robots.robot import Robot
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
+#: Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s².
 SAME_GRAVITY = 3e-4
-"""Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s²."""
 
 
 def targets_method(data: Training) -> MethodResult:

@@ -35,44 +35,28 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 
+#: Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]
 CUTOFF = 4.0
-"""Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]"""
-
+#: Relative standard deviation up to which a drive constant counts as determined.
 CONSTANT_KNOWN = 1e-2
-"""Relative standard deviation up to which a drive constant counts as determined."""
-
-ROTOR_KNOWN = 2e-2
-"""Relative standard deviation up to which a rotor inertia counts as determined."""
-
+ROTOR_KNOWN = 2e-2  #: Relative standard deviation up to which a rotor inertia counts as determined.
+#: Friction shapes beside which the drive constants must agree.
 SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
     Shape(("coulomb", "viscous", "quadratic", "offset")),
 )
-"""Friction shapes beside which the drive constants must agree."""
-
+#: Friction shapes of which the best is written where too few points of the law are reached.
 WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
 )
-"""Friction shapes of which the best is written where too few points of the law are reached."""
-
-MOVING = 0.05
-"""Speed from which a joint moves enough to show its friction. [rad/s]"""
-
-UNASKED = 0.5
-"""Share of the motion with a target velocity below which a hand led the arm."""
-
+MOVING = 0.05  #: Speed from which a joint moves enough to show its friction. [rad/s]
+UNASKED = 0.5  #: Share of the motion with a target velocity below which a hand led the arm.
+#: Share of the law that a joint's friction has at most when a hand leads the arm; programs feed .8
+#: to 1.3 of it forward, by temperature and load.
 GUIDED = 0.4
-"""Share of the law that a joint's friction has at most when a hand leads the arm; programs feed .8
-to 1.3 of it forward, by temperature and load."""
-
-SPEEDS = (0.0, 0.05, 0.1, 0.2)
-"""Lowest speeds of the samples used, which must agree too. [rad/s]"""
-
-SETTLE = 0.1
-"""Left out at both ends of a rest. [s]"""
-
-STEADY = 5e-3
-"""Relative change of the target current during a rest up to which it is one."""
+SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of the samples used, which must agree too. [rad/s]
+SETTLE = 0.1  #: Left out at both ends of a rest. [s]
+STEADY = 5e-3  #: Relative change of the target current during a rest up to which it is one.
 
 
 class Estimate(NamedTuple):
@@ -87,52 +71,31 @@ UNKNOWN = Estimate(float("nan"), float("inf"), False)
 
 
 class ControllerModel(NamedTuple):
-    """What the controller believes of one joint.
+    """What the controller believes of one joint."""
 
-    Attributes:
-        constant: Drive constant K. [N·m/A]
-        rotor: Reflected rotor inertia. [kg·m²]
-        friction: The best of `WRITTEN`, its coefficients and their standard deviations, None where
-            the joint does not move.
-        gravity: Its gravity torque over the profile's.
-    """
-
-    constant: Estimate
-    rotor: Estimate
+    constant: Estimate  #: Drive constant K. [N·m/A]
+    rotor: Estimate  #: Reflected rotor inertia. [kg·m²]
+    #: The best of `WRITTEN`, its coefficients and their standard deviations, None where the joint
+    #: does not move.
     friction: tuple[Shape, Array, Array] | None
-    gravity: Estimate
+    gravity: Estimate  #: Its gravity torque over the profile's.
 
 
 class Targets(NamedTuple):
-    """One log's targets beside its motion, filtered alike.
+    """One log's targets beside its motion, filtered alike."""
 
-    Attributes:
-        recording: The log.
-        motion: Measured motion.
-        columns: Friction columns.
-        current: Target current. (M, n) [A]
-        moment: Target moment. (M, n) [N·m]
-        lead: Its time derivative: what a shift in time would add. (M, n) [N·m/s]
-        rigid: The profile's rigid-body torque. (M, n) [N·m]
-        gravity: The profile's gravity torque. (M, n) [N·m]
-    """
-
-    recording: Recording
-    motion: PreparedLog
-    columns: FrictionColumns
-    current: Array
-    moment: Array
-    lead: Array
-    rigid: Array
-    gravity: Array
+    recording: Recording  #: The log.
+    motion: PreparedLog  #: Measured motion.
+    columns: FrictionColumns  #: Friction columns.
+    current: Array  #: Target current. (M, n) [A]
+    moment: Array  #: Target moment. (M, n) [N·m]
+    lead: Array  #: Its time derivative: what a shift in time would add. (M, n) [N·m/s]
+    rigid: Array  #: The profile's rigid-body torque. (M, n) [N·m]
+    gravity: Array  #: The profile's gravity torque. (M, n) [N·m]
 
 
 def read_targets(recording: Recording, robot: Robot) -> Targets:
-    """Filter a log's targets like its motion.
-
-    Raises:
-        MissingSignalError: If the log has no target currents or target moments.
-    """
+    """Filter a log's targets like its motion."""
     wanted, asked = recording.require("target_current"), recording.require("target_torque")
     motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
     load = gravity_torque(robot, recording.q)
@@ -150,16 +113,7 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
 
 
 def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[ControllerModel, ...]:
-    """Read the controller's model of every joint off its targets.
-
-    Args:
-        recordings: Logs with target currents and moments.
-        robot: The profile, whose rigid body is the maker's; its K stands in where none is found.
-
-    Raises:
-        IdentificationError: If the robot has no drive constants, or a hand led the arm.
-        MissingSignalError: If the targets are missing.
-    """
+    """Read the controller's model of every joint off its targets."""
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "

@@ -35,40 +35,26 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 
+#: Share of a fit's cross-validated error from which down on the profile's friction is kept.
 KEPT = 0.85
-"""Share of a fit's cross-validated error from which down on the profile's friction is kept."""
-
+#: Relative standard deviation up to which a drive constant is taken from free motion.
 CONSTANT_KNOWN = 0.02
-"""Relative standard deviation up to which a drive constant is taken from free motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Training:
-    """The training logs, prepared.
+    """The training logs, prepared."""
 
-    Attributes:
-        robot: The profile.
-        recordings: The logs.
-        motions: Those that move, filtered and decimated.
-        columns: Their friction columns.
-        rigid: Torque of the profile's rigid body. (M, n) each [N·m]
-        rubbing: Torque of its rotors and its friction. (M, n) each [N·m]
-        excited: Which joints move.
-        source: The logs in words, for the robot file.
-        fit_constants: Whether drive constants are unknowns of the friction method.
-        rubs: Whether the joints have friction to be fitted.
-    """
-
-    robot: Robot
-    recordings: tuple[Recording, ...]
-    motions: tuple[PreparedLog, ...]
-    columns: tuple[FrictionColumns, ...]
-    rigid: tuple[Array, ...]
-    rubbing: tuple[Array, ...]
-    excited: Excitation
-    source: str
-    fit_constants: bool = False
-    rubs: bool = True
+    robot: Robot  #: The profile.
+    recordings: tuple[Recording, ...]  #: The logs.
+    motions: tuple[PreparedLog, ...]  #: Those that move, filtered and decimated.
+    columns: tuple[FrictionColumns, ...]  #: Their friction columns.
+    rigid: tuple[Array, ...]  #: Torque of the profile's rigid body. (M, n) each [N·m]
+    rubbing: tuple[Array, ...]  #: Torque of its rotors and its friction. (M, n) each [N·m]
+    excited: Excitation  #: Which joints move.
+    source: str  #: The logs in words, for the robot file.
+    fit_constants: bool = False  #: Whether drive constants are unknowns of the friction method.
+    rubs: bool = True  #: Whether the joints have friction to be fitted.
 
     @property
     def rotor(self) -> bool:
@@ -88,13 +74,7 @@ def prepare_training(
     fit_constants: bool,
     rubs: bool = True,
 ) -> Training:
-    """Prepare the training logs, of joints that rub or not.
-
-    Raises:
-        MissingSignalError: If velocities or efforts are missing.
-        RobotError: If the number of joints differs.
-        IdentificationError: If nothing moves.
-    """
+    """Prepare the training logs, of joints that rub or not."""
     for recording in recordings:
         drive_torque(recording, robot)
     motions = tuple(prepare(recording, robot, processing) for recording in recordings)
@@ -128,23 +108,15 @@ def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
 
 
 class JointFit(NamedTuple):
-    """Friction of one joint, with what was fitted beside it.
+    """Friction of one joint, with what was fitted beside it."""
 
-    Attributes:
-        shape: The chosen structure.
-        fit: Friction coefficients, then q̈'s, then the rigid torque's.
-        choices: The candidates and their errors.
-        constant: Whether the drive constant was fitted too.
-        presliding: The arm's presliding length, which all joints share.
-        errors: RMS of what the model misses of stretches left out, and what the profile's friction
-            and rotor miss there; NaN where they were not compared. [N·m]
-    """
-
-    shape: Shape
-    fit: ColumnFit
-    choices: list[ShapeChoice]
-    constant: bool
-    presliding: PreslidingChoice
+    shape: Shape  #: The chosen structure.
+    fit: ColumnFit  #: Friction coefficients, then q̈'s, then the rigid torque's.
+    choices: list[ShapeChoice]  #: The candidates and their errors.
+    constant: bool  #: Whether the drive constant was fitted too.
+    presliding: PreslidingChoice  #: The arm's presliding length, which all joints share.
+    #: RMS of what the model misses of stretches left out, and what the profile's friction and rotor
+    #: miss there; NaN where they were not compared. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
     @property

@@ -11,14 +11,10 @@ from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark, Where, caution
 
-THIRDS = 3
-"""Stretches in which a log's friction is compared."""
-
+THIRDS = 3  #: Stretches in which a log's friction is compared.
+#: Fall of the dry friction from the first to the last stretch that is remarked on, as a share.
 DRIFT = 0.05
-"""Fall of the dry friction from the first to the last stretch that is remarked on, as a share."""
-
-LEAST = 0.1
-"""Smallest fall that is. [N·m]"""
+LEAST = 0.1  #: Smallest fall that is. [N·m]
 
 
 def warm_up_remarks(

@@ -41,12 +41,11 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import caution, fact
 
+#: Share of undetermined base parameters from which on a motion tells the links too little.
 NARROW = 0.7
-"""Share of undetermined base parameters from which on a motion tells the links too little."""
-
+#: The same where the weakest pull predicts best, as of rounds of one motion: each knows the others,
+#: whatever the links are.
 MOST = 0.5
-"""The same where the weakest pull predicts best, as of rounds of one motion: each knows the others,
-whatever the links are."""
 
 
 def whole_arm(data: Training) -> MethodResult:
@@ -103,11 +102,7 @@ def whole_arm(data: Training) -> MethodResult:
 def stack_training(
     data: Training, layout: ParameterColumns, start: Array, weights: Sequence[Array]
 ) -> Triangles:
-    """The stacked, weighted equations of all training logs.
-
-    Raises:
-        IdentificationError: If there are hardly more equations than unknowns.
-    """
+    """The stacked, weighted equations of all training logs."""
     logs = [
         WeightedLog(m, c, w) for m, c, w in zip(data.motions, data.columns, weights, strict=True)
     ]

@@ -25,38 +25,23 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.shown import Shown
 
-SLOWEST = 1.0
-"""Smallest natural frequency that is tried. [rad/s]"""
-
+SLOWEST = 1.0  #: Smallest natural frequency that is tried. [rad/s]
+#: The same for `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
+#: lets 1/(1 + (ω/ω_n)⁴) through. A joint that nothing pushed may be pushed next. [rad/s]
 SLOWEST_BEST = 9.0
-"""The same for `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
-lets 1/(1 + (ω/ω_n)⁴) through. A joint that nothing pushed may be pushed next. [rad/s]"""
-
-FASTEST = 2.0
-"""Largest natural frequency that is tried, times the sample time. [rad]"""
-
-TRIED = 96
-"""Natural frequencies tried, on a logarithmic scale."""
-
-LEAST_SHARE = 1e-3
-"""R stands for at least this share of the noise in the free part. [1]"""
-
+FASTEST = 2.0  #: Largest natural frequency that is tried, times the sample time. [rad]
+TRIED = 96  #: Natural frequencies tried, on a logarithmic scale.
+LEAST_SHARE = 1e-3  #: R stands for at least this share of the noise in the free part. [1]
+#: And for at least this torque: a log in single precision keeps 1e-5 of 100 N·m. [N·m]
 FINEST = 1e-6
-"""And for at least this torque: a log in single precision keeps 1e-5 of 100 N·m. [N·m]"""
 
 
 class Curve(NamedTuple):
-    """The expected error of one kind of filter against its natural frequency.
+    """The expected error of one kind of filter against its natural frequency."""
 
-    Attributes:
-        omega_n: Natural frequencies tried. (G,) [rad/s]
-        rmse: Expected error. (G, n) [N·m]
-        best: The natural frequency with the smallest. (n,) [rad/s]
-    """
-
-    omega_n: Array
-    rmse: Array
-    best: Array
+    omega_n: Array  #: Natural frequencies tried. (G,) [rad/s]
+    rmse: Array  #: Expected error. (G, n) [N·m]
+    best: Array  #: The natural frequency with the smallest. (n,) [rad/s]
 
     @property
     def least(self) -> Array:
@@ -77,15 +62,14 @@ def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
     return KalmanSmoother(filter=kalman_filter(omega_n, r))
 
 
+#: Natural frequencies (n,) [rad/s], and R if it is not 1 → the observer.
 Kind = Callable[..., Observer]
-"""Natural frequencies (n,) [rad/s], and R if it is not 1 → the observer."""
-
+#: Name at the command line → what is tuned.
 KINDS: dict[str, Kind] = {
     "best": kalman_smoother,
     "kfo-auto": kalman_filter,
     "rts-auto": kalman_smoother,
 }
-"""Name at the command line → what is tuned."""
 
 
 def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
@@ -162,16 +146,11 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class AutoTuned(Shown):
-    """An observer under its own name whose gains came from the log, or fell back to hand-set ones.
+    """An observer with gains from the log, or with hand-set ones where there are none."""
 
-    Attributes:
-        name: Name at the command line.
-        observer: The observer itself.
-        curve: What was minimised, None where it fell back.
-    """
-
-    name: str
-    observer: Observer
+    name: str  #: Name at the command line.
+    observer: Observer  #: The observer itself.
+    #: What was minimised, None where it fell back.
     curve: Curve | None = field(default=None, repr=False)
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:

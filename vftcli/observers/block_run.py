@@ -9,8 +9,8 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import Clock
 
+#: Samples that the smoother looks ahead at most; one that forgets more slowly has the whole log.
 FARTHEST = 1 << 17
-"""Samples that the smoother looks ahead at most; one that forgets more slowly has the whole log."""
 
 
 @runtime_checkable
@@ -23,13 +23,7 @@ class Resumable(Protocol):
 
 
 def runs_in_blocks(observer: Observer, clock: Clock, joints: int) -> bool:
-    """Whether an observer's estimate of a log can be made block by block.
-
-    Args:
-        observer: The observer.
-        clock: The log's clock.
-        joints: Number of joints n.
-    """
+    """Whether an observer's estimate of a log can be made block by block."""
     if not isinstance(observer, KalmanSmoother):
         return isinstance(observer, Resumable)
     steady = observer.filter.is_steady(clock)

@@ -37,41 +37,32 @@ from vftcli.signals.remarks import Remark, caution
 if TYPE_CHECKING:
     from vftcli.observers.matching import MatchTarget
 
-PAPER_GAINS = "paper"
-"""The word for the gains of the robot's file, the paper's where it has them."""
-
-LOG_GAINS = "auto"
-"""The word for the gains that the spectra of the log call for."""
+PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
+LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ObserverChoice:
     """Which observers run, and what their gains are.
 
-    Attributes:
-        names: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None given:
-            `DEFAULT`, or the paper's four where their own formulas or one footing for all of them
-            is asked for.
-        settings: Parameters the user sets, which go before every file's.
-        gains: Whose gains the observers have that bring none of their own: `PAPER_GAINS` or
-            `LOG_GAINS`.
-        gains_file: A file of gains that go before the robot's own, or None.
-        match: What every observer is to have alike on every joint, or None.
-        as_printed: Whether the paper's printed formulas run, and its numeric dynamics.
-        causal: Whether to leave out what could not run while the log is being written.
-        from_rest: Whether estimates start at the static residual of the first sample, not at zero.
-
     Raises:
         ParameterError: If there is no such observer, or none of those named could run online.
     """
 
+    #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None given:
+    #: `DEFAULT`, or the paper's four where their own formulas or one footing for all of them is
+    #: asked for.
     names: tuple[str, ...] = ()
+    #: Parameters the user sets, which go before every file's.
     settings: Settings = field(default_factory=dict)
+    #: Whose gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
     gains: str = PAPER_GAINS
-    gains_file: Path | None = None
+    gains_file: Path | None = None  #: A file of gains that go before the robot's own, or None.
+    #: What every observer is to have alike on every joint, or None.
     match: "MatchTarget | None" = None
-    as_printed: bool = False
-    causal: bool = False
+    as_printed: bool = False  #: Whether the paper's printed formulas run, and its numeric dynamics.
+    causal: bool = False  #: Whether to leave out what could not run while the log is being written.
+    #: Whether estimates start at the static residual of the first sample, not at zero.
     from_rest: bool = False
 
     def __post_init__(self) -> None:

@@ -18,28 +18,22 @@ import numpy as np
 from vftcli.robots.friction import HELD
 from vftcli.signals.arrays import Array, Mask
 
-ENOUGH = 50
-"""Free samples of a resting or a moving joint that its own mean square needs."""
+ENOUGH = 50  #: Free samples of a resting or a moving joint that its own mean square needs.
 
+#: Share of the dry friction by which friction in motion may be off, where no free motion shows it.
+#:
+#: On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives show that
+#: day.
 UNSEEN = 0.2
-"""Share of the dry friction by which friction in motion may be off, where no free motion shows it.
-
-On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives show that day.
-"""
 
 
 class FreeError(NamedTuple):
-    """Mean square of what an estimator reads where nothing touches the arm.
+    """Mean square of what an estimator reads where nothing touches the arm."""
 
-    Attributes:
-        moving: While the joint moves. (n,) [(N·m)²]
-        resting: While it rests. (n,) [(N·m)²]
-        unseen: Joints that hardly move while nothing touches the arm, so that `moving` rests on
-            their dry friction. (n,)
-    """
-
-    moving: Array
-    resting: Array
+    moving: Array  #: While the joint moves. (n,) [(N·m)²]
+    resting: Array  #: While it rests. (n,) [(N·m)²]
+    #: Joints that hardly move while nothing touches the arm, so that `moving` rests on their dry
+    #: friction. (n,)
     unseen: Mask
 
 

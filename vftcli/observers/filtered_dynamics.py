@@ -39,17 +39,13 @@ class FilteredDynamicsObserver(Shown):
     which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a share of the momentum that leaks into the estimate;
     and the printed filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, which forgets −ωe^{−ωt}p₀ of (26).
 
-    Attributes:
-        omega: Cutoff ω, the same for all joints. [rad/s]
-        as_printed: Use the printed k₃ and start.
-
     Raises:
         ParameterError: If the cutoff is not positive.
     """
 
     name: ClassVar[str] = "fdo"
-    omega: float = 10.0
-    as_printed: bool = False
+    omega: float = 10.0  #: Cutoff ω, the same for all joints. [rad/s]
+    as_printed: bool = False  #: Use the printed k₃ and start.
 
     def __post_init__(self) -> None:
         if np.size(number_array(self.omega, "omega", self.name)) != 1:

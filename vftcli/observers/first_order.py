@@ -11,22 +11,15 @@ from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.steady_filter import steady_filter
 
-GAP = 3.0
-"""A step of more than this many nominal ones is a gap."""
+GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 
 
 class FirstOrderState(NamedTuple):
-    """Where a first-order observer stands after a block of a log.
+    """Where a first-order observer stands after a block of a log."""
 
-    Attributes:
-        states: Its states, the estimate first. (m, n) [N·m]
-        gaps: Number of gaps that it started afresh after.
-        longest: The longest of them. [s]
-    """
-
-    states: Array
-    gaps: int = 0
-    longest: float = 0.0
+    states: Array  #: Its states, the estimate first. (m, n) [N·m]
+    gaps: int = 0  #: Number of gaps that it started afresh after.
+    longest: float = 0.0  #: The longest of them. [s]
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

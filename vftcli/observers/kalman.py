@@ -33,21 +33,16 @@ from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
 
+#: Weights that pick the external torque out of a filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])
-"""Weights that pick the external torque out of a filter's two states. (2, 1)"""
 
 
 class KalmanState(NamedTuple):
-    """Where a Kalman observer stands after a block of a log.
+    """Where a Kalman observer stands after a block of a log."""
 
-    Attributes:
-        error: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
-        posterior: Their covariance. (n,) each
-        skew: Its lower-left entry less its upper-right one, which only (44) as printed has. (n,)
-    """
-
-    error: Array
-    posterior: Covariance
+    error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
+    posterior: Covariance  #: Their covariance. (n,) each
+    #: Its lower-left entry less its upper-right one, which only (44) as printed has. (n,)
     skew: Array | float = 0.0
 
 
@@ -62,28 +57,21 @@ class KalmanObserver(Shown):
 
     For A_τ = 0, A_c² = 0 and both discretisations have the same A and B; they differ in Q only.
 
-    Attributes:
-        discretisation: "fe" (41), (42) or "zoh" (43), (44).
-        r_diag: R, one number or one a joint. (n,) [(N·m·s)²·s under "density"]
-        q_p_diag: Q_p. (n,) [(N·m)²·s]
-        q_tau_diag: Q_τ. (n,) [(N·m)²/s]
-        decay: a in A_τ = −a; a number with its sign turned means the same. (n,) [1/s]
-        noise_convention: A key of `NOISE_CONVENTIONS`.
-        initial_covariance: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the
-            stationary one. (3, n)
-        as_printed: Use μᵗ alone (40), the literal noise convention, and (44)'s printed block.
-
     Raises:
         ParameterError: If a variance is not positive, or a name is unknown.
     """
 
-    discretisation: str = "fe"
-    r_diag: Array | float = 0.5
-    q_p_diag: Array | float = 0.01
-    q_tau_diag: Array | float = 5000.0
+    discretisation: str = "fe"  #: "fe" (41), (42) or "zoh" (43), (44).
+    r_diag: Array | float = 0.5  #: R, one number or one a joint. (n,) [(N·m·s)²·s under "density"]
+    q_p_diag: Array | float = 0.01  #: Q_p. (n,) [(N·m)²·s]
+    q_tau_diag: Array | float = 5000.0  #: Q_τ. (n,) [(N·m)²/s]
+    #: a in A_τ = −a; a number with its sign turned means the same. (n,) [1/s]
     decay: Array | float = 0.0
-    noise_convention: str = "density"
+    noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
+    #: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the stationary one. (3,
+    #: n)
     initial_covariance: Array | None = None
+    #: Use μᵗ alone (40), the literal noise convention, and (44)'s printed block.
     as_printed: bool = False
 
     def __post_init__(self) -> None:

@@ -14,24 +14,17 @@ import numpy as np
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 
+#: Below this a·Ts the integrals are summed as series: their closed forms cancel there.
 SERIES = 1e-2
-"""Below this a·Ts the integrals are summed as series: their closed forms cancel there."""
 
 
 class Densities(NamedTuple):
-    """The filter's parameters, one a joint.
+    """The filter's parameters, one a joint."""
 
-    Attributes:
-        r: Measurement noise of the momentum, R. (n,)
-        q_p: Process noise of the momentum, Q_p. (n,)
-        q_tau: Process noise of the external torque, Q_τ. (n,)
-        decay: a in A_τ = −a. (n,) [1/s]
-    """
-
-    r: Array
-    q_p: Array
-    q_tau: Array
-    decay: Array
+    r: Array  #: Measurement noise of the momentum, R. (n,)
+    q_p: Array  #: Process noise of the momentum, Q_p. (n,)
+    q_tau: Array  #: Process noise of the external torque, Q_τ. (n,)
+    decay: Array  #: a in A_τ = −a. (n,) [1/s]
 
 
 class Discrete(NamedTuple):
@@ -110,12 +103,12 @@ def integral_of_reach_squared(step: Array, a: Array, reach: Array, squared: Arra
 Discretisation = Callable[[Array, Densities], Discrete]
 DISCRETISATIONS: dict[str, Discretisation] = {"fe": forward_euler, "zoh": zero_order_hold}
 
+#: How R and Q are read; (42) as printed counts Ts twice, (44) does not.
 NOISE_CONVENTIONS = {
     "density": "Q = Q̂, R = R/Ts: densities, the same filter at every rate",
     "discrete": "Q = Q̂, R = R: R is the variance of one sample (default of a file's gains)",
     "literal": "fe: Q = Ts·Q̂, R = R/Ts as (42) prints it; zoh: as density",
 }
-"""How R and Q are read; (42) as printed counts Ts twice, (44) does not."""
 
 
 def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discrete:
@@ -126,9 +119,6 @@ def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discr
         convention: A key of `NOISE_CONVENTIONS`.
         step: Sample time, one or one a sample as a column (T, 1). [s]
         d: Parameters, one a joint.
-
-    Raises:
-        ParameterError: If forward Euler is unstable at this decay and sample time.
     """
     if scheme == "fe" and np.any(np.asarray(step) * d.decay > 2.0):
         worst = float(np.max(np.asarray(step) * d.decay))

@@ -8,14 +8,9 @@ from vftcli.observers.observer import Observer
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
 
-LEAD = 60.0
-"""For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log."""
-
-LONGEST = 1 << 17
-"""Samples of that time at most."""
-
-SETTLED = 0.01
-"""Share of its start that an estimate has forgotten once it counts as settled."""
+LEAD = 60.0  #: For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log.
+LONGEST = 1 << 17  #: Samples of that time at most.
+SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
 
 
 def led(terms: DynamicsTerms, count: int) -> DynamicsTerms:

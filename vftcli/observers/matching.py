@@ -15,28 +15,18 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, fact
 
-HALVINGS = 70
-"""Bisections of a gain's logarithm: its last digits are those of float64."""
+HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
 
 
 class MatchTarget(NamedTuple):
-    """What every observer is to have on every joint.
+    """What every observer is to have on every joint."""
 
-    Attributes:
-        quantity: "delay" or "bandwidth".
-        value: [s] or [Hz]
-    """
-
-    quantity: str
-    value: float
+    quantity: str  #: "delay" or "bandwidth".
+    value: float  #: [s] or [Hz]
 
 
 def parse_target(text: str) -> MatchTarget:
-    """Read ``delay=S`` or ``bandwidth=HZ``.
-
-    Raises:
-        ParameterError: If it is neither, or not positive.
-    """
+    """Read ``delay=S`` or ``bandwidth=HZ``."""
     quantity, _, number = text.partition("=")
     try:
         value = float(number)
@@ -57,14 +47,6 @@ def match_observers(
     A first-order observer has one gain to move. A Kalman filter keeps R and Q_p and moves Q_τ,
     which sets its natural frequency. Delay is that behind a slow ramp, 1/K or L₁/L₂ − Ts/2;
     bandwidth is where the exact response to a sinusoid has fallen to 1/√2 of that to a constant.
-
-    Args:
-        observers: As built from profile and settings.
-        goal: Which quantity is to be alike, and its value.
-        setup: Joints, sample time, and whether the printed formulas run.
-
-    Raises:
-        ParameterError: If the goal is out of reach at the sample time, or an observer has neither.
     """
     if setup.as_printed:
         raise ParameterError(
@@ -127,13 +109,13 @@ def excess_response(observer: Observer, goal: float, setup: Setup) -> Array:
     return excess
 
 
+#: Quantity of ``--match`` → how far an observer is above the goal.
 MEASURES: dict[str, Callable[[Observer, float, Setup], Array]] = {
     "delay": lambda observer, goal, on: observer.tuning(on.step, on.joints).delay - goal,
     "bandwidth": excess_response,
 }
-"""Quantity of ``--match`` → how far an observer is above the goal."""
-
-
+#: Observer → what makes it anew with another cutoff ω [rad/s], gain K [1/s] or Q_τ on each joint,
+#: and the least and the largest there is. A cutoff is one for all joints.
 KNOBS: dict[type, tuple[Callable[[Observer, Array], Observer], float, float]] = {
     FilteredDynamicsObserver: (
         lambda _, value: FilteredDynamicsObserver(omega=float(value[0])),
@@ -148,5 +130,3 @@ KNOBS: dict[type, tuple[Callable[[Observer, Array], Observer], float, float]] = 
         1e18,
     ),
 }
-"""Observer → what makes it anew with another cutoff ω [rad/s], gain K [1/s] or Q_τ on each joint,
-and the least and the largest there is. A cutoff is one for all joints."""

@@ -33,17 +33,13 @@ class MomentumObserver(Shown):
     (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is
     unstable from 2 on; that form runs with `as_printed`.
 
-    Attributes:
-        gain: Bandwidth K, one number or one a joint. (n,) [1/s]
-        as_printed: Feed back one sample late, as (35) is printed.
-
     Raises:
         ParameterError: If a gain is not positive.
     """
 
     name: ClassVar[str] = "gmo"
-    gain: Array | float = 10.0
-    as_printed: bool = False
+    gain: Array | float = 10.0  #: Bandwidth K, one number or one a joint. (n,) [1/s]
+    as_printed: bool = False  #: Feed back one sample late, as (35) is printed.
 
     def __post_init__(self) -> None:
         gain = numbers_of(self.gain, "gain", self.name)

@@ -18,23 +18,14 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Tuning(Shown):
-    """What an observer's parameters mean, joint by joint.
+    """What an observer's parameters mean, joint by joint."""
 
-    Attributes:
-        omega_n: Natural frequency; for a first-order observer its cutoff. (n,) [rad/s]
-        zeta: Damping ratio; NaN for a first-order observer. (n,)
-        delay: Lag behind a slow ramp. (n,) [s]
-        bandwidth: Frequency at which the gain has fallen by 3 dB. (n,) [Hz]
-        dc_gain: Gain to a constant torque, 1 where unbiased. (n,)
-        parameter_count: How many numbers there are to tune for an n-joint arm.
-    """
-
-    omega_n: Array
-    zeta: Array
-    delay: Array
-    bandwidth: Array
-    dc_gain: Array
-    parameter_count: int
+    omega_n: Array  #: Natural frequency; for a first-order observer its cutoff. (n,) [rad/s]
+    zeta: Array  #: Damping ratio; NaN for a first-order observer. (n,)
+    delay: Array  #: Lag behind a slow ramp. (n,) [s]
+    bandwidth: Array  #: Frequency at which the gain has fallen by 3 dB. (n,) [Hz]
+    dc_gain: Array  #: Gain to a constant torque, 1 where unbiased. (n,)
+    parameter_count: int  #: How many numbers there are to tune for an n-joint arm.
 
     def __post_init__(self) -> None:
         seal(self, "omega_n", "zeta", "delay", "bandwidth", "dc_gain")
@@ -62,11 +53,7 @@ class Observer(Protocol):
 
 
 def per_joint(value: Array | float, joints: int) -> Array:
-    """One number a joint from one number or one a joint. (n,)
-
-    Raises:
-        ShapeError: If it is neither.
-    """
+    """One number a joint from one number or one a joint. (n,)"""
     found = np.asarray(value, dtype=np.float64)
     if found.size != 1 and found.shape != (joints,):
         told = f"an observer's parameter has shape {found.shape}"
@@ -75,11 +62,7 @@ def per_joint(value: Array | float, joints: int) -> Array:
 
 
 def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
-    """A parameter as a list of numbers, one or one a joint. (1,) or (n,)
-
-    Raises:
-        ShapeError: If it is something else.
-    """
+    """A parameter as a list of numbers, one or one a joint. (1,) or (n,)"""
     found = number_array(value, name, observer)
     if found.ndim > 1:
         told = f"{name} of {observer} has shape {found.shape}"

@@ -13,15 +13,11 @@ from vftcli.observers.kalman_gains import Covariance, Gains, Steady
 from vftcli.observers.kalman_model import Densities, Discrete
 from vftcli.signals.arrays import Array
 
+#: Relative change of a covariance in one sample from which on rounding moves it alone.
 SETTLED = 1e-14
-"""Relative change of a covariance in one sample from which on rounding moves it alone."""
-
-LONGEST = 100_000
-"""Samples within which a filter settles; the paper's need some hundred."""
-
-
+LONGEST = 100_000  #: Samples within which a filter settles; the paper's need some hundred.
+#: Below this a·Ts (e^{aTs} − 1 − aTs)/a² is its series, good to a tenth of a·Ts squared.
 SMALL = 1e-5
-"""Below this a·Ts (e^{aTs} − 1 − aTs)/a² is its series, good to a tenth of a·Ts squared."""
 
 
 def printed_noise(model: Discrete, d: Densities) -> Array:

@@ -15,24 +15,19 @@ import numpy as np
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.steady_filter import FORGOTTEN, PIECE
 
+#: Samples in a block at most: the Python loops have this length. From 32 to 64 all take as long.
 LENGTH = 36
-"""Samples in a block at most: the Python loops have this length. From 32 to 64 all take as long."""
 
 
 class Fold(NamedTuple):
     """A piece of a log laid out as position in block × joint × block.
 
     Every operation then runs along many blocks at once.
-
-    Attributes:
-        length: Samples in a block; the last one is filled up with its last sample.
-        blocks: Number of blocks.
-        samples: Samples of the piece.
     """
 
-    length: int
-    blocks: int
-    samples: int
+    length: int  #: Samples in a block; the last one is filled up with its last sample.
+    blocks: int  #: Number of blocks.
+    samples: int  #: Samples of the piece.
 
     @classmethod
     def of(cls, samples: int) -> "Fold":
@@ -63,12 +58,7 @@ class Fold(NamedTuple):
 
 
 def spans(samples: int, *, begins: bool) -> list[slice]:
-    """The pieces of a block of a log: they end at multiples of their length, wherever it begins.
-
-    Args:
-        samples: Its number of samples.
-        begins: Whether its first sample is the log's first, which no step leads to.
-    """
+    """The pieces of a block of a log: they end at multiples of their length, wherever it begins."""
     edges = [int(begins), *range(PIECE, samples, PIECE), samples]
     return [slice(a, b) for a, b in pairwise(edges) if a < b]
 

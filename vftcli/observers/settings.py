@@ -11,45 +11,28 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import assignment, did_you_mean, numbers, shown, toml_tables
 
 Value = float | str | list[float]
-Gains = Mapping[str, Mapping[str, Any]]
-"""Section of a file → parameter → number, list or word."""
-
+Gains = Mapping[str, Mapping[str, Any]]  #: Section of a file → parameter → number, list or word.
+#: Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value.
 Settings = dict[str, dict[str, Value]]
-"""Section ("fdo", "gmo", "kfo", or one observer's own name) → parameter → value."""
-
+#: Section → the parameters it takes; `kfo` holds for every Kalman filter.
 PARAMETERS: dict[str, tuple[str, ...]] = {
     "fdo": ("omega",),
     "gmo": ("gain",),
     "kfo": ("r_diag", "q_p_diag", "q_tau_diag", "decay", "noise_convention"),
 }
-"""Section → the parameters it takes; `kfo` holds for every Kalman filter."""
-
+#: What an assignment of ``--set`` looks like.
 FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
-"""What an assignment of ``--set`` looks like."""
-
-WORDS = {"noise_convention"}
-"""Parameters whose value is a word."""
-
+WORDS = {"noise_convention"}  #: Parameters whose value is a word.
+#: Parameters that are rates: no log resolves a microsecond. [1/s]
 LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
-"""Parameters that are rates: no log resolves a microsecond. [1/s]"""
-
+#: Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second.
 LARGEST_VARIANCE = 1e15
-"""Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second."""
-
+#: Smallest size of a number that is not zero: the ratio of two must stay a number.
 SMALLEST = 1e-15
-"""Smallest size of a number that is not zero: the ratio of two must stay a number."""
 
 
 def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
-    """Read ``observer.parameter=VALUE`` assignments; a value is a number or one a joint.
-
-    Args:
-        assignments: The command line's ``--set`` values.
-        sections: Section → parameters, `PARAMETERS` with the observers' own names added.
-
-    Raises:
-        ParameterError: If an assignment is malformed or names nothing there is.
-    """
+    """Read ``observer.parameter=VALUE`` assignments; a value is a number or one a joint."""
     settings: Settings = {}
     for text in assignments:
         name, value = assignment(text, "--set", FORM)
@@ -79,11 +62,7 @@ def check_name(
 
 
 def parse_value(parameter: str, text: str, whole: str) -> Value:
-    """The value of an assignment: a word for the parameters in `WORDS`, else one number or several.
-
-    Raises:
-        ParameterError: If it is no number, or not a finite one.
-    """
+    """The value of an assignment: a word for a name in `WORDS`, else one number or several."""
     if parameter in WORDS:
         return text
     values = numbers(text)
@@ -131,9 +110,6 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
     Args:
         path: A TOML file with ``[observers.SECTION]`` tables.
         sections: Sections and parameters there are.
-
-    Raises:
-        ParameterError: If it is no such file, or names a section or parameter there is not.
     """
     try:
         document = toml_tables(path.read_text(encoding="utf-8"))
@@ -177,11 +153,7 @@ def parameters_given(
 
 
 def joint_values(value: Any, joints: int, what: str) -> Array:  # noqa: ANN401 - TOML is untyped
-    """One number a joint from one number or a list of them. (n,)
-
-    Raises:
-        ParameterError: If the list has another length.
-    """
+    """One number a joint from one number or a list of them. (n,)"""
     try:
         array = np.atleast_1d(np.asarray(value, dtype=np.float64))
     except (TypeError, ValueError):

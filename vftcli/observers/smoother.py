@@ -33,8 +33,8 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
 
+#: Share of the smoother's settled information that may be missing where it counts as settled.
 SETTLED = 1e-16
-"""Share of the smoother's settled information that may be missing where it counts as settled."""
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -42,14 +42,10 @@ class KalmanSmoother(Shown):
     """Fixed-interval smoother on a disturbance Kalman filter, with the filter's own parameters.
 
     Exact at uneven clocks; memory grows with the log, time too.
-
-    Attributes:
-        filter: The Kalman observer that it smooths.
-        name: Name at the command line.
     """
 
-    filter: KalmanObserver
-    name: str = "kfo-rts"
+    filter: KalmanObserver  #: The Kalman observer that it smooths.
+    name: str = "kfo-rts"  #: Name at the command line.
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Smooth a whole log; `sd` is the smoother's own √P₂₂."""

@@ -29,52 +29,34 @@ from vftcli.signals.intervals import grown, intervals
 from vftcli.signals.series import median_step
 from vftcli.signals.spectrum import welch
 
-SEGMENT = 4.0
-"""Length of a segment: what changes more slowly counts as constant. [s]"""
-
-LEAST_SEGMENT = 32
-"""Fewest samples of a segment; a shorter free or loaded part has no spectrum."""
-
-IMPACT = 1.0
-"""A loaded part of which nothing lasts longer is one of impacts. [s]"""
-
+SEGMENT = 4.0  #: Length of a segment: what changes more slowly counts as constant. [s]
+LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.
+IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. [s]
+#: How far the average of neighbouring frequencies reaches, as a share of the frequency.
 NEIGHBOURS = 0.2
-"""How far the average of neighbouring frequencies reaches, as a share of the frequency."""
-
-SLOW = 5.0
-"""Up to here the spectrum of the external torque is taken as it is measured. [Hz]"""
-
+SLOW = 5.0  #: Up to here the spectrum of the external torque is taken as it is measured. [Hz]
+#: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
+#: and the 4 of one that has no jumps and no corners.
 FALL = 2.5
-"""Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
-and the 4 of one that has no jumps and no corners."""
 
 
+#: A free part that was found is believed if on most joints the loaded part has this share of its
+#: slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact
+#: all the time 0.82 and less.
 QUIETER = 0.85
-"""A free part that was found is believed if on most joints the loaded part has this share of its
-slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact all
-the time 0.82 and less."""
 
-CONTACT_BAND = 5.0
-"""Where contacts are told from noise: below this frequency. [Hz]"""
+CONTACT_BAND = 5.0  #: Where contacts are told from noise: below this frequency. [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spectra:
-    """One-sided power spectral densities of the raw disturbance.
+    """One-sided power spectral densities of the raw disturbance."""
 
-    Attributes:
-        frequency: (F,) [Hz]
-        free: S_n, over the free part. (F, n) [(N·m)²/Hz]
-        loaded: S_d, over the rest. (F, n) [(N·m)²/Hz]
-        step: Sample time. [s]
-        segments: Segments averaged over the free part and over the loaded one.
-    """
-
-    frequency: Array
-    free: Array
-    loaded: Array
-    step: float
-    segments: tuple[int, int]
+    frequency: Array  #: (F,) [Hz]
+    free: Array  #: S_n, over the free part. (F, n) [(N·m)²/Hz]
+    loaded: Array  #: S_d, over the rest. (F, n) [(N·m)²/Hz]
+    step: float  #: Sample time. [s]
+    segments: tuple[int, int]  #: Segments averaged over the free part and over the loaded one.
 
     def __post_init__(self) -> None:
         seal(self, "frequency", "free", "loaded")
@@ -162,15 +144,10 @@ def neighbour_mean(spectrum: Array) -> Array:
 
 
 class Part(NamedTuple):
-    """A log's p and μ, and which of its samples belong to the part.
+    """A log's p and μ, and which of its samples belong to the part."""
 
-    Attributes:
-        terms: p and μ.
-        inside: (T,)
-    """
-
-    terms: DynamicsTerms
-    inside: Mask
+    terms: DynamicsTerms  #: p and μ.
+    inside: Mask  #: (T,)
 
 
 def around_impacts(t: Array, inside: Mask) -> Mask:
@@ -188,13 +165,6 @@ def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
 
     A loaded part of short impacts is widened until it holds a second in a row: its excess over the
     free part is then that of the impacts, thinned by what stands around them, and set right.
-
-    Args:
-        loaded: The log and its loaded samples.
-        free: The same log and its free samples, or free runs in other logs.
-
-    Raises:
-        ParameterError: If one of the parts is too short for a spectrum.
     """
     t = loaded.terms.t
     nominal = median_step(t) if len(t) > 1 else 0.0

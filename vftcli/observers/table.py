@@ -24,79 +24,51 @@ from vftcli.signals.remarks import Remark, Where, caution, fact
 if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra
 
-FALLBACK_RATE = 10.0
-"""First-order gain where a robot gives no gains at all. [1/s]"""
-
-BEST = "best"
-"""The most accurate estimate that a log allows."""
+FALLBACK_RATE = 10.0  #: First-order gain where a robot gives no gains at all. [1/s]
+BEST = "best"  #: The most accurate estimate that a log allows.
 
 
 class LogSpectra(NamedTuple):
-    """What a complete log shows of noise and contact, None where its free part is not known.
+    """What a complete log shows of noise and contact, None where its free part is not known."""
 
-    Attributes:
-        plain: Of p and μ as the robot's model gives them.
-        best: Of those that `best` runs on, the bias of the whole log taken off.
-        gains: The gains that `plain` calls for, as a gains file holds them.
-    """
-
-    plain: "Spectra | None" = None
+    plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
+    #: Of those that `best` runs on, the bias of the whole log taken off.
     best: "Spectra | None" = None
-    gains: Gains | None = None
+    gains: Gains | None = None  #: The gains that `plain` calls for, as a gains file holds them.
 
     def under(self, name: str) -> "Spectra | None":
         """The spectra of what the observer of this name runs on."""
         return self.best if name == BEST else self.plain
 
 
+#: What is known of a log that is still being written, or has no free part.
 NOT_SHOWN = LogSpectra()
-"""What is known of a log that is still being written, or has no free part."""
 
 
 class Setup(NamedTuple):
-    """What an observer is built from.
+    """What an observer is built from."""
 
-    Attributes:
-        gains: The robot file's ``[observers.*]``.
-        settings: The user's ``--set``.
-        joints: Number of joints n.
-        step: Nominal sample time. [s]
-        as_printed: Use the paper's printed formulas.
-        shown: What the complete log shows of noise and contact.
-    """
-
-    gains: Gains
-    settings: Settings
-    joints: int
-    step: float
-    as_printed: bool
-    shown: LogSpectra = NOT_SHOWN
+    gains: Gains  #: The robot file's ``[observers.*]``.
+    settings: Settings  #: The user's ``--set``.
+    joints: int  #: Number of joints n.
+    step: float  #: Nominal sample time. [s]
+    as_printed: bool  #: Use the paper's printed formulas.
+    shown: LogSpectra = NOT_SHOWN  #: What the complete log shows of noise and contact.
 
 
-Built = tuple[Observer, tuple[Remark, ...]]
-"""An observer, and remarks on gains that nobody gave."""
+Built = tuple[Observer, tuple[Remark, ...]]  #: An observer, and remarks on gains that nobody gave.
 
 
 class Entry(NamedTuple):
-    """One line of the observer table.
+    """One line of the observer table."""
 
-    Attributes:
-        title: The field's name for it.
-        section: The ``--set`` section its parameters stand in.
-        equations: The paper's equations.
-        summary: What it does, in a sentence.
-        build: Makes it from a Setup, with remarks on gains nobody gave.
-        from_spectra: Whether it takes its gains from the log's spectra.
-        online: Whether it could run while the log is being written.
-    """
-
-    title: str
-    section: str
-    equations: str
-    summary: str
-    build: Callable[[Setup], Built]
-    from_spectra: bool = False
-    online: bool = True
+    title: str  #: The field's name for it.
+    section: str  #: The ``--set`` section its parameters stand in.
+    equations: str  #: The paper's equations.
+    summary: str  #: What it does, in a sentence.
+    build: Callable[[Setup], Built]  #: Makes it from a Setup, with remarks on gains nobody gave.
+    from_spectra: bool = False  #: Whether it takes its gains from the log's spectra.
+    online: bool = True  #: Whether it could run while the log is being written.
 
 
 def build_fdo(setup: Setup) -> Built:
@@ -154,10 +126,6 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
 
     R and Q of a file are read as "discrete" unless a convention is named: with that reading the
     paper's gains win joints 1 to 3, as its Table I says. Without a file they are densities.
-
-    Args:
-        scheme: "fe" or "zoh".
-        section: Its own ``--set`` section, if that is not the observer's name.
     """
 
     def build(setup: Setup) -> Built:
@@ -210,6 +178,7 @@ def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup]
     return build
 
 
+#: Name at the command line → the observer.
 OBSERVERS: dict[str, Entry] = {
     BEST: Entry(
         "the most accurate that a complete log allows",
@@ -275,13 +244,9 @@ OBSERVERS: dict[str, Entry] = {
         online=False,
     ),
 }
-"""Name at the command line → the observer."""
-
+#: The four of the paper, each of which runs while the log is being written.
 PAPER = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
-"""The four of the paper, each of which runs while the log is being written."""
-
-DEFAULT = (BEST, *PAPER)
-"""What runs where nobody chooses."""
+DEFAULT = (BEST, *PAPER)  #: What runs where nobody chooses.
 
 
 def sections() -> dict[str, Sequence[str]]:

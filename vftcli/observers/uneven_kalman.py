@@ -24,8 +24,8 @@ from vftcli.observers.kalman_model import Discrete
 from vftcli.observers.recursion import Fold, moved, spans
 from vftcli.signals.arrays import Array
 
+#: Relative change of the blocks' starts below which another round would change nothing.
 SETTLED = 1e-15
-"""Relative change of the blocks' starts below which another round would change nothing."""
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
@@ -72,17 +72,12 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
 
 
 class Response(NamedTuple):
-    """What blocks make of the covariance that they start from.
+    """What blocks make of the covariance that they start from."""
 
-    Attributes:
-        end: Posterior at the end, from the start that was tried, as P₁₁, P₁₂, P₂₂. (3, n, blocks)
-        phi: Φ. (2, 2, n, blocks)
-        information: O. (2, 2, n, blocks)
-    """
-
+    #: Posterior at the end, from the start that was tried, as P₁₁, P₁₂, P₂₂. (3, n, blocks)
     end: Array
-    phi: Array
-    information: Array
+    phi: Array  #: Φ. (2, 2, n, blocks)
+    information: Array  #: O. (2, 2, n, blocks)
 
     def of(self, change: Array) -> Array:
         """Posterior at the end from a start that is changed by Δ: X = Δ(I + OΔ)⁻¹ written out."""

@@ -9,49 +9,29 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion
 
+#: Radius of the first and of the last link, as a share of the arm's length.
 THICKNESS = (0.048, 0.030)
-"""Radius of the first and of the last link, as a share of the arm's length."""
-
-RATE = 50.0
-"""Poses a second that are drawn. [Hz]"""
-
-MOST_POSES = 20_000
-"""Poses that are drawn, however long the log is."""
-
-SHORTEST = 0.02
-"""A link shorter than this share of the arm's length is not drawn: its joints are. """
+RATE = 50.0  #: Poses a second that are drawn. [Hz]
+MOST_POSES = 20_000  #: Poses that are drawn, however long the log is.
+SHORTEST = 0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
 
 
 class Capsule(NamedTuple):
-    """A cylinder with round ends, in the axes of the frame it moves with.
+    """A cylinder with round ends, in the axes of the frame it moves with."""
 
-    Attributes:
-        start: Centre of one end. (3,) [m]
-        direction: From one end's centre to the other's. (3,) [m]
-        radius: Radius. [m]
-        joint: Whether it stands for a joint rather than for a link.
-    """
-
-    start: Array
-    direction: Array
-    radius: float
-    joint: bool
+    start: Array  #: Centre of one end. (3,) [m]
+    direction: Array  #: From one end's centre to the other's. (3,) [m]
+    radius: float  #: Radius. [m]
+    joint: bool  #: Whether it stands for a joint rather than for a link.
 
 
 class ArmPoses(NamedTuple):
-    """Poses of the links over time.
+    """Poses of the links over time."""
 
-    Attributes:
-        t: Time. (S,) [s]
-        translation: Origins in the base frame, the flange last. (S, n+1, 3) [m]
-        quat_xyzw: Orientations as unit quaternions. (S, n+1, 4)
-        q: Joint positions. (S, n) [rad]
-    """
-
-    t: Array
-    translation: Array
-    quat_xyzw: Array
-    q: Array
+    t: Array  #: Time. (S,) [s]
+    translation: Array  #: Origins in the base frame, the flange last. (S, n+1, 3) [m]
+    quat_xyzw: Array  #: Orientations as unit quaternions. (S, n+1, 4)
+    q: Array  #: Joint positions. (S, n) [rad]
 
 
 def arm_length(chain: Chain) -> float:

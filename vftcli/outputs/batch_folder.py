@@ -19,27 +19,18 @@ from vftcli.signals.errors import OutputError
 if TYPE_CHECKING:
     import polars as pl
 
+#: What the rows of a folder were made with; the first file of a batch to come.
 MARKER = "batch.json"
-"""What the rows of a folder were made with; the first file of a batch to come."""
 
 TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
-GATHERED = (TABLE, FAILURES, PAGE, SEAL)
-"""Files that are made anew by every run."""
-
-PIECE = 500
-"""Logs whose rows are in memory at a time."""
-
-DONE, FAILED = ".parquet", ".failed.json"
-"""Endings of what a log leaves in ``rows/``."""
+GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files that are made anew by every run.
+PIECE = 500  #: Logs whose rows are in memory at a time.
+DONE, FAILED = ".parquet", ".failed.json"  #: Endings of what a log leaves in ``rows/``.
 
 
 class BatchFolder:
-    """The folder of a batch.
-
-    Args:
-        path: Where it is; nothing is made yet.
-    """
+    """The folder of a batch."""
 
     def __init__(self, path: Path) -> None:
         self.path = Path(path)
@@ -60,16 +51,7 @@ class BatchFolder:
 
     @contextmanager
     def opened(self, options: str, record: Mapping[str, Any], *, force: bool) -> Iterator[None]:
-        """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile.
-
-        Args:
-            options: Digest of the options.
-            record: What they are, for whoever reads the marker.
-            force: Whether a batch with other options is gone on with; its rows stay.
-
-        Raises:
-            OutputError: If it holds something else, is in use, or cannot be written.
-        """
+        """Make the folder, or take up the batch in it, for a block; nobody else does meanwhile."""
         try:
             check_letters(self.path)
             self._check(options, force=force)
@@ -114,22 +96,14 @@ class BatchFolder:
         return {path.name.removesuffix(ending) for path in found}
 
     def put(self, name: str, content: bytes) -> None:
-        """Write a file, whole or not at all, over what an earlier run of the batch left.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Write a file, whole or not at all, over what an earlier run of the batch left."""
         path = self.path / name
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path, force=True) as temporary:
             temporary.write_bytes(content)
 
     def put_rows(self, key: str, rows: "pl.DataFrame") -> None:
-        """Write a log's rows: with them its result is complete.
-
-        Raises:
-            OutputError: If they cannot be written.
-        """
+        """Write a log's rows: with them its result is complete."""
         path = self.row_file(key)
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path, force=True) as temporary, table_file(temporary) as file:
@@ -141,11 +115,7 @@ class BatchFolder:
         self.put(name, json.dumps(dict(record), ensure_ascii=False).encode("utf-8", "replace"))
 
     def failure(self, key: str) -> dict[str, str]:
-        """Why a log failed in this run or an earlier one.
-
-        Raises:
-            OSError: If it did not.
-        """
+        """Why a log failed in this run or an earlier one."""
         text = self.row_file(key, FAILED).read_text(encoding="utf-8")
         return {str(name): str(value) for name, value in json.loads(text).items()}
 
@@ -154,13 +124,7 @@ class BatchFolder:
         self.row_file(key, FAILED).unlink(missing_ok=True)
 
     def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "Iterator[pl.DataFrame]":
-        """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first.
-
-        Args:
-            logs: ``log``, ``episode`` and ``key`` of every log that is done. Two logs of equal
-                bytes have one key, and the same rows.
-            schema: Columns of the rows.
-        """
+        """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first."""
         import polars as pl
 
         for part in logs.iter_slices(PIECE) if logs.height else (logs,):
@@ -175,17 +139,7 @@ class BatchFolder:
         page: Callable[[], str],
         record: Mapping[str, Any],
     ) -> None:
-        """Write the tables and the page, and at last their seal.
-
-        Args:
-            tables: Pieces of the one table, never all in memory.
-            failures: Why logs failed.
-            page: Makes the page, once every piece is written.
-            record: What else the seal holds.
-
-        Raises:
-            OutputError: If one cannot be written.
-        """
+        """Write the tables and the page, and at last their seal."""
         (self.path / SEAL).unlink(missing_ok=True)
         for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
             with atomic(self.path / name, force=True) as temporary:

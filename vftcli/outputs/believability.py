@@ -33,36 +33,25 @@ from vftcli.signals.arrays import Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import sentence
 
+#: How far an item lets the answer be believed.
 Standing = Literal["good", "caution", "bad", "unknown"]
-"""How far an item lets the answer be believed."""
-
+#: The sign of each standing; the page and the terminal use the same.
 MARKS = {"good": "✓", "caution": "△", "bad": "✗", "unknown": "–"}
-"""The sign of each standing; the page and the terminal use the same."""
-
+#: The standings, the worst first.
 SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
-"""The standings, the worst first."""
-
-STILL = 0.01
-"""A joint slower than this rests. [rad/s]"""
+STILL = 0.01  #: A joint slower than this rests. [rad/s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Ground:
-    """One reason to believe an answer, or not to.
+    """One reason to believe an answer, or not to."""
 
-    Attributes:
-        standing: What it does to the answer.
-        subject: What it is about, in one to three words.
-        sentence: What is known of it.
-        remedy: A command that would mend it, None where there is none.
-        of_log: Whether it was found in this log, rather than true of every log like it: what the
-            one line of a log among several tells.
-    """
-
-    standing: Standing
-    subject: str
-    sentence: str
-    remedy: str | None = None
+    standing: Standing  #: What it does to the answer.
+    subject: str  #: What it is about, in one to three words.
+    sentence: str  #: What is known of it.
+    remedy: str | None = None  #: A command that would mend it, None where there is none.
+    #: Whether it was found in this log, rather than true of every log like it: what the one line of
+    #: a log among several tells.
     of_log: bool = True
 
     @property
@@ -145,9 +134,9 @@ def grounds_record(found: Iterable[Ground]) -> list[dict[str, Any]]:
     ]
 
 
+#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
+#: the effort is another.
 MOST_UNEXPLAINED = 0.5
-"""Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
-the effort is another."""
 
 
 def robot_ground(analysis: Analysis) -> Ground:
@@ -283,6 +272,7 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
         )
 
 
+#: What the remarks of a list are about.
 LIST_SUBJECTS = {
     "contact-is-load": "load",
     "arm-stopped-abruptly": "stop",
@@ -290,7 +280,6 @@ LIST_SUBJECTS = {
     "free-part-misses-joints": "free motion",
     "no-wrench-of-few-joints": "wrench",
 }
-"""What the remarks of a list are about."""
 
 
 def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
@@ -329,8 +318,7 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
             )
 
 
-FULL_OF_REST = 0.5
-"""A joint that rests in more than this share of the log is said to rest."""
+FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
 
 
 def resting(recording: Recording) -> Mask:

@@ -3,32 +3,23 @@
 import textwrap
 from typing import NamedTuple, Self
 
-NARROWEST, WIDEST = 72, 100
-"""Columns that a screen uses at least, and at most."""
-
+NARROWEST, WIDEST = 72, 100  #: Columns that a screen uses at least, and at most.
+#: Style → ANSI code.
 STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
-"""Style → ANSI code."""
-
+#: What stands for a letter where a terminal has ASCII only.
 PLAIN = {
     "·": "-", "–": "-", "−": "-", "…": "...", "±": "+/-", "≤": "<=", "→": "->", "°": " deg",
     "✓": "+", "△": "!", "✗": "x", "┤": "|", "ω": "w", "τ": "tau", "×": "x", "≥": ">=", "√": "sqrt",
     "₃": "3", "²": "2", "≈": "~", "’": "'",
 }  # fmt: skip
-"""What stands for a letter where a terminal has ASCII only."""
 
 
 class Canvas(NamedTuple):
-    """What a terminal can show.
+    """What a terminal can show."""
 
-    Attributes:
-        width: Columns that are used.
-        unicode: Whether it has more letters than ASCII.
-        colour: Whether it has colours.
-    """
-
-    width: int = 80
-    unicode: bool = True
-    colour: bool = False
+    width: int = 80  #: Columns that are used.
+    unicode: bool = True  #: Whether it has more letters than ASCII.
+    colour: bool = False  #: Whether it has colours.
 
     @classmethod
     def of(cls, *, columns: int, unicode: bool, colour: bool) -> Self:

@@ -11,8 +11,7 @@ from vftcli.outputs.plain_rows import csv_rows
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
 
-MOST_ROWS = 20
-"""Rows on the terminal unless all are asked for."""
+MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
 
@@ -188,11 +187,8 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     return [*row, place_words(contact), contact.trust]
 
 
-PART = 0.35
-"""An axis that holds more than this share of a force is named in its direction."""
-
-AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")
-"""An axis' two directions, base axes."""
+PART = 0.35  #: An axis that holds more than this share of a force is named in its direction.
+AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.
 
 
 def direction(force: Array) -> str:

@@ -9,22 +9,16 @@ from numpy.typing import NDArray
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import gaps_of
 
-GAP_STEPS = 10.0
-"""A step this many times the median is drawn as a break in the line."""
+GAP_STEPS = 10.0  #: A step this many times the median is drawn as a break in the line.
 
 Index = NDArray[np.intp]
 
 
 class Line(NamedTuple):
-    """One series ready to be drawn; NaN where the line breaks.
+    """One series ready to be drawn; NaN where the line breaks."""
 
-    Attributes:
-        t: Time. (P,) [s]
-        y: Value, in the series' own unit. (P,)
-    """
-
-    t: Array
-    y: Array
+    t: Array  #: Time. (P,) [s]
+    y: Array  #: Value, in the series' own unit. (P,)
 
 
 def decimated(t: Array, values: Array, stretches: int) -> list[Line]:

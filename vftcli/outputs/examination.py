@@ -11,8 +11,7 @@ from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 
-MOST_FITS = 3
-"""Profiles that are shown though they do not fit: the nearest."""
+MOST_FITS = 3  #: Profiles that are shown though they do not fit: the nearest.
 
 
 def examination_record(examination: Examination) -> dict[str, Any]:
@@ -103,12 +102,7 @@ def warnings_of(examination: Examination) -> tuple[Remark, ...]:
 
 
 def health_line(examination: Examination, *, named: bool = False) -> str:
-    """What is wrong with a log, on one line: how much, the first of it, the others' names.
-
-    Args:
-        examination: What was found.
-        named: Whether the line says which log it is about.
-    """
+    """What is wrong with a log, on one line: how much, the first of it, the others' names."""
     recording, found = examination.recording, warnings_of(examination)
     head = f"{recording.name}: log health" if named else "log health"
     if not found:

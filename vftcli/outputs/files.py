@@ -38,14 +38,6 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
     """Yield a temporary path, which takes the place of `path` when the block ends well.
 
     A device or pipe (``/dev/stdout``) is yielded as it is. If the block fails nothing is left.
-
-    Args:
-        path: Where the file shall be.
-        force: Whether a file that is there may be replaced.
-
-    Raises:
-        OutputError: If the file exists and `force` is not set, is an input, or it cannot be
-            written.
     """
     path = Path(path)
     # A device cannot be replaced: `-o /dev/stdout` is written to as it is.
@@ -67,11 +59,7 @@ def atomic(path: Path, force: bool = False) -> Iterator[Path]:
 
 
 def check_file(path: Path, force: bool = False) -> None:
-    """See before anything is computed whether a file could be written.
-
-    Raises:
-        OutputError: As `atomic` does.
-    """
+    """See before anything is computed whether a file could be written."""
     try:
         check_letters(path)
         refuse_existing(path, force)
@@ -82,12 +70,7 @@ def check_file(path: Path, force: bool = False) -> None:
 
 @contextmanager
 def table_file(path: Path) -> Iterator[Path]:
-    """Yield a path at which Polars writes a table.
-
-    Raises:
-        OutputError: If the disk is full, which Polars calls an error of computation, the system's
-            word in the middle of its own.
-    """
+    """Yield a path at which Polars writes a table."""
     from polars.exceptions import ComputeError
 
     try:
@@ -98,11 +81,7 @@ def table_file(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:
-    """Write UTF-8 text, whole or not at all.
-
-    Raises:
-        OutputError: As `atomic` does.
-    """
+    """Write UTF-8 text, whole or not at all."""
     with atomic(path, force) as temporary:
         put_text(temporary, text)
 
@@ -114,8 +93,7 @@ def put_text(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
 
 
-EARLIER = "earlier"
-"""Folder, in the temporary one, of the files that make room for new ones."""
+EARLIER = "earlier"  #: Folder, in the temporary one, of the files that make room for new ones.
 
 
 class OutputFolder:
@@ -126,10 +104,6 @@ class OutputFolder:
     With `force`, those of `names` that an earlier run left and this one does not write are removed,
     and every file that the earlier run's seal lists, so that all files of the folder belong
     together.
-
-    Raises:
-        OutputError: If the folder is a file or cannot be written, holds one of `names` and
-            `force` is not set, or holds an input under one of them.
     """
 
     def __init__(self, path: Path, force: bool = False, names: Iterable[str] = ()) -> None:
@@ -253,12 +227,7 @@ def last_sealed(path: Path) -> tuple[bool, int, str]:
 
 @contextmanager
 def kept_aside(paths: Iterable[Path], aside: Path) -> Iterator[None]:
-    """Move files out of the way for a block; put them back, and only them, if the block fails.
-
-    Args:
-        paths: Files that are there or will be.
-        aside: A folder that is made for them, and goes with what is around it.
-    """
+    """Move files out of the way for a block; put them back, and only them, if the block fails."""
     paths = set(paths)
     aside.mkdir()
     there = sorted((p for p in paths if p.exists() or p.is_symlink()), key=last_sealed)[::-1]

@@ -9,14 +9,10 @@ from vftcli.contacts.contact_list import Contact
 from vftcli.outputs.canvas import Canvas
 from vftcli.signals.arrays import Array
 
-ROWS = 3
-"""Lines of the bars."""
-
+ROWS = 3  #: Lines of the bars.
+#: How full a letter is, from empty to full.
 STEPS, ASCII_STEPS = " ▁▂▃▄▅▆▇█", " .-=#"
-"""How full a letter is, from empty to full."""
-
-LABELS = 9
-"""Seconds that are written below the bars, about."""
+LABELS = 9  #: Seconds that are written below the bars, about.
 
 
 def forces_of_list(analysis: Analysis) -> Array | None:

@@ -15,36 +15,23 @@ import numpy as np
 
 from vftcli.signals.letters import printable
 
-DASH = "–"
-"""What stands where nothing is known."""
-
+DASH = "–"  #: What stands where nothing is known.
+#: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
-"""A number or a bound, and its decimals with their point."""
-
+#: What stands, unseen, where a number has fewer decimals than others of its column.
 DECIMALS = "." + 20 * "0"
-"""What stands, unseen, where a number has fewer decimals than others of its column."""
-
+#: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
-"""Width of a column of the IEEE, of a letter and of the gap between two columns. [in]"""
-
-
-BEST = ' class="best"'
-"""What the style sheet makes bold."""
+BEST = ' class="best"'  #: What the style sheet makes bold.
 
 
 class GridCell(NamedTuple):
-    """An entry that stands out, or that the page shows otherwise than the terminal.
+    """An entry that stands out, or that the page shows otherwise than the terminal."""
 
-    Attributes:
-        text: Its text.
-        best: Whether it is the best of its column: bold wherever type can be bold.
-        mark: What follows it on the terminal, as a star.
-        html: What the page shows instead of `text`, escaped already; "" for the text itself.
-    """
-
-    text: str
-    best: bool = False
-    mark: str = ""
+    text: str  #: Its text.
+    best: bool = False  #: Whether it is the best of its column: bold wherever type can be bold.
+    mark: str = ""  #: What follows it on the terminal, as a star.
+    #: What the page shows instead of `text`, escaped already; "" for the text itself.
     html: str = ""
 
 
@@ -70,23 +57,17 @@ def signed(value: float) -> str:
 
 
 class Column(NamedTuple):
-    """One column.
+    """One column."""
 
-    Attributes:
-        head: Its heading.
-        unit: Unit of its numbers, in brackets behind the heading; "" where the heading says it.
-        form: How a float is printed: a format as ``.3f``, or a function.
-        words: Whether it holds words, which stand to the left; numbers stand to the right.
-        width: Least width on the terminal.
-        symbol: The heading in LaTeX where it is a formula.
-    """
-
-    head: str
+    head: str  #: Its heading.
+    #: Unit of its numbers, in brackets behind the heading; "" where the heading says it.
     unit: str = ""
+    #: How a float is printed: a format as ``.3f``, or a function.
     form: str | Callable[[float], str] = significant
+    #: Whether it holds words, which stand to the left; numbers stand to the right.
     words: bool = False
-    width: int = 0
-    symbol: str = ""
+    width: int = 0  #: Least width on the terminal.
+    symbol: str = ""  #: The heading in LaTeX where it is a formula.
 
     @property
     def heading(self) -> str:
@@ -107,30 +88,19 @@ class Column(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Grid:
-    """A table.
+    """A table."""
 
-    Attributes:
-        columns: What stands in each column.
-        rows: One entry a column.
-        title: What the table is about, "" for none.
-        quantity: What all of its numbers are, as RMSE, where they are one thing.
-        unit: Their unit, where it is one.
-        summaries: How many rows at the end sum up those above, below a rule.
-        marked: Whether numbers may bear a mark: the terminal then keeps a place for it, so that
-            digits stand below digits.
-        notes: Lines on what the marks mean, footnotes in LaTeX.
-        swatches: Whether the page shows the colour of the observer that heads a row.
-    """
-
-    columns: tuple[Column, ...]
-    rows: tuple[Sequence[Entry], ...]
-    title: str = ""
-    quantity: str = ""
-    unit: str = ""
-    summaries: int = 0
+    columns: tuple[Column, ...]  #: What stands in each column.
+    rows: tuple[Sequence[Entry], ...]  #: One entry a column.
+    title: str = ""  #: What the table is about, "" for none.
+    quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
+    unit: str = ""  #: Their unit, where it is one.
+    summaries: int = 0  #: How many rows at the end sum up those above, below a rule.
+    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that digits stand
+    #: below digits.
     marked: bool = False
-    notes: tuple[str, ...] = ()
-    swatches: bool = False
+    notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
+    swatches: bool = False  #: Whether the page shows the colour of the observer that heads a row.
 
     @property
     def caption(self) -> str:
@@ -153,12 +123,7 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
 
 
 def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
-    """A table as text, two blanks between columns, each line ended.
-
-    Args:
-        grid: It.
-        letters: Puts an entry into letters that the terminal has, before columns are made.
-    """
+    """A table as text, two blanks between columns, each line ended."""
     # Where numbers may bear a mark, those without one keep its place.
     rooms = [" " * (grid.marked and not column.words) for column in grid.columns]
     heads = [letters(c.heading) + room for c, room in zip(grid.columns, rooms, strict=True)]
@@ -326,6 +291,7 @@ def escape_markdown(text: str) -> str:
     return text
 
 
+#: What LaTeX would not print as it stands, or not in every font encoding.
 LATEX_LETTERS = {
     "\\": r"\textbackslash{}",
     "&": r"\&",
@@ -353,7 +319,6 @@ LATEX_LETTERS = {
     "<": r"$<$",
     "·": r"\,",
 }
-"""What LaTeX would not print as it stands, or not in every font encoding."""
 
 
 def escape_latex(text: str) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from vftcli.signals.external_torque import ExternalTorque
 
+#: Okabe and Ito's hues, in tones that stand out from white and from black paper alike.
 COLOURS = {
     "best": "#d3224b",
     "fdo": "#2f86d0",
@@ -14,24 +15,18 @@ COLOURS = {
     "kfo-auto": "#7a6fd6",
     "rts-auto": "#a0522d",
 }
-"""Okabe and Ito's hues, in tones that stand out from white and from black paper alike."""
-
+#: For estimates that have no colour of their own, in turn.
 SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
-"""For estimates that have no colour of their own, in turn."""
-
+#: The reference in a viewer whose background is not known; the page uses the colour of its ink.
 REFERENCE = "#8a929a"
-"""The reference in a viewer whose background is not known; the page uses the colour of its ink."""
-
+#: The part of the arm that was touched, in words → its colour.
 PLACES = {
     "wrist": "#dd6415",
     "forearm": "#2f86d0",
     "upper arm": "#c95fa4",
     "cannot tell": "#c8a200",
 }
-"""The part of the arm that was touched, in words → its colour."""
-
-DASHED = ("kfo-zoh", "rts-auto")
-"""Drawn dashed: where they lie on their neighbour, both are seen."""
+DASHED = ("kfo-zoh", "rts-auto")  #: Drawn dashed: where they lie on their neighbour, both are seen.
 
 
 def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:

@@ -12,15 +12,12 @@ from pathlib import Path
 if sys.platform != "win32":
     import fcntl
 
-PARTIAL = ".vftcli-*.partial"
-"""Every temporary folder's name, as a pattern of paths."""
-
+PARTIAL = ".vftcli-*.partial"  #: Every temporary folder's name, as a pattern of paths.
+#: What a temporary folder is called; the number is that of the process that made it.
 NAME = re.compile(r"\.vftcli-(\d+)-[0-9a-f]{8}\.partial")
-"""What a temporary folder is called; the number is that of the process that made it."""
-
+#: A folder that nobody holds is cleared at this age even if its process number is in use, which by
+#: then is another program's. [s]
 UNSURE = 60.0
-"""A folder that nobody holds is cleared at this age even if its process number is in use, which by
-then is another program's. [s]"""
 
 
 @contextmanager
@@ -28,9 +25,6 @@ def partial_folder(parent: Path) -> Iterator[Path]:
     """Make a folder in `parent` for a block; it goes with all that is still in it.
 
     When the block ends well, what killed runs left in `parent` goes too.
-
-    Raises:
-        OSError: If it cannot be made.
     """
     path = parent / f".vftcli-{os.getpid()}-{os.urandom(4).hex()}.partial"
     path.mkdir()
@@ -69,15 +63,7 @@ def is_running(process: int) -> bool:
 
 @contextmanager
 def held(folder: Path, *, wait: bool) -> Iterator[None]:
-    """Hold a folder for a block against others that hold it; the system lets go of the dead's.
-
-    Args:
-        folder: A folder that is there.
-        wait: Whether to wait until nobody else holds it.
-
-    Raises:
-        BlockingIOError: If somebody else holds it and `wait` is not set.
-    """
+    """Hold a folder for a block against others that hold it; the system lets go of the dead's."""
     if sys.platform == "win32":
         yield
         return

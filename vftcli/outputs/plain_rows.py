@@ -29,8 +29,8 @@ def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
     return text.getvalue()
 
 
+#: How a text begins that spreadsheets run: the list of OWASP's "CSV Injection".
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
-"""How a text begins that spreadsheets run: the list of OWASP's "CSV Injection"."""
 
 
 def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds

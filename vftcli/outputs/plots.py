@@ -10,57 +10,34 @@ from vftcli.signals.arrays import Array
 
 
 class PlotLine(NamedTuple):
-    """One line of a plot.
+    """One line of a plot."""
 
-    Attributes:
-        name: What the legend calls it.
-        values: NaN where not known. (T,)
-        colour: ``#rrggbb``.
-        width: In pixels.
-    """
-
-    name: str
-    values: Array
-    colour: str
-    width: float = 1.5
+    name: str  #: What the legend calls it.
+    values: Array  #: NaN where not known. (T,)
+    colour: str  #: ``#rrggbb``.
+    width: float = 1.5  #: In pixels.
 
 
 class PlotPoints(NamedTuple):
-    """Single points of a plot, at times of their own.
+    """Single points of a plot, at times of their own."""
 
-    Attributes:
-        name: What the legend calls them.
-        t: Times. (K,) [s]
-        values: (K,)
-        colour: ``#rrggbb``.
-    """
-
-    name: str
-    t: Array
-    values: Array
-    colour: str
+    name: str  #: What the legend calls them.
+    t: Array  #: Times. (K,) [s]
+    values: Array  #: (K,)
+    colour: str  #: ``#rrggbb``.
 
 
 class Lines(NamedTuple):
-    """The lines of one plot.
+    """The lines of one plot."""
 
-    Attributes:
-        path: The entity.
-        title: What the plot shows, with its unit.
-        lines: At least one, all of one length.
-        family: Plots of one family have the same vertical axis; "" stands alone.
-        points: Single points among the lines, or none.
-        legend: Whether a legend may cover a corner of it, where the title does not say it all.
-        t: Times of these samples where they are not all of the tab's. (T,) [s]
-    """
-
-    path: str
-    title: str
-    lines: Sequence[PlotLine]
-    family: str = ""
-    points: PlotPoints | None = None
+    path: str  #: The entity.
+    title: str  #: What the plot shows, with its unit.
+    lines: Sequence[PlotLine]  #: At least one, all of one length.
+    family: str = ""  #: Plots of one family have the same vertical axis; "" stands alone.
+    points: PlotPoints | None = None  #: Single points among the lines, or none.
+    #: Whether a legend may cover a corner of it, where the title does not say it all.
     legend: bool = True
-    t: Array | None = None
+    t: Array | None = None  #: Times of these samples where they are not all of the tab's. (T,) [s]
 
     def thinned(
         self, t: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
@@ -96,37 +73,22 @@ class Lines(NamedTuple):
 
 
 class LogLine(NamedTuple):
-    """One line of a text log.
+    """One line of a text log."""
 
-    Attributes:
-        path: The entity.
-        t: When. [s]
-        text: What happened.
-        colour: ``#rrggbb``.
-        level: How much it matters: INFO, WARN or ERROR.
-    """
-
-    path: str
-    t: float
-    text: str
-    colour: str
-    level: str = "INFO"
+    path: str  #: The entity.
+    t: float  #: When. [s]
+    text: str  #: What happened.
+    colour: str  #: ``#rrggbb``.
+    level: str = "INFO"  #: How much it matters: INFO, WARN or ERROR.
 
 
 class Tab(NamedTuple):
-    """Plots shown together.
+    """Plots shown together."""
 
-    Attributes:
-        name: The tab's name.
-        t: Time of their samples. (T,) [s]
-        plots: What they show.
-        log: A text log below them, or none.
-    """
-
-    name: str
-    t: Array
-    plots: Sequence[Lines]
-    log: Sequence[LogLine] = ()
+    name: str  #: The tab's name.
+    t: Array  #: Time of their samples. (T,) [s]
+    plots: Sequence[Lines]  #: What they show.
+    log: Sequence[LogLine] = ()  #: A text log below them, or none.
 
     def ends(self, lines: Lines) -> tuple[float, float]:
         """Lower and upper end of a plot's vertical axis: those of its whole family."""

@@ -7,6 +7,7 @@ from vftcli.robots import PROFILES
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 
+#: Subject → the findings that are about it; any other is about the drives' effort.
 SUBJECTS = {
     "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-mismatch-untold",
              "payload-not-mounted", "payload-differs", "load-changes"),
@@ -25,10 +26,8 @@ SUBJECTS = {
                "zero-far-from-start", "zero-swings"),
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
-"""Subject → the findings that are about it; any other is about the drives' effort."""
-
+#: Findings that ``--find-payload`` answers.
 LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {"contact-is-load"}
-"""Findings that ``--find-payload`` answers."""
 
 
 def subject_of(code: str) -> str:

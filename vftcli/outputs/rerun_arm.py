@@ -11,31 +11,20 @@ from vftcli.outputs.rerun_file import Stream
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 
-NEWTON_PER_METRE = 200.0
-"""Length of a force arrow where nothing else is said: 200 N are 1 m."""
-
+NEWTON_PER_METRE = 200.0  #: Length of a force arrow where nothing else is said: 200 N are 1 m.
+#: Colours of links, joints and the force arrow.
 LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
-"""Colours of links, joints and the force arrow."""
-
+#: Lengths that a force arrow may have. [N/m]
 SCALES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
-"""Lengths that a force arrow may have. [N/m]"""
-
-LONGEST = 0.5
-"""The hardest force's arrow is as long at most. [m]"""
+LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
 
 
 class PaintedSpan(NamedTuple):
-    """A span in which a link has another colour.
+    """A span in which a link has another colour."""
 
-    Attributes:
-        start: [s]
-        stop: [s]
-        colour: ``#rrggbb``.
-    """
-
-    start: float
-    stop: float
-    colour: str
+    start: float  #: [s]
+    stop: float  #: [s]
+    colour: str  #: ``#rrggbb``.
 
 
 def arrow_scale(hardest: float) -> float:
@@ -51,16 +40,7 @@ def send_arm(
     ghost: tuple[int, ...] | None = None,
     painted: Mapping[int, Sequence[PaintedSpan]] | None = None,
 ) -> None:
-    """Send an arm's shape once and its poses over time.
-
-    Args:
-        stream: The recording.
-        path: Entity of the arm.
-        chain: The arm.
-        poses: Where it has been.
-        ghost: Red, green, blue and opacity of an arm that is seen through, None for a solid one.
-        painted: Number of a link → the spans in which it has another colour, in order.
-    """
+    """Send an arm's shape once and its poses over time."""
     import rerun as rr
 
     time = rr.TimeColumn("t", duration=poses.t)

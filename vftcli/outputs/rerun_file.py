@@ -21,22 +21,16 @@ from vftcli.outputs.plots import Lines, LogLine, Tab
 from vftcli.signals.arrays import Array
 from vftcli.signals.packages import check_installed
 
-CONTACTS = "/contacts"
-"""Below it stand the contacts: `/contacts/1` is that of number 1."""
+CONTACTS = "/contacts"  #: Below it stand the contacts: `/contacts/1` is that of number 1.
 
 Stream = Any
 
 
 class ArmView(NamedTuple):
-    """The space in which arms stand.
+    """The space in which arms stand."""
 
-    Attributes:
-        name: What it is called.
-        poses: Where an arm has been, so that the eye sees all of it.
-    """
-
-    name: str
-    poses: ArmPoses
+    name: str  #: What it is called.
+    poses: ArmPoses  #: Where an arm has been, so that the eye sees all of it.
 
 
 @contextmanager
@@ -57,10 +51,6 @@ def rerun_file(
         words: Name of a document → its Markdown.
         view: Where arms will be drawn, None if there are none.
         marked: The span that the time panel marks, None if there is none. [s]
-
-    Raises:
-        OutputError: If the file cannot be written.
-        PackageError: If Rerun is not installed.
     """
     check_installed("rerun", path.name)
     import rerun as rr
@@ -249,6 +239,7 @@ def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
         stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
 
 
+#: How to write what the viewer's font may lack.
 SPELLED = {
     "ᵀ": "^T",
     "⁻": "^-",
@@ -269,7 +260,6 @@ SPELLED = {
     "Σ": "sum ",
     "ẋ": "dx",
 }
-"""How to write what the viewer's font may lack."""
 
 
 def drawable(text: str) -> str:

@@ -26,24 +26,18 @@ from vftcli.outputs.short_screen import answer_lines, doubt_lines, facts
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
 
-MOST_LINES = 40
-"""Lines of a screen."""
+MOST_LINES = 40  #: Lines of a screen.
 
+#: Lines of a ground and rows of the table, None for all; then less and less, till it fits.
+#:
+#: A good ground has a line less than the others, one at least. With none, the good grounds share a
+#: line and the others have one each.
 FORMS = ((None, None), (3, 20), (2, 20), (1, 20), *((0, rows) for rows in range(20, 2, -1)))
-"""Lines of a ground and rows of the table, None for all; then less and less, till it fits.
 
-A good ground has a line less than the others, one at least. With none, the good grounds share a
-line and the others have one each.
-"""
-
-MOST_LOGS, WORST = 20, 3
-"""Logs that are shown at most, findings below them."""
-
-SUBJECT = 17
-"""Columns of what a ground is about."""
-
+MOST_LOGS, WORST = 20, 3  #: Logs that are shown at most, findings below them.
+SUBJECT = 17  #: Columns of what a ground is about.
+#: Remarks that the other observers run on the paper's gains.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
-"""Remarks that the other observers run on the paper's gains."""
 
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 
@@ -51,14 +45,7 @@ LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another p
 def log_screen(
     analysis: Analysis, canvas: Canvas, below: Sequence[str] = (), *, every: bool = False
 ) -> str:
-    """The screen of one log.
-
-    Args:
-        analysis: What was found.
-        canvas: What the terminal can show.
-        below: Lines on what was written.
-        every: Whether everything is shown, however long.
-    """
+    """The screen of one log."""
     head = [canvas.painted(facts(analysis), "bold"), "", *answer_lines(analysis, canvas)]
     bars, found = bar_lines(analysis, canvas), grounds(analysis)
     tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
@@ -130,14 +117,7 @@ def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> l
 def ground_lines(
     ground: Ground, canvas: Canvas, most: int | None, about: str = ""
 ) -> Iterator[str]:
-    """One ground: its mark, what it is about, what is known of it; then its remedy.
-
-    Args:
-        ground: It.
-        canvas: What the terminal can show.
-        most: Lines that its sentence may take, None for all.
-        about: The log, where there are several.
-    """
+    """One ground: its mark, what it is about, what is known of it; then its remedy."""
     subject = f"{about}: {ground.subject}" if about else ground.subject
     indent = SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
@@ -196,15 +176,7 @@ def logs_screen(
     *,
     every: bool = False,
 ) -> str:
-    """The screen of several logs: one line a log, then the worst findings.
-
-    Args:
-        analyses: What was found in those that could be analysed.
-        canvas: What the terminal can show.
-        failed: Why each of the others could not, by its label.
-        below: Lines on what was written.
-        every: Whether every log is shown, however many.
-    """
+    """The screen of several logs: one line a log, then the worst findings."""
     found = [(analysis, grounds(analysis)) for analysis in analyses]
     lines = [canvas.painted(logs_facts(analyses, len(failed)), "bold"), ""]
     shown = found if every or len(found) <= MOST_LOGS else worst_logs(found)

@@ -5,8 +5,8 @@ import json
 from collections.abc import Iterator
 from pathlib import Path
 
+#: The last file of a run to come and the first to go; beside other files `NAME.run.json`.
 SEAL = "run.json"
-"""The last file of a run to come and the first to go; beside other files `NAME.run.json`."""
 
 
 def is_seal(path: Path) -> bool:
@@ -33,10 +33,6 @@ def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
     """The files that an earlier run's seal lists, where they still are as that run left them.
 
     A seal is a file like any other: what it lists outside its folder is not believed.
-
-    Args:
-        seal: The seal.
-        at: The folder that it was written in, where it has been moved out of it.
     """
     try:
         files = json.loads(seal.read_text(encoding="utf-8"))["files"]

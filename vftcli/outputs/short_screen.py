@@ -52,15 +52,7 @@ def written_lines(
     *,
     several: bool = False,
 ) -> list[str]:
-    """What was written, as far as it is there, and how to open it.
-
-    Args:
-        folder: Where it is.
-        names: Files that may be there, the most wanted first.
-        canvas: What the terminal can show.
-        open_with: The command that opens it, "" for the page itself.
-        several: Whether there is a sub-folder a log.
-    """
+    """What was written, as far as it is there, and how to open it."""
     there = [name for name in names if (folder / name).exists()]
     there += ["one folder a log"] * several
     lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)

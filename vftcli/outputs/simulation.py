@@ -28,12 +28,7 @@ def companions(path: Path) -> tuple[Path, Path, Path]:
 
 
 def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
-    """The folder of logs that stand beside one another, checked.
-
-    Raises:
-        OutputError: If a file exists and `force` is not set, is an input, or the folder is missing
-            or closed.
-    """
+    """The folder of logs that stand beside one another, checked."""
     names: list[str] = []
     for path in paths:
         if not path.name:
@@ -63,18 +58,8 @@ def save(
 ) -> list[Path]:
     """Write each log, with ``PATH.truth.parquet``, ``.scenario.toml`` and ``.run.json`` beside it.
 
-    Args:
-        runs: Where each log goes → the finished run; all in one folder.
-        format: A name in `WRITERS`, or "" for the scenario's or the vendor's usual one.
-        force: Whether files that are there may be replaced.
-        command: The command line, for the record.
-
     Returns:
         The paths of all files; of a bag, its folder.
-
-    Raises:
-        ParameterError: If the robot cannot log in the format.
-        OutputError: As `log_folder` does, or if a file cannot be written.
     """
     from vftcli.simulation.writers import usual_format
 

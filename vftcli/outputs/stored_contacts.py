@@ -22,11 +22,7 @@ from vftcli.signals.remarks import Remark, Where
 
 
 def stored_record(estimates: Path) -> dict[str, Any]:
-    """The contacts in the ``run.json`` beside an ``estimates.parquet``, as they were written.
-
-    Raises:
-        LogError: If it is not there, is no record of ours, or holds no list.
-    """
+    """The contacts in the ``run.json`` beside an ``estimates.parquet``, as they were written."""
     path = estimates.with_name(SEAL)
     try:
         record = json.loads(path.read_text(encoding="utf-8"))

@@ -9,8 +9,8 @@ from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Threshold
 from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
 from vftcli.robots.writing import lines_of
 
+#: A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre.
 SHARES = 100
-"""A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre."""
 
 
 def thresholds_text(
@@ -131,12 +131,7 @@ def check_line(check: ContactCheck) -> str:
 def threshold_rows(
     thresholds: Sequence[tuple[str, str, float, SignalThreshold]], key: str
 ) -> list[dict[str, Any]]:
-    """Rows for machines, the unit in the names.
-
-    Args:
-        thresholds: Name, unit, level and threshold of each signal, as `Thresholds.named`.
-        key: What a signal is: "joint", by its number, or "axis".
-    """
+    """Rows for machines, the unit in the names."""
     rows = []
     for shown, of, level, one in thresholds:
         unit, tail = of.replace("·", ""), one.tail
@@ -208,15 +203,10 @@ def contact_record(number: int, contact: CheckedContact) -> dict[str, Any]:
 
 
 class Interface(NamedTuple):
-    """How one robot's interface is told thresholds.
+    """How one robot's interface is told thresholds."""
 
-    Attributes:
-        joints: How many joint torques it takes, None for any number.
-        write: Makes the text of it.
-    """
-
-    joints: int | None
-    write: Callable[[Thresholds], str]
+    joints: int | None  #: How many joint torques it takes, None for any number.
+    write: Callable[[Thresholds], str]  #: Makes the text of it.
 
 
 def calls(thresholds: Thresholds) -> dict[str, str]:
@@ -322,10 +312,10 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
+#: Name → how it is told thresholds.
 INTERFACES = {
     "libfranka": Interface(7, libfranka_call),
     "franka_ros": Interface(7, franka_ros_parameters),
     "ur_script": Interface(6, ur_script),
     "toml": Interface(None, toml_text),
 }
-"""Name → how it is told thresholds."""

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     )
     from vftcli.readers.registry import READERS
 
+#: Public name → the module of this room that it lives in.
 HOMES = {
     "READERS": "registry",
     "LogFile": "reader",
@@ -32,7 +33,6 @@ HOMES = {
     "read_first_recording": "reading",
     "recognise": "reading",
 }
-"""Public name → the module of this room that it lives in."""
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - the names are of every kind

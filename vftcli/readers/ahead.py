@@ -21,30 +21,17 @@ if TYPE_CHECKING:
 
 
 class TextParse(NamedTuple):
-    """How a table of text is parsed.
+    """How a table of text is parsed."""
 
-    Attributes:
-        separator: What stands between two cells.
-        width: Number of columns.
-        kinds: Column that is wanted → its polars type.
-        skip: Lines before the rows.
-        quoted: Whether cells may stand in quotes.
-        decimal_comma: Whether numbers are written 0,5.
-    """
-
-    separator: str
-    width: int
-    kinds: Mapping[int, Any]
-    skip: int
-    quoted: bool = False
-    decimal_comma: bool = False
+    separator: str  #: What stands between two cells.
+    width: int  #: Number of columns.
+    kinds: Mapping[int, Any]  #: Column that is wanted → its polars type.
+    skip: int  #: Lines before the rows.
+    quoted: bool = False  #: Whether cells may stand in quotes.
+    decimal_comma: bool = False  #: Whether numbers are written 0,5.
 
     def frame(self, source: Any) -> "pl.DataFrame":  # noqa: ANN401 - a path or bytes
-        """The rows by polars, every wanted column with its type and its number as name.
-
-        Raises:
-            polars.exceptions.PolarsError: If they are no such table.
-        """
+        """The rows by polars, every wanted column with its type and its number as name."""
         import polars as pl
 
         return pl.read_csv(
@@ -75,12 +62,7 @@ class Ahead:
 
     @classmethod
     def of(cls, path: Path, signals: frozenset[str] | None) -> "Ahead | None":
-        """Begin to parse a log, None where its first lines do not say what will be wanted of it.
-
-        Args:
-            path: Any path.
-            signals: Fields of Recording that will be wanted, beside the positions; None for all.
-        """
+        """Begin to parse a log, None where its first lines do not say what will be wanted of it."""
         with suppress(LogError):  # what cannot be opened is said by who reads it
             head, wrapping = head_of(path)
             columns = {} if wrapping else wanted_columns(head, path.stat().st_size, signals)
@@ -95,11 +77,7 @@ class Ahead:
         return None
 
     def frame(self, parse: TextParse) -> "pl.DataFrame | None":
-        """What was parsed, once, if it was parsed like this; None if it was not.
-
-        Raises:
-            polars.exceptions.PolarsError: As `TextParse.frame` does.
-        """
+        """What was parsed, once, if it was parsed like this; None if it was not."""
         background, self._frame = self._frame, None
         return background.result() if background is not None and parse == self.parse else None
 
@@ -112,13 +90,7 @@ def header(head: bytes) -> tuple[list[str], str]:
 
 
 def wanted_columns(head: bytes, size: int, signals: frozenset[str] | None) -> list[int]:
-    """The columns that will be wanted of a log of RTDE names; none of any other.
-
-    Args:
-        head: The first bytes.
-        size: Bytes of the whole file; a log of very many rows is not parsed in one piece.
-        signals: As in `Ahead.of`.
-    """
+    """The columns that will be wanted of a log of RTDE names; none of any other."""
     names, _ = header(head)
     lines = head.split(b"\n")[1:-1]
     if f"{JOINT_COLUMNS['q']}_0" not in names or CLOCK not in names or not lines or b'"' in head:

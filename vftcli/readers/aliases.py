@@ -26,29 +26,24 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import fact
 
+#: Names of the clock; a unit may follow, as in time_ms.
 CLOCKS = ("t", "time", "timestamp", "time_s", "stamp", "sec", "__time", "%time", "seconds")
-"""Names of the clock; a unit may follow, as in time_ms."""
-
+#: The nanoseconds beside a column of seconds whose name has the same stem.
 NANOSECONDS = re.compile(r"(?P<stem>.*?)(nsecs?|nanosecs?|nanos|nanoseconds|ns)")
-"""The nanoseconds beside a column of seconds whose name has the same stem."""
-
+#: A message's own stamp, or a part of it.
 HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
-"""A message's own stamp, or a part of it."""
-
+#: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them.
 OWN_STAMPS = "t_src_ns"
-"""The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them."""
-
+#: Field of Recording → names its columns go by, in lower case and without their index.
 ALIASES: dict[str, tuple[str, ...]] = {
     field: tuple(names)
     for field, names in tomllib.loads(
         (Path(__file__).parent / "aliases.toml").read_text(encoding="utf-8")
     ).items()
 }
-"""Field of Recording → names its columns go by, in lower case and without their index."""
-
+#: Names of libfranka's residual, measured torque minus model: its sign has to be turned.
 TURNED = {"tau_ext_hat_filtered", "state.tau_ext_hat_filtered", "motor_torques_external"}
-"""Names of libfranka's residual, measured torque minus model: its sign has to be turned."""
-
+#: Names of the six columns of a wrench.
 WRENCHES = (
     "fx fy fz mx my mz",
     "fx fy fz tx ty tz",
@@ -56,35 +51,32 @@ WRENCHES = (
     "wrench/fx wrench/fy wrench/fz wrench/tx wrench/ty wrench/tz",
     " ".join(f"ft_wrench_{what}_{axis}" for what in ("force", "torque") for axis in "xyz"),
 )
-"""Names of the six columns of a wrench."""
 
 INDEXED = re.compile(
     r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
     re.IGNORECASE,
 )  # a number of any length would be tried from each of its digits on
+#: What ROS tools put before the fields of a JointState.
 FIELD = re.compile(r"field\.|/?joint_states?[./]")
-"""What ROS tools put before the fields of a JointState."""
-
+#: A joint's name before the signal's, as PlotJuggler exports JointState topics.
 JOINT_FIRST = re.compile(
     r"(?:.*/)?(?P<joint>[A-Za-z][\w ]*)[/.](?P<stem>position|velocity|effort)(?:\[\])?"
 )
-"""A joint's name before the signal's, as PlotJuggler exports JointState topics."""
 
 SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
+#: A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel.
 SIGNAL_OF_JOINT = (
     re.compile(rf"(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)", re.IGNORECASE),
     re.compile(rf"(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})", re.IGNORECASE),
 )
-"""A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel."""
 
 NUMBERED_JOINT = re.compile(r"(joint|j)?_?\d+", re.IGNORECASE)
+#: What a pose has in place of joints.
 AXES = re.compile(r"r?[xyz]|q[wxyz]|roll|pitch|yaw", re.IGNORECASE)
-"""What a pose has in place of joints."""
 
 FEWEST_JOINTS = 3
 
-RESIDUAL_TURNED = fact("residual-turned")
-"""Said wherever libfranka's residual is taken."""
+RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual is taken.
 
 
 class Group(NamedTuple):
@@ -97,16 +89,7 @@ class Group(NamedTuple):
 
 
 def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[str, ...]]:
-    """Find the signals of a headed table by the names of its columns, and the joints' names.
-
-    Args:
-        table: The table.
-        stated: What a --columns text says of some signals; their columns are no other signal's.
-            Where it names the positions, only the clock, velocities and an effort are added.
-
-    Raises:
-        LogError: If two groups of columns could be the same signal, or none is the positions.
-    """
+    """Find the signals of a headed table by the names of its columns, and the joints' names."""
     groups = grouped(table)
     rate = next((item.rate for item in stated if item.rate is not None), None)
     named = [item for item in stated if item.rate is None and item.signal != "_"]
@@ -131,11 +114,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
 
 
 def found_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
-    """All signals that are found by their names beside those that are stated.
-
-    Raises:
-        LogError: If two groups of columns could be one of them.
-    """
+    """All signals that are found by their names beside those that are stated."""
     known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
     found = []
     for signal in ALIASES:
@@ -177,11 +156,7 @@ def _as_driven(pick: Pick, groups: dict[str, Group]) -> Pick:
 
 
 def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
-    """The columns of an item: by pattern, by a name without index, or those found without it.
-
-    Raises:
-        LogError: If there are none.
-    """
+    """The columns of an item: by pattern, by a name without index, or those found without it."""
     if item.pattern is None:
         signal = SIGNALS.get(item.signal, item.signal)
         found = _clock(table) if signal == "t" else None
@@ -279,11 +254,7 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
 
 
 def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
-    """The cells of a group.
-
-    Raises:
-        LogError: If there are none: a column of lists whose first one is empty; or two of an index.
-    """
+    """The cells of a group."""
     if group.twice:
         raise LogError(
             f"{table.path}: two columns could be {name} of one index: {group.twice!r} and another. "
@@ -326,9 +297,6 @@ def _clock(table: Table) -> Pick | None:
     """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
 
     A message's own stamp goes before the time at which a recorder took it.
-
-    Raises:
-        LogError: If several could be.
     """
     names = [name.lower() for name in table.names or ()]
     pairs: list[tuple[int, ...]] = [*_second_pairs(names)]
@@ -363,11 +331,7 @@ def _second_pairs(names: Sequence[str]) -> Iterator[tuple[int, int]]:
 
 
 def table_clock(table: Table, column: int) -> Cell:
-    """The cell of a clock's column, which may hold lists of one number.
-
-    Raises:
-        LogError: If it holds lists of any other length.
-    """
+    """The cell of a clock's column, which may hold lists of one number."""
     length = table.lists.get(column, 1)
     if length != 1:
         raise LogError(

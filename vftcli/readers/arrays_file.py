@@ -18,19 +18,13 @@ from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, nump
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark
 
-SKILL = "skill_state_dict"
-"""What frankapy calls the states of a skill."""
-
+SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
+#: The fields of libfranka's state that are taken from panda-py's get_log().
 PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
-"""The fields of libfranka's state that are taken from panda-py's get_log()."""
 
 
 def npz_arrays(file: LogFile) -> dict[str, Column]:
-    """The arrays of an .npz file by name, unpacked within bounds.
-
-    Raises:
-        LogError: If it is damaged, holds objects, or unpacks beyond the limit.
-    """
+    """The arrays of an .npz file by name, unpacked within bounds."""
     limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
     arrays = {}
     try:
@@ -59,17 +53,7 @@ def npz_arrays(file: LogFile) -> dict[str, Column]:
 def read_arrays(
     file: LogFile, arrays: Mapping[str, Column], remarks: tuple[Remark, ...], request: ReadChoice
 ) -> RawLog:
-    """Read named arrays as panda-py's log, by --columns, or by alias.
-
-    Args:
-        file: The file.
-        arrays: Its arrays.
-        remarks: What had to be done to them.
-        request: What is wanted.
-
-    Raises:
-        LogError: If the arrays differ in length or none is the positions.
-    """
+    """Read named arrays as panda-py's log, by --columns, or by alias."""
     shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
     table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)
     if request.columns is not None and parse_columns(request.columns).named:
@@ -94,12 +78,7 @@ def _shaped(array: Column) -> Column:
 
 
 def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
-    """The arrays of a dictionary of arrays or of lists of equally long arrays.
-
-    Raises:
-        NoLogError: If nothing in it is an array of numbers.
-        LogError: If its rows differ in length.
-    """
+    """The arrays of a dictionary of arrays or of lists of equally long arrays."""
     arrays = {}
     for name, value in log.items():
         rows = value.shape[0] if isinstance(value, np.ndarray) and value.ndim else 0
@@ -117,11 +96,7 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
 
 
 def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    """Read a dictionary of arrays or lists: panda-py's get_log(), frankapy's skills, or others.
-
-    Raises:
-        LogError: If nothing in it is an array of numbers, or it has no such episode.
-    """
+    """Read a dictionary of arrays or lists: panda-py's get_log(), frankapy's skills, or others."""
     numbers = episodes_of_skills(log)
     number, part, remarks = episode_of(file.path, request, numbers)
     if skills := skills_of(log):

@@ -13,14 +13,10 @@ from vftcli.signals.packages import needed
 
 FILE_MAGIC, STREAM_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
-LONGEST_HEAD = 1 << 24
-"""Bytes that the first message of a stream, its schema, may take."""
-
-NUMBER = struct.Struct("<q")
-"""A whole number in a message."""
-
+LONGEST_HEAD = 1 << 24  #: Bytes that the first message of a stream, its schema, may take.
+NUMBER = struct.Struct("<q")  #: A whole number in a message.
+#: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs).
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
-"""Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs)."""
 
 
 class ArrowTable(PyarrowTable):
@@ -65,11 +61,7 @@ class ArrowTable(PyarrowTable):
 
 
 def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
-    """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked.
-
-    Raises:
-        ValueError: If a batch contradicts itself.
-    """
+    """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
     pa = needed("pyarrow", "an Arrow file")
 
     reader = pa.ipc.MessageReader.open_stream(content)
@@ -106,12 +98,7 @@ def unpacked(batch: "Flat", body: memoryview) -> int:
 
 
 class Flat:
-    """A table of a flatbuffer, in which Arrow describes a batch.
-
-    Args:
-        data: The buffer.
-        place: Where the table is; the root's if None.
-    """
+    """A table of a flatbuffer, in which Arrow describes a batch."""
 
     def __init__(self, data: memoryview, place: int | None = None) -> None:
         self._data = data

@@ -16,27 +16,21 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
 from vftcli.signals.source import Source
 
+#: Values as large as this are no measurement in any unit; anywhere in a log they are refused.
 ABSURD = 1e9
-"""Values as large as this are no measurement in any unit; anywhere in a log they are refused."""
-
+#: How a log is read without one of its signals.
 LEAVING_OUT = (
     "leave the signal out: with --columns name the others, as in t=t,q=q_{i},dq=dq_{i}, or skip it "
     "with _:6 in a table without a header"
 )
-"""How a log is read without one of its signals."""
-
+#: No robot is sampled ten million times a second, nor for six years: behind the farthest start
+#: nanoseconds in 64 bits count no farther. [s]
 SHORTEST_STEP, LONGEST_LOG = 1e-7, 2e8
-"""No robot is sampled ten million times a second, nor for six years: behind the farthest start
-nanoseconds in 64 bits count no farther. [s]"""
-
+#: A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]
 FARTHEST_START = 9e9
-"""A clock starts within 285 years of 1970: nanoseconds in 64 bits count no farther. [s]"""
-
+#: How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]
 ONE_TURN, TWO_TURNS = 2 * np.pi + 0.1, 13.0
-"""How far a joint goes from its zero, with a little to spare: of seven-joint arms, of any. [rad]"""
-
-GAP_STEPS = 4.0
-"""A step this many times the median is reported as a gap."""
+GAP_STEPS = 4.0  #: A step this many times the median is reported as a gap.
 
 
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
@@ -52,10 +46,6 @@ def cleaned(
     In order: joints without a signal are left out, garbage of a misaligned packet at the start is
     dropped, values that are no numbers are refused, repeated stamps are dropped, a clock that runs
     backwards is refused, gaps are counted, and positions that can only be degrees are refused.
-
-    Raises:
-        LogError: If a signal holds NaN or infinity, or its unit cannot be radians.
-        ClockError: If the clock is not finite, runs backwards, or holds no samples.
     """
     rows = len(raw.stamps) + (0 if raw.unknown is None else len(raw.unknown))
     raw = measured(raw, path)
@@ -77,12 +67,7 @@ def cleaned(
 
 
 def measured(raw: RawLog, path: Path) -> RawLog:
-    """Samples that a robot may have given: of the segment that is asked for, without garbage.
-
-    Raises:
-        LogError: If a signal holds a value that nobody measured.
-        ClockError: If there is none, or the clock is none of a robot's log.
-    """
+    """Samples that a robot may have given: of the segment that is asked for, without garbage."""
     if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
     if raw.segment is not None:
@@ -159,15 +144,13 @@ def without_empty_joints(raw: RawLog) -> RawLog:
     )
 
 
+#: Rows at the start of a log among which a misaligned packet may have left garbage.
 GARBAGE_ROWS = 100
-"""Rows at the start of a log among which a misaligned packet may have left garbage."""
-
+#: No joint measurement in SI units is this large; a misread double nearly always is, or is tiny.
 GARBAGE_VALUE = 1e6
-"""No joint measurement in SI units is this large; a misread double nearly always is, or is tiny."""
 
 DENORMAL = 1e-300
-ABSURD_STAMP = 1e19
-"""Nanoseconds since 1970 stay below this for some centuries."""
+ABSURD_STAMP = 1e19  #: Nanoseconds since 1970 stay below this for some centuries.
 
 
 def without_leading_garbage(raw: RawLog) -> RawLog:
@@ -204,8 +187,8 @@ def last_jump(raw: RawLog, rows: int) -> int:
     return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
 
 
+#: What a column of a signal is that is none of a joint.
 COLUMN = {"wrench": "axis", "jacobian": "cell"}
-"""What a column of a signal is that is none of a joint."""
 
 
 def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
@@ -245,17 +228,12 @@ class RestartError(ClockError):
         super().__init__(message)
 
 
+#: A stretch between two restarts of the clock that is shorter is not a recording of its own.
 SEGMENT_ROWS = 20
-"""A stretch between two restarts of the clock that is shorter is not a recording of its own."""
 
 
 def refuse_backward_steps(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError that names the first sample whose stamp lies before the one before.
-
-    Raises:
-        RestartError: If the clock starts anew, so that the file holds several recordings.
-        ClockError: If it runs backwards in any other way.
-    """
+    """Raise a ClockError that names the first sample whose stamp lies before the one before."""
     backward = np.diff(raw.stamps) < 0
     if not backward.any():
         return
@@ -279,12 +257,7 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
 
 
 def refuse_standing_clock(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError if the clock does not run, or as the clock of no robot's log can.
-
-    Raises:
-        ClockError: If all stamps are one, lie nearer or farther apart than any robot's, or begin
-            farther from zero than nanoseconds can be counted.
-    """
+    """Raise a ClockError if the clock does not run, or as the clock of no robot's log can."""
     t, start = seconds(raw), float(raw.stamps[0]) * raw.tick + raw.origin
     rows, span, steps = len(t), float(t[-1]), np.diff(t)
     if not abs(start) <= FARTHEST_START:
@@ -309,11 +282,7 @@ def refuse_standing_clock(raw: RawLog, path: Path) -> None:
 
 
 def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
-    """One of several recordings in a file, counted from 1; the clock's restarts part them.
-
-    Raises:
-        ClockError: If there is no such recording.
-    """
+    """One of several recordings in a file, counted from 1; the clock's restarts part them."""
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
     if not 1 <= number < len(edges):
         raise ClockError(f"{path}: there is no segment {number}; the file holds {len(edges) - 1}.")
@@ -329,11 +298,7 @@ def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
 
 
 def without_repeats(raw: RawLog, path: Path) -> RawLog:
-    """Drop rows whose stamp repeats the one before, and say so.
-
-    Raises:
-        ClockError: If most rows do and are samples of their own.
-    """
+    """Drop rows whose stamp repeats the one before, and say so."""
     fresh = np.concatenate([[True], np.diff(raw.stamps) > 0])
     again = np.flatnonzero(~fresh)
     if again.size == 0:
@@ -373,8 +338,8 @@ def told_gaps(gaps: Array) -> tuple[Remark, ...]:
     return (remark,)
 
 
+#: Share of samples below which positions of another size are errors, and not of another unit.
 BAD_SHARE = 0.05
-"""Share of samples below which positions of another size are errors, and not of another unit."""
 
 
 def refuse_degrees(raw: RawLog, path: Path) -> None:

@@ -17,38 +17,24 @@ from vftcli.readers.reader import LogFile, ReadChoice, Reader, open_log
 from vftcli.readers.reading import read_chosen, recognise
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 
-TRUTH = ".truth.parquet"
-"""Ending of what a simulation writes beside its log."""
-
-BATCH = "batch.json"
-"""The file by which a folder of `vftcli batch` is known."""
-
+TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
+BATCH = "batch.json"  #: The file by which a folder of `vftcli batch` is known.
+#: The file that lists what a command of ours wrote beside it; beside other files its ending.
 RECORD = "run.json"
-"""The file that lists what a command of ours wrote beside it; beside other files its ending."""
-
-METADATA = "metadata.yaml"
-"""The file that lists the pieces of a bag of ROS 2."""
+METADATA = "metadata.yaml"  #: The file that lists the pieces of a bag of ROS 2.
 
 NUMBER = re.compile(rb"(?:^|[\s,;])[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?(?=$|[\s,;])")
+#: A file of JSON beside logs that is smaller is read to see whether it is one. [B]
 DESCRIPTION = 1 << 20
-"""A file of JSON beside logs that is smaller is read to see whether it is one. [B]"""
-
-FEWEST = 3
-"""Numbers in a row: time, a position, an effort."""
+FEWEST = 3  #: Numbers in a row: time, a position, an effort.
 
 
 class LogEntry(NamedTuple):
-    """One log of a collection.
+    """One log of a collection."""
 
-    Attributes:
-        path: Its file or folder, from the root.
-        episode: Its episode, of a file or folder that holds several.
-        files: The files that it is read from.
-    """
-
-    path: Path
-    episode: int | None = None
-    files: tuple[Path, ...] = ()
+    path: Path  #: Its file or folder, from the root.
+    episode: int | None = None  #: Its episode, of a file or folder that holds several.
+    files: tuple[Path, ...] = ()  #: The files that it is read from.
 
 
 class LogCollection:
@@ -56,10 +42,6 @@ class LogCollection:
 
     A file is a log, whatever it holds. A folder is searched: what no reader knows is left out, and
     what our own commands wrote. A file or data set of several episodes is a log an episode.
-
-    Args:
-        choice: How the logs are read.
-        leave: A folder that is not searched, where the command writes.
 
     Attributes:
         passed: Files of folders that were left out.

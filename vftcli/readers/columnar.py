@@ -37,19 +37,12 @@ def guarded(path: Path, errors: tuple[type[BaseException], ...]) -> Iterator[Non
 
 
 class HeldColumns(NamedTuple):
-    """What a table says that it holds.
+    """What a table says that it holds."""
 
-    Attributes:
-        names: Of its columns.
-        lists: Whether each is a column of lists.
-        rows: Their number.
-        told: What `vftcli convert` wrote beside the columns, as JSON; "{}" for nothing.
-    """
-
-    names: tuple[str, ...]
-    lists: tuple[bool, ...]
-    rows: int
-    told: bytes | str
+    names: tuple[str, ...]  #: Of its columns.
+    lists: tuple[bool, ...]  #: Whether each is a column of lists.
+    rows: int  #: Their number.
+    told: bytes | str  #: What `vftcli convert` wrote beside the columns, as JSON; "{}" for nothing.
 
 
 class ColumnarTable(ABC):
@@ -87,11 +80,7 @@ class ColumnarTable(ABC):
 
     @abstractmethod
     def _numbers(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Decode columns, of the rows that are kept; whole stamps stay whole.
-
-        Raises:
-            LogError: If one holds no numbers or its lists differ in length.
-        """
+        """Decode columns, of the rows that are kept; whole stamps stay whole."""
 
     def _guarded(self) -> AbstractContextManager[None]:
         """Turn the errors of its decoder into a LogError that names the file."""
@@ -123,22 +112,14 @@ class ColumnarTable(ABC):
         return len(value) if value is not None else 0
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Decode some columns.
-
-        Raises:
-            LogError: If a column holds no numbers or its lists differ in length.
-        """
+        """Decode some columns."""
         self._names_of(columns)
         self._check_size(columns)
         with self._guarded():
             return self._numbers(sorted(columns), clock)
 
     def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
-        """The names of some columns, each of one column only.
-
-        Raises:
-            LogError: If one is the name of two.
-        """
+        """The names of some columns, each of one column only."""
         names = self._held.names
         # Decoders hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
@@ -150,9 +131,6 @@ class ColumnarTable(ABC):
 
         The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
         whole process.
-
-        Raises:
-            LogError: If they hold more numbers than a log of this size can.
         """
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
         width = sum(self.lists.get(column, 1) for column in columns)
@@ -178,11 +156,7 @@ class ColumnarTable(ABC):
 
 
 def read_columns(table: ColumnarTable, request: ReadChoice) -> RawLog:
-    """Read a table: ours, a user's, or a file of a LeRobot dataset, of which one episode is read.
-
-    Raises:
-        LogError: If the columns cannot be told, or there is no such episode.
-    """
+    """Read a table: ours, a user's, or one episode of a LeRobot file."""
     part, numbers = "", table.episodes()
     remarks: tuple[Remark, ...] = ()
     if numbers.size or request.episode is not None:

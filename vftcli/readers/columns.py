@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from vftcli.signals.errors import LogError
 
+#: Name in --columns → field of Recording. `t` is the clock and `_` skips.
 SIGNALS: dict[str, str] = {
     "q": "q",
     "dq": "dq",
@@ -19,10 +20,10 @@ SIGNALS: dict[str, str] = {
     "wrench": "wrench",
     "temperature": "temperature",
 }
-"""Name in --columns → field of Recording. `t` is the clock and `_` skips."""
 
 DEGREE = 0.017453292519943295
 
+#: Kind of signal → unit in brackets → factor to SI.
 UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "q": {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "rev": 360 * DEGREE},
@@ -33,8 +34,7 @@ UNITS: dict[str, dict[str, float]] = {
     "tau": {"Nm": 1.0, "N·m": 1.0, "mNm": 1e-3, "Ncm": 1e-2},
     "temperature": {"C": 1.0, "°C": 1.0, "degC": 1.0},
 }  # fmt: skip
-"""Kind of signal → unit in brackets → factor to SI."""
-
+#: Signals that share another signal's units.
 KINDS = {
     "target_q": "q",
     "target_dq": "dq",
@@ -43,7 +43,6 @@ KINDS = {
     "target_torque": "tau",
     "tau_ext": "tau",
 }
-"""Signals that share another signal's units."""
 
 ITEM = re.compile(
     r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
@@ -53,23 +52,15 @@ ITEM = re.compile(
 
 @dataclass(frozen=True, kw_only=True)
 class Item:
-    """One item of a --columns text.
+    """One item of a --columns text."""
 
-    Attributes:
-        signal: A key of SIGNALS, `t`, or `_`.
-        factor: What a value is multiplied with to be in SI units and in our sign.
-        unit: The unit as written, or None.
-        count: Columns in a row that it covers, in a headerless table.
-        pattern: The column names it means, in a headed table; None for those found without it.
-        rate: Sampling rate of a table that has no clock. [Hz]
-    """
-
-    signal: str
-    factor: float = 1.0
-    unit: str | None = None
-    count: int = 1
+    signal: str  #: A key of SIGNALS, `t`, or `_`.
+    factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
+    unit: str | None = None  #: The unit as written, or None.
+    count: int = 1  #: Columns in a row that it covers, in a headerless table.
+    #: The column names it means, in a headed table; None for those found without it.
     pattern: str | None = None
-    rate: float | None = None
+    rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,11 +85,7 @@ class ColumnSpec:
 
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
-    """Parse a --columns text, of a log unless it is of a reference, which has no positions.
-
-    Raises:
-        LogError: If an item cannot be understood; the message shows the item and the grammar.
-    """
+    """Parse a --columns text, of a log unless it is of a reference, which has no positions."""
     if not _split(text):
         raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
     parts, segment = _without_segment(_split(text))
@@ -183,11 +170,7 @@ def _rate(part: str, name: str, text: str | None) -> float | None:
 
 
 def unit_factor(signal: str, unit: str | None) -> float:
-    """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead.
-
-    Raises:
-        LogError: If the signal has no such unit.
-    """
+    """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
     units = UNITS[KINDS.get(signal, signal)]

@@ -20,10 +20,8 @@ from vftcli.signals.remarks import Remark, fact
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
-BLOCK_BYTES = 1 << 22
-"""Text that is parsed at a time, of a long table."""
-COMPARED_ROWS = 20
-"""Rows before the last that tell whether its last number is whole."""
+BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time, of a long table.
+COMPARED_ROWS = 20  #: Rows before the last that tell whether its last number is whole.
 
 
 def is_comment(line: str) -> bool:
@@ -50,13 +48,9 @@ def split_cells(line: str, separator: str) -> list[str]:
 
 @dataclass
 class TextTable:
-    """A delimited text table; only the columns asked for are parsed, always as float64.
+    """A delimited text table; only the columns asked for are parsed, always as float64."""
 
-    Attributes:
-        file: The opened file.
-    """
-
-    file: LogFile
+    file: LogFile  #: The opened file.
     lists: Mapping[int, int] = field(default_factory=dict)
     _is_cut: bool = False
 
@@ -131,11 +125,7 @@ class TextTable:
         return len(self.cells(self.sample[0]))
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Parse some columns; a clock of long whole numbers or dates comes back as integers.
-
-        Raises:
-            LogError: If a row has too many cells or a cell holds no number.
-        """
+        """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
         import polars as pl
 
         kinds = self._kinds(columns, clock)
@@ -158,11 +148,7 @@ class TextTable:
         return len(self.file.content) * len(lines) // sum(len(line) + 1 for line in lines)
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Parse some columns as `load` does, some megabytes of text at a time.
-
-        Raises:
-            InOnePieceError: If something must be mended, or is no number.
-        """
+        """Parse some columns as `load` does, some megabytes of text at a time."""
         import polars as pl
 
         path, kinds = self.file.direct, self._kinds(columns, clock)
@@ -194,11 +180,7 @@ class TextTable:
         return kinds
 
     def words(self, column: int) -> tuple[str, ...]:
-        """The different texts that a column holds, in the order in which they come.
-
-        Raises:
-            LogError: If the table cannot be parsed.
-        """
+        """The different texts that a column holds, in the order in which they come."""
         import polars as pl
 
         for text in (self._text, self._mended):

@@ -13,11 +13,8 @@ from vftcli.signals.remarks import fact
 
 TRAJECTORY = "trajectory.h5"
 
-DEEPEST = 8
-"""Folders inside folders; the release has five: version, lab, success, date, episode."""
-
-MOST_LOOKED_AT = 2000
-"""Folders that are looked at to recognise a release."""
+DEEPEST = 8  #: Folders inside folders; the release has five: version, lab, success, date, episode.
+MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 
 
 def trajectories(folder: Path) -> Iterator[Path | None]:
@@ -39,11 +36,7 @@ def is_droid(file: LogFile) -> bool:
 
 
 def episodes_below(file: LogFile) -> list[Path]:
-    """The episodes of a folder, by name.
-
-    Raises:
-        LogError: If there is none.
-    """
+    """The episodes of a folder, by name."""
     found = [path for path in trajectories(file.path) if path is not None]
     if not found:
         raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
@@ -51,11 +44,7 @@ def episodes_below(file: LogFile) -> list[Path]:
 
 
 def read_release(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read one episode of a release.
-
-    Raises:
-        LogError: If there is no such episode, or it cannot be read.
-    """
+    """Read one episode of a release."""
     paths = episodes_below(file)
     number, part, remarks = episode_of(file.path, request, range(len(paths)))
     path = paths[number]

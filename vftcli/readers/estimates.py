@@ -10,15 +10,8 @@ PREFIX = "tau_ext/"
 def estimates_columns(path: Path, observer: str) -> str | None:
     """How to read an ``estimates.parquet`` with one observer's torque as its tau_ext.
 
-    Args:
-        path: Any log.
-        observer: Name of the observer whose columns are wanted.
-
     Returns:
         A description for ``--columns``, or None if the file is not one of ours.
-
-    Raises:
-        LogError: If it is, and holds no such observer; the message lists those it holds.
     """
     if not (held := stored_observers(path)):
         return None
@@ -50,11 +43,7 @@ def stored_observers(path: Path) -> list[str]:
 
 
 def refuse_estimates(path: Path) -> None:
-    """Raise where a log is needed and a file of our estimates is given.
-
-    Raises:
-        LogError: If it is one.
-    """
+    """Raise where a log is needed and a file of our estimates is given."""
     if stored_observers(path):
         raise LogError(
             f"{path} holds estimates, not what the drives measured; give the log. `vftcli "

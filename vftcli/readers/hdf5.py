@@ -19,8 +19,8 @@ from vftcli.signals.remarks import Remark
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 
+#: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
 MOST_OBJECTS, DEEPEST = 100_000, 32
-"""Groups and datasets that are looked at, and groups inside groups; a log has some hundred."""
 
 
 def is_hdf5(head: bytes) -> bool:
@@ -31,11 +31,7 @@ def is_hdf5(head: bytes) -> bool:
 
 @contextmanager
 def opened(file: LogFile) -> Iterator[Any]:
-    """The file as h5py opens it, its errors turned into one that names the file.
-
-    Raises:
-        LogError: If h5py is not installed, or the file is damaged.
-    """
+    """The file as h5py opens it, its errors turned into one that names the file."""
     h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
     try:
         with h5py.File(file.direct or BytesIO(file.content), "r") as content:
@@ -56,10 +52,9 @@ class Hdf5Table:
 
     Attributes:
         path: The file.
-        remarks: Nothing: whoever reads it knows what there is to say.
     """
 
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: Nothing: whoever reads it knows what there is to say.
 
     def __init__(self, path: Path, datasets: Mapping[str, Any]) -> None:
         self.path: Path | str = path
@@ -87,11 +82,7 @@ class Hdf5Table:
         return Hdf5Table(Path(self.path), {name: self._datasets[name] for name in also} | below)
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Read datasets as float64; whole stamps stay whole.
-
-        Raises:
-            LogError: If they differ in length, or claim too much.
-        """
+        """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
         names, datasets = list(self._datasets), list(self._datasets.values())
         if len({datasets[c].shape[0] for c in columns}) > 1:
@@ -100,12 +91,7 @@ class Hdf5Table:
         return {c: self._numbers(datasets[c], c == clock) for c in columns}
 
     def check_size(self, columns: Sequence[int]) -> None:
-        """Check that datasets may be read: a kilobyte may claim any size, and costs nothing.
-
-        Raises:
-            LogError: If they claim more numbers than what is stored of them can hold, or a chunk
-                unpacks to more.
-        """
+        """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
         names, datasets = list(self._datasets), list(self._datasets.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * stored)
@@ -125,11 +111,7 @@ class Hdf5Table:
 
 
 def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # noqa: ANN401 - h5py
-    """The datasets of numbers of an open file that have some rows.
-
-    Raises:
-        LogError: If there is none.
-    """
+    """The datasets of numbers of an open file that have some rows."""
     found = {name: d for name, d in datasets_of(path, content) if is_signal(d, fewest_rows)}
     if not found:
         raise LogError(f"{path}: an HDF5 file without datasets of numbers, so no log.")
@@ -137,11 +119,7 @@ def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # no
 
 
 def datasets_of(path: Path, content: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - h5py
-    """Every dataset of an open file by its path, links to elsewhere and second ways left out.
-
-    Raises:
-        LogError: If there are too many objects to be a log.
-    """
+    """Every dataset of an open file by its path, links to elsewhere and second ways left out."""
     h5py = needed("h5py", "an HDF5 file")
 
     seen: set[int] = set()

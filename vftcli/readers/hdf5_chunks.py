@@ -8,24 +8,13 @@ from typing import Any
 
 from vftcli.signals.errors import LogError
 
+#: Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders.
 DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
-"""Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders."""
-
-DEFLATE_RATIO = 1032
-"""The most that deflate unpacks a byte to (zlib, algorithm.txt)."""
+DEFLATE_RATIO = 1032  #: The most that deflate unpacks a byte to (zlib, algorithm.txt).
 
 
 def check_chunks(told: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 - h5py
-    """Check that no chunk unpacks to more than a log's may.
-
-    Args:
-        told: File and dataset, for messages.
-        dataset: The dataset.
-        limit: Bytes that all of it may unpack to.
-
-    Raises:
-        LogError: If one does, or is packed in a way whose size is not told beforehand.
-    """
+    """Check that no chunk unpacks to more than a log's may."""
     if dataset.chunks is None:
         return
     size = dataset.dtype.itemsize
@@ -46,11 +35,7 @@ def check_chunks(told: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 -
 
 
 def inflate_suspects(told: str, dataset: Any, size: int, limit: int) -> None:  # noqa: ANN401
-    """Inflate chunks that could unpack to more than `limit`, no further than to their `size`.
-
-    Raises:
-        LogError: If one holds more.
-    """
+    """Inflate chunks that could unpack to more than `limit`, no further than to their `size`."""
     suspects: list[tuple[int, ...]] = []
 
     def look(chunk: Any) -> None:  # noqa: ANN401 - h5py

@@ -21,46 +21,29 @@ from vftcli.readers.tables import ArrayTable, described, from_table, states_posi
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact
 
-ALOHA_RATE = 50.0
-"""ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]"""
-
-ALOHA_WIDTH, ALOHA_ARM = 14, 7
-"""Two arms of six joints, a gripper behind each."""
-
-ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"
-"""ALOHA's positions and efforts."""
-
-FASTEST = 1e6
-"""Highest rate that is believed. [Hz]"""
+ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
+ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
+ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
+FASTEST = 1e6  #: Highest rate that is believed. [Hz]
 
 DROID_STATE = "observation/robot_state/"
 DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
+#: What DROID measures, gravity included, and what its controller commands, without gravity.
 DROID_TORQUE, DROID_COMPUTED = "motor_torques_measured", "joint_torques_computed"
-"""What DROID measures, gravity included, and what its controller commands, without gravity."""
-
+#: robosuite's name of a robot in lower case → profile.
 ROBOSUITE = {"panda": "panda", "ur5e": "ur5e"}
-"""robosuite's name of a robot in lower case → profile."""
-
+#: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
 FRANKA = ("panda", "fr3")
-"""Profiles that the serial number of a robot starts with, as in panda-295341-1325480."""
-
-TOLD_LIMIT = 1 << 20
-"""Letters of a description beside the numbers that are parsed."""
+TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
 
 
 class Layout(NamedTuple):
-    """How a project lays its episodes out.
+    """How a project lays its episodes out."""
 
-    Attributes:
-        name: The project.
-        anchor: Path of the positions, below the group of an episode.
-        beside: Further paths that make it this layout.
-        read: Reads one episode of an open file: its table, the file's attributes, the request.
-    """
-
-    name: str
-    anchor: str
-    beside: tuple[str, ...]
+    name: str  #: The project.
+    anchor: str  #: Path of the positions, below the group of an episode.
+    beside: tuple[str, ...]  #: Further paths that make it this layout.
+    #: Reads one episode of an open file: its table, the file's attributes, the request.
     read: Callable[[Hdf5Table, Any, ReadChoice], RawLog]
 
     def groups(self, names: Sequence[str]) -> tuple[str, ...]:
@@ -164,11 +147,7 @@ def robot_of(folder: Path) -> str | None:
 
 
 def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
-    """Any other file: by --columns, or by alias among the datasets of one group.
-
-    Raises:
-        UnknownFormatError: If two layouts fit and --columns does not say which positions are meant.
-    """
+    """Any other file: by --columns, or by alias among the datasets of one group."""
     refuse_arm(table.path, request)
     if states_positions(request):
         return from_table(table, request)
@@ -184,11 +163,7 @@ def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: 
 
 
 def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
-    """The beginning that the names of one group share, the one with positions; "" for the top.
-
-    Raises:
-        LogError: If several groups have positions.
-    """
+    """The beginning that the names of one group share, the one with positions; "" for the top."""
     levels: dict[str, str] = {}
     for name in names:
         prefix, found, last = name.rpartition(separator)
@@ -202,13 +177,13 @@ def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
     return "" if "" in levels or not levels else next(iter(levels))
 
 
+#: The layouts that are known.
 LAYOUTS = (
     Layout("ALOHA", ALOHA, (), read_aloha),
     Layout("robomimic", "obs/robot0_joint_pos", (), read_robomimic),
     Layout("roboset", "qp_arm", ("qv_arm", "time"), read_roboset),
     Layout("DROID", f"{DROID_STATE}joint_positions", (), read_droid),
 )
-"""The layouts that are known."""
 
 ANY = Layout("HDF5", "", (), read_any)
 
@@ -228,11 +203,7 @@ def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
 
 
 def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read an HDF5 log, or one episode of it.
-
-    Raises:
-        LogError: If h5py is not installed, the file is damaged, or it has no such episode or arm.
-    """
+    """Read an HDF5 log, or one episode of it."""
     with opened(file) as content:
         table = table_of(file.path, content)
         layout, groups = layout_of(table)
@@ -253,15 +224,7 @@ def episodes_in(file: LogFile) -> tuple[int, ...]:
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
-    """The group, as "observations/", in which each episode of an HDF5 file has its positions.
-
-    Args:
-        file: The file.
-        columns: A --columns text, which goes before what their names say, or None.
-
-    Raises:
-        LogError: If several groups have positions.
-    """
+    """The group, as "observations/", in which each episode of an HDF5 file has its positions."""
     stated = parse_columns(columns).item("q") if columns is not None else None
     with opened(file) as content:
         table = table_of(file.path, content)

@@ -9,44 +9,30 @@ from vftcli.readers.picking import tick_of
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import median_step
 
-ROWS = 20_000
-"""Rows that are looked at; of more, the first."""
-FITTED = 2000
-"""Rows, of these, by which a drive constant is told."""
-JOINTS = range(3, 13)
-"""Numbers of joints that a table may be of."""
+ROWS = 20_000  #: Rows that are looked at; of more, the first.
+FITTED = 2000  #: Rows, of these, by which a drive constant is told.
+JOINTS = range(3, 13)  #: Numbers of joints that a table may be of.
+#: Rows over which a velocity's integral is compared with the change of a position.
 STEPS = (1, 4, 16, 64)
-"""Rows over which a velocity's integral is compared with the change of a position."""
-OPEN = 0.35
-"""Share of a position's change that its own velocity may leave; another's leaves 1."""
-STILL = 0.02
-"""Travel below which a joint need not show which velocity is its own. [rad]"""
-EVEN = 20.0
-"""How much longer than the median a twentieth of a clock's steps are at most."""
+OPEN = 0.35  #: Share of a position's change that its own velocity may leave; another's leaves 1.
+STILL = 0.02  #: Travel below which a joint need not show which velocity is its own. [rad]
+EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps are at most.
+#: Misfit of a current to a torque divided by its drive constant, friction left free.
+#:
+#: Of a UR10e's target current .02 to .09, of its measured current .06 to .6.
 DRIVEN = 0.12
-"""Misfit of a current to a torque divided by its drive constant, friction left free.
-
-Of a UR10e's target current .02 to .09, of its measured current .06 to .6.
-"""
-CLEAR = 1.3
-"""How much better than another current it must fit."""
-CONSTANTS = (3.0, 400.0)
-"""Drive constants of geared joints. [N·m/A]"""
+CLEAR = 1.3  #: How much better than another current it must fit.
+CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]
+#: Slope and cosine between a target and what was measured, of the joint where they are nearest.
 ALIKE, NEAR = (0.5, 2.0), 0.9
-"""Slope and cosine between a target and what was measured, of the joint where they are nearest."""
 
 
 class Guess(NamedTuple):
-    """What the values of a table say.
+    """What the values of a table say."""
 
-    Attributes:
-        columns: The text for --columns.
-        why: What was found, in words.
-        others: Further texts that fit as well; empty where the values settle it.
-    """
-
-    columns: str
-    why: str
+    columns: str  #: The text for --columns.
+    why: str  #: What was found, in words.
+    #: Further texts that fit as well; empty where the values settle it.
     others: tuple[str, ...] = ()
 
 
@@ -88,8 +74,8 @@ def guessed(columns: Sequence[Array]) -> Guess | None:
     return Guess(texts[0], even + why, tuple(texts[1:]) or (texts[0],))
 
 
+#: What the numbers behind the velocities may be, the likeliest first.
 SINGLE = ("tau", "current", "tau+g")
-"""What the numbers behind the velocities may be, the likeliest first."""
 
 
 def worded(names: Sequence[str], joints: int) -> str:

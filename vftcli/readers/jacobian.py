@@ -15,50 +15,26 @@ from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark
 
-UNIT = 1e-3
-"""How far from 1 the axis of a joint may be in the Jacobian."""
+UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.
 
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianLog:
-    """What such a log holds; the Jacobian's axes and point are the log's own.
+    """What such a log holds; the Jacobian's axes and point are the log's own."""
 
-    Attributes:
-        name: What it is called in tables.
-        path: The file.
-        sha256: Digest of its bytes.
-        t: Time since its first sample. (T,) [s]
-        tau_ext: The vendor's estimate of the torque on the robot. (T, n) [N·m]
-        jacobian: Rows of velocity, then of angular velocity. (T, 6, n)
-        wrench: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
-        remarks: What reading dropped or turned.
-    """
-
-    name: str
-    path: Path
-    sha256: str
-    t: Array
-    tau_ext: Array
-    jacobian: Array
-    wrench: Array | None
-    remarks: tuple[Remark, ...] = ()
+    name: str  #: What it is called in tables.
+    path: Path  #: The file.
+    sha256: str  #: Digest of its bytes.
+    t: Array  #: Time since its first sample. (T,) [s]
+    tau_ext: Array  #: The vendor's estimate of the torque on the robot. (T, n) [N·m]
+    jacobian: Array  #: Rows of velocity, then of angular velocity. (T, 6, n)
+    wrench: Array | None  #: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
+    remarks: tuple[Remark, ...] = ()  #: What reading dropped or turned.
 
 
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
 def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
-    """Read the log in which positions were looked for in vain.
-
-    Args:
-        path: The file.
-        found: What the search ended with: the table and the signals that it has.
-        choice: The interval that is wanted.
-        name: What to call it.
-
-    Raises:
-        LogError: If it lacks a signal, a value is none that was measured, or its Jacobian is none
-            of an arm of six joints or more.
-        ClockError: If its clock is none of a robot's log, or no sample is in the interval.
-    """
+    """Read the log in which positions were looked for in vain."""
     table, digest = found.table, Digest((path,))
     digest.start()
     signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
@@ -91,11 +67,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
 
 
 def jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
-    """The cells of jacobian_R_C row by row, and the number of joints.
-
-    Raises:
-        LogError: If it has not six rows, fewer columns, or a hole.
-    """
+    """The cells of jacobian_R_C row by row, and the number of joints."""
     names = found.table.names or ()
     places = {
         (int(match[2]), int(match[3])): Cell(column)
@@ -112,11 +84,7 @@ def jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
 
 
 def velocity_first(jacobian: Array, path: Path) -> Array:
-    """The Jacobian with its rows of velocity first: the axes of revolute joints have length 1.
-
-    Raises:
-        LogError: If neither half of its rows are axes.
-    """
+    """The Jacobian with its rows of velocity first: the axes of revolute joints have length 1."""
     for J in (jacobian, np.roll(jacobian, 3, axis=1)):
         if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
             return J

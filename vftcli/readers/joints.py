@@ -11,6 +11,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import fact
 
+#: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical.
 UR_NAMES = (
     "shoulder_pan_joint",
     "shoulder_lift_joint",
@@ -19,16 +20,13 @@ UR_NAMES = (
     "wrist_2_joint",
     "wrist_3_joint",
 )
-"""The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical."""
-
+#: The names on UR's teach pendant, base to tip.
 UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
-"""The names on UR's teach pendant, base to tip."""
 
 FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
 NUMBERED = re.compile(r".*?joint[_ ]?(\d{1,9})", re.IGNORECASE)
 
-HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}
-"""Stem of Franka's joint names → profile."""
+HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}  #: Stem of Franka's joint names → profile.
 
 
 def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
@@ -67,16 +65,7 @@ def effort_of(names: Sequence[str]) -> str:
 
 
 def laid_along(raw: RawLog, names: Sequence[str], request: ReadChoice) -> RawLog:
-    """A log of JointState messages with its joints base to tip, its effort by their names.
-
-    Args:
-        raw: The log; what was found as effort is its torque.
-        names: The joints' names in the order of its columns.
-        request: What --columns names one by one keeps its order, and an effort it names its kind.
-
-    Raises:
-        LogError: If there are not as many names as columns.
-    """
+    """A log of JointState messages with its joints base to tip, its effort by their names."""
     stated = parse_columns(request.columns).items if request.columns is not None else ()
     if any("|" in (item.pattern or "") for item in stated):
         return raw

@@ -20,27 +20,18 @@ from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
 
+#: Bytes of objects that a document may be parsed into; one a line may be of any length.
 MEMORY_LIMIT = 768 * 1024 * 1024
-"""Bytes of objects that a document may be parsed into; one a line may be of any length."""
-
+#: Letter → bytes of the object that it begins, at most.
 COSTS = {b"[": 64, b"{": 72, b",": 40, b":": 110}
-"""Letter → bytes of the object that it begins, at most."""
-
-LONGEST_LINE = 1 << 20
-"""Letters of one sample."""
-
-CHUNK_LINES = 8192
-"""Lines whose objects are in memory at a time."""
+LONGEST_LINE = 1 << 20  #: Letters of one sample.
+CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
 
 Objects = list[dict[str, Any]]
 
 
 def read_json(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a JSON log, of whichever of the shapes.
-
-    Raises:
-        LogError: If it is not JSON, too large for it, or holds no arrays of numbers.
-    """
+    """Read a JSON log, of whichever of the shapes."""
     if is_lines(file):
         episode_of(file.path, request, (0,))
         return read_arrays(file, *columns_of_lines(file), request)
@@ -70,11 +61,7 @@ def is_lines(file: LogFile) -> bool:
 
 
 def columns_of_lines(file: LogFile) -> tuple[dict[str, Column], tuple[Remark, ...]]:
-    """The fields of the objects, one a line, and what is to be said of the last one.
-
-    Raises:
-        LogError: If a line holds no object, or lacks a field of the first.
-    """
+    """The fields of the objects, one a line, and what is to be said of the last one."""
     blocks: list[dict[str, Column]] = []
     objects: Objects = []
     waiting: int | None = None
@@ -134,16 +121,7 @@ def object_in(line: bytes) -> dict[str, Any] | None:
 
 
 def columns_of(file: LogFile, objects: Objects, first: int) -> dict[str, Column]:
-    """The numeric fields of some objects, a row an object.
-
-    Args:
-        file: The file, for messages.
-        objects: The objects.
-        first: Number of the first, for messages.
-
-    Raises:
-        LogError: If one lacks a field of the first, or has it in another length.
-    """
+    """The numeric fields of some objects, a row an object."""
     columns: dict[str, Column] = {}
     for name, value in objects[0].items():
         if not is_numeric(value):
@@ -168,11 +146,7 @@ def is_numeric(value: Any) -> bool:  # noqa: ANN401 - of JSON
 
 
 def parsed(file: LogFile) -> Any:  # noqa: ANN401 - of JSON
-    """The one value of a file: an object or a list.
-
-    Raises:
-        LogError: If it is none, is nested too deeply, or would fill memory.
-    """
+    """The one value of a file: an object or a list."""
     content = bytes(file.content)
     if sum(cost * content.count(letter) for letter, cost in COSTS.items()) > MEMORY_LIMIT:
         raise LogError(

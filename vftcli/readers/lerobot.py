@@ -22,41 +22,33 @@ from vftcli.readers.tables import described, states_positions
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
-TOLD_LIMIT = 64 * 1024 * 1024
-"""Bytes of a description beside the data that are parsed."""
+TOLD_LIMIT = 64 * 1024 * 1024  #: Bytes of a description beside the data that are parsed.
 
 FRAME = "frame_index"
 
+#: How far the stamps, 32-bit floats, may lie from frame / fps for that to be taken. [s]
 CLOCK_SLACK = 1e-3
-"""How far the stamps, 32-bit floats, may lie from frame / fps for that to be taken. [s]"""
-
+#: What an element's name says it measures.
 STEMS = {
     "pos": "q", "position": "q", "positions": "q", "vel": "dq", "velocity": "dq",
     "velocities": "dq", "effort": "torque", "efforts": "torque", "torque": "torque",
     "torques": "torque", "current": "current", "currents": "current",
 }  # fmt: skip
-"""What an element's name says it measures."""
-
-NAMED = re.compile(rf"(?P<joint>.+)[._/](?P<stem>{'|'.join(STEMS)})")
-"""joint_1.pos"""
-
+NAMED = re.compile(rf"(?P<joint>.+)[._/](?P<stem>{'|'.join(STEMS)})")  #: joint_1.pos
+#: joint_positions.1
 COUNTED = re.compile(
     rf"(?P<joint>.*?joint)[_.](?P<stem>{'|'.join(STEMS)})[_.](?P<number>\d{{1,4}})"
 )
-"""joint_positions.1"""
 
 SIDE = re.compile(rf"(?:^|[._/ ])({'|'.join(ARMS)})(?:$|[._/ ])")
 NO_JOINT = re.compile(r"grip|finger", re.IGNORECASE)
+#: Names of elements that are a pose's.
 CARTESIAN = {
     "x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw",
 }  # fmt: skip
-"""Names of elements that are a pose's."""
-
-MEASURED = ("q", "dq", "torque", "current", "tau_ext")
-"""Signals that are looked for."""
-
+MEASURED = ("q", "dq", "torque", "current", "tau_ext")  #: Signals that are looked for.
+#: Values of robot_type that are a profile's name.
 ROBOTS = ("panda", "fr3", "ur5", "ur5e", "ur10e")
-"""Values of robot_type that are a profile's name."""
 
 EPISODES_TABLE = (
     EPISODE, "length", "dataset_from_index", "dataset_to_index", "data/chunk_index",
@@ -65,43 +57,27 @@ EPISODES_TABLE = (
 
 
 class Episode(NamedTuple):
-    """Where an episode is.
+    """Where an episode is."""
 
-    Attributes:
-        number: Its index.
-        length: Its frames, None where that is not told.
-        start: Index of its first frame in the dataset, None where that is not told.
-        file: Its data file by the dataset's usual name, None where that is not told.
-    """
-
-    number: int
-    length: int | None = None
+    number: int  #: Its index.
+    length: int | None = None  #: Its frames, None where that is not told.
+    #: Index of its first frame in the dataset, None where that is not told.
     start: int | None = None
+    #: Its data file by the dataset's usual name, None where that is not told.
     file: Path | None = None
 
 
 class Element(NamedTuple):
-    """One number of an observation: which signal of which joint.
+    """One number of an observation: which signal of which joint."""
 
-    Attributes:
-        column: Its name for --columns.
-        signal: Field of Recording.
-        joint: The joint's name, "" where the dataset gives none.
-        side: left, right, or "" for neither.
-    """
-
-    column: str
-    signal: str
-    joint: str
-    side: str
+    column: str  #: Its name for --columns.
+    signal: str  #: Field of Recording.
+    joint: str  #: The joint's name, "" where the dataset gives none.
+    side: str  #: left, right, or "" for neither.
 
 
 def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read an episode of a dataset.
-
-    Raises:
-        LogError: If it has no such episode, its tables contradict one another, or it has no joints.
-    """
+    """Read an episode of a dataset."""
     info = info_of(file.path)
     episodes = episodes_told(file.path)
     number, part, remarks = episode_of(file.path, request, [e.number for e in episodes])
@@ -132,9 +108,6 @@ def columns_of(
 
     Returns:
         The --columns text, the joints' names or none, the arm of two or "", what is to be said.
-
-    Raises:
-        LogError: If there are no joints, an arm has to be chosen, or signals name other joints.
     """
     there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
@@ -175,11 +148,7 @@ def wrenches_left(table: ColumnarTable, features: Mapping[str, Any]) -> tuple[Re
 def in_order(
     path: Path, signal: str, elements: list[Element], names: tuple[str, ...]
 ) -> list[Element]:
-    """A signal's elements in the order of the joints, as they stand where they have no names.
-
-    Raises:
-        LogError: If they are of other joints.
-    """
+    """A signal's elements in the order of the joints, as they stand where they have no names."""
     by_joint = {element.joint: element for element in elements}
     if not names or "" in by_joint:
         return elements
@@ -236,11 +205,7 @@ def by_frames(raw: RawLog, table: ColumnarTable, fps: Any) -> RawLog:  # noqa: A
 
 
 def info_of(folder: Path) -> dict[str, Any]:
-    """meta/info.json.
-
-    Raises:
-        LogError: If it cannot be read.
-    """
+    """meta/info.json."""
     path = folder / "meta" / "info.json"
     try:
         info = json.loads(text_of(path))
@@ -250,11 +215,7 @@ def info_of(folder: Path) -> dict[str, Any]:
 
 
 def text_of(path: Path) -> str:
-    """The text of a description beside the data.
-
-    Raises:
-        LogError: If it is too large to be one, or no text.
-    """
+    """The text of a description beside the data."""
     if path.stat().st_size > TOLD_LIMIT:
         raise LogError(f"{path}: larger than {TOLD_LIMIT >> 20} MiB; no description is.")
     try:
@@ -271,11 +232,7 @@ def features_of(info: dict[str, Any]) -> dict[str, Any]:
 
 
 def episodes_told(folder: Path) -> list[Episode]:
-    """The episodes of a dataset, rising.
-
-    Raises:
-        LogError: If its table of episodes cannot be read, or it has none and no data either.
-    """
+    """The episodes of a dataset, rising."""
     tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
     lines = folder / "meta" / "episodes.jsonl"
     if there := tables or ([lines] if lines.is_file() else []):
@@ -335,11 +292,7 @@ def episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
 
 
 def data_file(folder: Path, episode: Episode) -> Path:
-    """The data file of an episode: where the table says, by its name, or the one that holds it.
-
-    Raises:
-        LogError: If there is none.
-    """
+    """The data file of an episode: where the table says, by its name, or the one that holds it."""
     if episode.file is not None and episode.file.is_file():
         return episode.file
     files = sorted((folder / "data").rglob("*.parquet"))
@@ -351,11 +304,7 @@ def data_file(folder: Path, episode: Episode) -> Path:
 
 
 def rows_of(file: LogFile, episode: Episode) -> ColumnarTable:
-    """The rows of an episode in its data file, checked against the table of episodes.
-
-    Raises:
-        LogError: If the two differ.
-    """
+    """The rows of an episode in its data file, checked against the table of episodes."""
     table = parquet_table(file)
     numbers = table.episodes()
     if not numbers.size:

@@ -20,14 +20,14 @@ from vftcli.signals.wrench import FRANKA_FRAME
 JOINTS = 7
 CLOCK = "robot clock (milliseconds since start)"
 
+#: Groups of seven columns that follow `duration, success rate` in the old header, in this order.
+#:
+#: The names q_d and dq_d come twice (the state's first, then the command's), so position decides.
 OLD_GROUPS = ("q", "q_d", "dq", "dq_d", "tau_J", "tau_ext_hat_filtered")
-"""Groups of seven columns that follow `duration, success rate` in the old header, in this order.
-
-The names q_d and dq_d come twice (the state's first, then the command's), so position decides.
-"""
 
 WRENCH = "O_F_ext_hat_K"
 
+#: libfranka's name → field of Recording.
 FIELDS = {
     "q": "q",
     "q_d": "target_q",
@@ -37,7 +37,6 @@ FIELDS = {
     "tau_ext_hat_filtered": "tau_ext",
     WRENCH: "wrench",
 }
-"""libfranka's name → field of Recording."""
 
 Cells = tuple[Cell, ...]
 
@@ -117,19 +116,13 @@ def read_array_fields(
     return read_fields(table, fields, time, request, **more)
 
 
+#: Non-finite numbers as C++ streams print them.
 NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
-"""Non-finite numbers as C++ streams print them."""
-
-MAX_LINE = 64 * 1024
-"""A robot state takes 1.7 kB; a line longer than this is no robot state."""
+MAX_LINE = 64 * 1024  #: A robot state takes 1.7 kB; a line longer than this is no robot state.
 
 
 def read_states(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read robot states printed one a line.
-
-    Raises:
-        LogError: If a line is no robot state, or no line is.
-    """
+    """Read robot states printed one a line."""
     states, skipped, cut = [], 0, False
     lines = bytes(file.content).replace(b"\r", b"\n").split(b"\n")
     numbered = [(k, line) for k, line in enumerate(lines, start=1) if line.strip()]
@@ -170,11 +163,7 @@ def state_in(line: bytes) -> dict[str, Any] | None:
 def field_of(
     file: LogFile, states: list[dict[str, Any]], name: str, shape: tuple[int, ...]
 ) -> Column:
-    """One field of all states. (T, *shape)
-
-    Raises:
-        LogError: If a state lacks it, or has it in another shape.
-    """
+    """One field of all states. (T, *shape)"""
     try:
         column = np.array([state[name] for state in states], dtype=np.float64)
     except (KeyError, ValueError, TypeError, OverflowError):

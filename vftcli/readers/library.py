@@ -13,12 +13,7 @@ from vftcli.signals.recording import Recording
 
 
 class Library:
-    """Reads the logs of one command; a log that two options name is read once.
-
-    Args:
-        paths: The logs the command was given. A log that is read without having been named here
-            gets a label that differs from theirs.
-    """
+    """Reads the logs of one command; a log that two options name is read once."""
 
     def __init__(self, paths: Iterable[str | Path] = ()) -> None:
         self._labels = labelled(absolute(path) for path in paths)
@@ -29,11 +24,7 @@ class Library:
         return len(self._labels)
 
     def open(self, path: str | Path, choice: ReadChoice | None = None) -> Recording:
-        """Read a log as it is chosen, unless that has been done, and take the part of it that is.
-
-        Raises:
-            VftError: As `vftcli.readers.read` does, or if the interval holds no samples.
-        """
+        """Read a log once, and return the part of it that is chosen."""
         from vftcli.readers.reading import read_chosen
 
         choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
@@ -45,16 +36,7 @@ class Library:
     def open_each(
         self, paths: Iterable[str | Path], choice: ReadChoice, *, whole: bool = False
     ) -> Iterator[Recording]:
-        """Read some logs, each episode as a log of its own where all are chosen.
-
-        Args:
-            paths: The logs.
-            choice: How they are read.
-            whole: Whether all episodes of a dataset are meant where none is chosen.
-
-        Raises:
-            LogError: If all episodes are chosen, of a log that has none.
-        """
+        """Read some logs, each episode as a log of its own where all are chosen."""
         from vftcli.readers.reading import episode_numbers, holds_episodes
 
         for path in paths:
@@ -72,11 +54,7 @@ class Library:
         return self._labels.setdefault(at, labelled([at, *self._labels])[at])
 
     def open_logs(self, paths: Iterable[str | Path], choice: ReadChoice) -> tuple[Recording, ...]:
-        """Read the logs of a command.
-
-        Raises:
-            ParameterError: If two of them are the same run.
-        """
+        """Read the logs of a command."""
         logs = tuple(self.open_each(paths, choice))
         refuse_repeated_logs(logs)
         return logs

@@ -31,11 +31,9 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.recording import LongLog, Recording
 from vftcli.signals.timing import TimingCount
 
+#: Samples of a stretch that is drawn, and stretches at least; at most twice as many.
 STRETCH_ROWS, STRETCHES = 1 << 11, 8
-"""Samples of a stretch that is drawn, and stretches at least; at most twice as many."""
-
-Rows = dict[str, Array]
-"""Clean samples: "t" and the signals, by their names."""
+Rows = dict[str, Array]  #: Clean samples: "t" and the signals, by their names.
 
 
 def long_recording(
@@ -46,20 +44,7 @@ def long_recording(
     sha256: Callable[[], str],
     label: str = "",
 ) -> Recording:
-    """A recording of stretches of a long log, with the log behind it.
-
-    Args:
-        raw: The log's first block, with the others behind it.
-        read: Reads that again.
-        path: The file.
-        format_name: Its format.
-        sha256: Gives its digest.
-        label: What it is called.
-
-    Raises:
-        InOnePieceError: If it has to be read in one piece.
-        LogError: If its positions can only be degrees.
-    """
+    """A recording of stretches of a long log, with the log behind it."""
     count, draw, cleaner = TimingCount(), Drawer(), Cleaner()
     for rows in cleaner.rows(raw):
         count.add(rows["t"])
@@ -112,15 +97,13 @@ class Cleaner:
     """Cleans a log as `vftcli.readers.cleaning.cleaned` does, block by block.
 
     Attributes:
-        first: The first block, what is no sample of it left out.
-        last: The last one, as it was read.
         read: Rows so far.
         repeats: Rows that were dropped because their stamp repeated the one before.
         different: Those of them with other values.
     """
 
-    first: RawLog
-    last: RawLog
+    first: RawLog  #: The first block, what is no sample of it left out.
+    last: RawLog  #: The last one, as it was read.
 
     def __init__(self) -> None:
         self.read = self.repeats = self.different = 0
@@ -128,14 +111,7 @@ class Cleaner:
         self._low, self._high = np.empty(0), np.empty(0)
 
     def rows(self, raw: RawLog) -> Iterator[Rows]:
-        """The clean samples of a log.
-
-        Args:
-            raw: Its first block, the others behind it.
-
-        Raises:
-            InOnePieceError: If something in it is odd.
-        """
+        """The clean samples of a log."""
         for block in chain([raw], raw.rest or ()):
             self.last = block
             self.read += len(block.stamps)
@@ -189,12 +165,7 @@ class Cleaner:
         return np.asarray(fresh)
 
     def finish(self, path: Path) -> None:
-        """Judge what only the whole log tells.
-
-        Raises:
-            InOnePieceError: If most rows repeat a stamp.
-            LogError: If its positions can only be degrees.
-        """
+        """Judge what only the whole log tells."""
         if 2 * self.different > self.read:
             raise InOnePieceError
         if self.first.degrees_possible:

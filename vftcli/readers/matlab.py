@@ -20,25 +20,17 @@ from vftcli.signals.remarks import fact
 
 V5, V73 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
 
-HEADER, TAG = 128, 8
-"""Bytes before the first variable, and of the tag before each."""
-
-COMPRESSED = 15
-"""Type of a variable that is packed."""
-
+HEADER, TAG = 128, 8  #: Bytes before the first variable, and of the tag before each.
+COMPRESSED = 15  #: Type of a variable that is packed.
+#: MATLAB's classes that may be signals, or hold them.
 NUMBERS = {
     "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",
     "logical", "struct",
 }  # fmt: skip
-"""MATLAB's classes that may be signals, or hold them."""
 
 
 def read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a .mat file; signals of joints × samples are turned, and said.
-
-    Raises:
-        LogError: If it is damaged, unpacks beyond the limit, or holds no positions.
-    """
+    """Read a .mat file; signals of joints × samples are turned, and said."""
     variables = variables_of_v73(file) if file.head.startswith(V73) else variables_of_v5(file)
     if not variables:
         raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")
@@ -75,11 +67,7 @@ def upright(variables: Mapping[str, Column]) -> tuple[dict[str, Column], list[st
 
 
 def variables_of_v73(file: LogFile) -> dict[str, Column]:
-    """The variables of numbers of a file of version 7.3, as MATLAB shows them.
-
-    Raises:
-        LogError: If h5py is not installed, or the file is damaged or claims too much.
-    """
+    """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
         kept = [k for k, name in enumerate(table.names or ()) if not name.startswith("#")]
@@ -93,11 +81,7 @@ def variables_of_v73(file: LogFile) -> dict[str, Column]:
 
 
 def variables_of_v5(file: LogFile) -> dict[str, Column]:
-    """The variables of numbers of a file of version 5, and those of its structs as struct.name.
-
-    Raises:
-        LogError: If the file is damaged, or unpacks to more than a log of its size can hold.
-    """
+    """The variables of numbers of a file of version 5, and those of its structs as struct.name."""
     check_size(file)
     from scipy.io import loadmat, whosmat
 
@@ -138,11 +122,7 @@ def flat(variables: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Colu
 
 
 def check_size(file: LogFile) -> None:
-    """Check what the packed variables of a file unpack to, before any is kept.
-
-    Raises:
-        LogError: If that is more than a log of its size can hold, or the file is cut.
-    """
+    """Check what the packed variables of a file unpack to, before any is kept."""
     content, place, total = file.content, HEADER, 0
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
     limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(content))

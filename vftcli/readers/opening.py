@@ -11,34 +11,28 @@ from typing import Literal
 
 from vftcli.signals.errors import LogError
 
-HEAD_BYTES = 64 * 1024
-"""Bytes that recognition looks at."""
+HEAD_BYTES = 64 * 1024  #: Bytes that recognition looks at.
 
 Wrapping = Literal["gzip", "zstd"]
 
 MAGICS: dict[bytes, Wrapping] = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd"}
 
 UNPACKED_LIMIT = 128 * 1024 * 1024
+#: A wrapped file may unpack to 128 MiB or to fifty times its size, whichever is more.
+#:
+#: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
 UNPACKED_RATIO = 50
-"""A wrapped file may unpack to 128 MiB or to fifty times its size, whichever is more.
 
-Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
-"""
-
+#: A log of no more rows is read in one piece: there is memory for all that is done with it.
 WHOLE_ROWS = 100_000
-"""A log of no more rows is read in one piece: there is memory for all that is done with it."""
 
 CHUNK = 1024 * 1024
+#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time.
 ZSTD_BYTES = 1024
-"""zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time."""
 
 
 def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
-    """Return the first bytes of a file's content, unwrapped, and what it was wrapped in.
-
-    Raises:
-        LogError: If the file does not exist, cannot be opened, or is empty.
-    """
+    """Return the first bytes of a file's content, unwrapped, and what it was wrapped in."""
     if not path.exists():
         raise LogError(f"{path}: no such file or folder. Check the path.")
     if not path.is_file():
@@ -73,9 +67,6 @@ def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:
 
     Returns:
         The content, and whether a wrapped file ends before its packed data does.
-
-    Raises:
-        LogError: If it is damaged, or unpacks beyond the limit.
     """
     if wrapping is not None:
         unpacker = Unpacker(path, wrapping)
@@ -101,11 +92,7 @@ class Unpacker:
         self.ended = False
 
     def pieces(self) -> Iterator[bytes]:
-        """The content, piece by piece.
-
-        Raises:
-            LogError: If the packed data is damaged, or unpacks beyond the limit.
-        """
+        """The content, piece by piece."""
         total = 0
         for piece in self._gunzipped() if self.wrapping == "gzip" else self._unzstd():
             total += len(piece)

@@ -13,8 +13,8 @@ from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import installed, needed
 
+#: Rows that are decoded at a time of a long table, and bytes of a column that are read for them.
 BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
-"""Rows that are decoded at a time of a long table, and bytes of a column that are read for them."""
 
 
 def parquet_table(file: LogFile) -> ColumnarTable:
@@ -49,12 +49,7 @@ class PyarrowParquet(PyarrowTable):
         return self._held.rows
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Decode some columns as `load` does, some thousand rows at a time.
-
-        Raises:
-            InOnePieceError: If rows of one episode stand among others.
-            LogError: As `load` raises it.
-        """
+        """Decode some columns as `load` does, some thousand rows at a time."""
         pa = needed("pyarrow", "a Parquet file")
         pq = needed("pyarrow.parquet", "a Parquet file")
 

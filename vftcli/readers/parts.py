@@ -13,16 +13,8 @@ def episode_of(
 ) -> tuple[int, str, tuple[Remark, ...]]:
     """The episode that is read of those a file holds: the one asked for, else the first, and said.
 
-    Args:
-        path: The file or folder, for messages.
-        request: What is asked for.
-        numbers: The episodes' numbers, rising; not empty.
-
     Returns:
         Its number, its name as a part ("" for the only one), and what is to be said of it.
-
-    Raises:
-        LogError: If there is no such episode.
     """
     number, count = request.episode, len(numbers)
     if number is not None and number not in numbers:
@@ -39,17 +31,7 @@ def episode_of(
 def arm_of(
     path: Path | str, request: ReadChoice, arms: Sequence[str], told: str = ""
 ) -> tuple[str, tuple[Remark, ...]]:
-    """The arm that is read of a log of two: the one asked for; to look at, the first, and said.
-
-    Args:
-        path: The file or folder, for messages.
-        request: What is asked for.
-        arms: The arms that the log has, members of `reader.ARMS`.
-        told: Where each is found in the file, for messages.
-
-    Raises:
-        LogError: If it lacks the arm, or none is chosen.
-    """
+    """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
     if request.arm is not None and request.arm not in arms:
         raise LogError(f"{path}: holds the {arms[0]} arm alone; leave --arm out.")
     if request.arm is not None or len(arms) == 1:
@@ -64,10 +46,6 @@ def arm_of(
 
 
 def refuse_arm(path: Path | str, request: ReadChoice) -> None:
-    """Refuse ``--arm`` for a log of one arm.
-
-    Raises:
-        LogError: If it is given.
-    """
+    """Refuse ``--arm`` for a log of one arm."""
     if request.arm is not None:
         raise LogError(f"{path}: a log of one arm; leave --arm out.")

@@ -23,18 +23,7 @@ def picked(
     clock_name: str = "",
     **more: Any,  # noqa: ANN401
 ) -> RawLog:
-    """Load the picked columns of a table and scale them.
-
-    Args:
-        table: The table.
-        picks: What to load.
-        request: Signals nobody asked for are left unread.
-        clock_name: Which clock the stamps are from, in words.
-        more: Further fields of the RawLog.
-
-    Raises:
-        LogError: If the table has no clock, or no positions.
-    """
+    """Load the picked columns of a table and scale them."""
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells[0] if picks.clock else None
     last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
@@ -128,11 +117,7 @@ def _stamps(
 
 
 def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], before: int = 0) -> Column:
-    """The stamps of loaded rows, of which so many came before in the table. (T,)
-
-    Raises:
-        LogError: If there is no clock, or one whose sign is turned.
-    """
+    """The stamps of loaded rows, of which so many came before in the table. (T,)"""
     if picks.clock is None:
         if picks.rate is None:
             raise LogError(
@@ -156,11 +141,7 @@ def rate_words(rate: float) -> str:
 
 
 def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
-    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]
-
-    Raises:
-        LogError: If they are no such pair: seconds with a fraction, or a second too many.
-    """
+    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]"""
     whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
     if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
         raise LogError(

@@ -14,13 +14,12 @@ from vftcli.readers.arrays_file import episodes_of_skills, read_dictionary
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.signals.errors import LogError
 
+#: Numbers that a pickle of any size may build; a larger one as many as it has bytes.
 BUILT_LIMIT = 1 << 20
-"""Numbers that a pickle of any size may build; a larger one as many as it has bytes."""
 
 TOO_MUCH = "more numbers than a file of its size can hold"
 
-DEPTH = 32
-"""Lists inside lists: a log has four, an array of states four or five."""
+DEPTH = 32  #: Lists inside lists: a log has four, an array of states four or five.
 
 
 class Refused(pickle.UnpicklingError):
@@ -31,11 +30,7 @@ class Marker:
     """Stands for the class ndarray, which a pickle names but may not call."""
 
     def __new__(cls, *_: object, **__: object) -> "Marker":
-        """Refuse to be called.
-
-        Raises:
-            Refused: Always.
-        """
+        """Refuse to be called."""
         raise Refused("an array of its own making")
 
 
@@ -83,12 +78,7 @@ class PickledArray:
         self.fill(content, kind, shape, "F" if fortran else "C")
 
     def fill(self, content: Any, kind: Any, shape: Any, order: str) -> None:  # noqa: ANN401
-        """Lay the array over some bytes.
-
-        Raises:
-            Refused: If what is given is not of the kinds that NumPy pickles.
-            ValueError: If the bytes do not fill the shape.
-        """
+        """Lay the array over some bytes."""
         if not isinstance(kind, PickledType) or not isinstance(content, bytes | bytearray):
             raise Refused("an array of objects")
         if kind.dtype is not None:
@@ -96,11 +86,8 @@ class PickledArray:
             self.array = numbers.reshape(shape, order="F" if order == "F" else "C")
 
 
-Built = tuple[Any, int]
-"""What was built of a part of a pickle, and how many numbers it holds."""
-
-NOTHING = np.empty(0, dtype="V1")
-"""What stands for an array that holds no numbers."""
+Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many numbers it holds.
+NOTHING = np.empty(0, dtype="V1")  #: What stands for an array that holds no numbers.
 
 
 def _from_buffer(buffer: Any, kind: Any, shape: Any, order: Any = "C") -> PickledArray:  # noqa: ANN401
@@ -117,6 +104,7 @@ def _scalar(kind: Any, content: Any = None) -> Any:  # noqa: ANN401
     return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
 
 
+#: All that a pickle may call, by the names NumPy has pickled it under, each replaced by ours.
 ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
     ("numpy", "ndarray"): Marker,
     ("numpy", "dtype"): PickledType,
@@ -130,7 +118,6 @@ ALLOWED: dict[tuple[str, str], Callable[..., Any] | type] = {
         )
     },
 }
-"""All that a pickle may call, by the names NumPy has pickled it under, each replaced by ours."""
 
 
 class ArrayUnpickler(pickle.Unpickler):
@@ -145,11 +132,7 @@ class ArrayUnpickler(pickle.Unpickler):
         self._left = max(BUILT_LIMIT, len(content))
 
     def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401
-        """Return what a name may stand for.
-
-        Raises:
-            Refused: If the name is not one of the few that arrays are made of.
-        """
+        """Return what a name may stand for."""
         if (module, name) == ("_codecs", "encode"):
             return self._encoded
         if (module, name) == ("collections", "OrderedDict"):
@@ -172,21 +155,13 @@ class ArrayUnpickler(pickle.Unpickler):
         return dict(items)
 
     def _claim(self, size: int) -> None:
-        """Count what is about to be built.
-
-        Raises:
-            Refused: If it is more than a pickle of this size holds.
-        """
+        """Count what is about to be built."""
         self._left -= size
         if self._left < 0:
             raise Refused(TOO_MUCH)
 
     def built(self, value: Any) -> Any:  # noqa: ANN401 - whatever the pickle holds
-        """What was loaded, with arrays for pickled arrays, once its size is known to be bounded.
-
-        Raises:
-            Refused: If it holds more numbers than a pickle of this size, or itself.
-        """
+        """What was loaded, with arrays for pickled arrays, once its size is known to be bounded."""
         built, size = self._settled(value, {}, 0)
         self._claim(size)
         return built
@@ -219,16 +194,12 @@ class ArrayUnpickler(pickle.Unpickler):
         return built
 
 
+#: Larger pickles are refused: they have to be held in memory twice.
 PICKLE_LIMIT = 512 * 1024 * 1024
-"""Larger pickles are refused: they have to be held in memory twice."""
 
 
 def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickle holds
-    """Load a pickle that holds only arrays, numbers, strings, lists and dictionaries.
-
-    Raises:
-        LogError: If it asks for anything else, is damaged, or is larger than its file can fill.
-    """
+    """Load a pickle that holds only arrays, numbers, strings, lists and dictionaries."""
     content = bytes(file.content)
     if len(content) > PICKLE_LIMIT:
         raise LogError(f"{file.path}: a pickle of {len(content) >> 20} MiB. Save it with np.savez.")
@@ -267,11 +238,7 @@ def _check_opcodes(content: bytes) -> None:
 
 
 def read_pickle(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read a pickled dictionary of arrays: panda-py's get_log() or frankapy's trajectory.
-
-    Raises:
-        LogError: If it holds anything but arrays, or no positions and times.
-    """
+    """Read a pickled dictionary of arrays: panda-py's get_log() or frankapy's trajectory."""
     log = load_arrays_only(file)
     if not isinstance(log, dict):
         raise LogError(

@@ -23,20 +23,14 @@ from vftcli.signals.wrench import WrenchFrame
 
 @dataclass(frozen=True, kw_only=True)
 class LogFile:
-    """A file or folder as the readers see it: its first bytes already unwrapped.
+    """A file or folder as the readers see it: its first bytes already unwrapped."""
 
-    Attributes:
-        path: The file or folder.
-        head: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
-        entries: Names in the folder, sorted; empty for a file.
-        wrapping: What the file is compressed with as a whole, or None.
-        ahead: Its table that is being parsed already, or None.
-    """
-
-    path: Path
+    path: Path  #: The file or folder.
+    #: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
     head: bytes = b""
-    entries: tuple[str, ...] = ()
-    wrapping: Wrapping | None = None
+    entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
+    wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
+    #: Its table that is being parsed already, or None.
     ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     @property
@@ -60,11 +54,7 @@ class LogFile:
 
     @property
     def content(self) -> memoryview:
-        """The whole content, unwrapped; the pages of a plain file are read when they are touched.
-
-        Raises:
-            LogError: If a compressed file is damaged or unpacks to an unreasonable size.
-        """
+        """The whole content, unwrapped; a plain file is mapped, not read."""
         return self._unwrapped[0]
 
     def release(self) -> None:
@@ -102,51 +92,35 @@ class LogFile:
 
 @dataclass(frozen=True, kw_only=True)
 class RawLog:
-    """What a reader found, in SI units, before the clock is cleaned.
+    """What a reader found, in SI units, before the clock is cleaned."""
 
-    Attributes:
-        stamps: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
-        tick: Length of one tick. [s]
-        origin: What has to be added to the stamps to be on the log's own clock. [s]
-        clock: Which clock the stamps are from, in words.
-        segment: Which of several recordings in the file is wanted, from 1; None for all.
-        signals: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
-        first_row: Number in the file of the first sample, counted from 1, for messages.
-        wrench_frame: What the log states of its wrench.
-        joint_names: The joints' names, base to tip, or empty.
-        robot_hint: Name of the profile that the log itself settles, or None.
-        degrees_possible: Whether nothing says that the positions are in radians.
-        remarks: What the reader dropped, turned or derived, and what looks suspicious.
-        constants: Last values of the columns with the payload: its mass, its centre of mass.
-        payload_mass: Mass the controller was told of. [kg]
-        payload_com: Its centre of mass in flange axes. (3,) [m]
-        part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
-        files: The files of a folder that it was read from; () for all.
-        rest: What follows in the file, block by block, where this is the first of several; None
-            where it is all.
-        rows: Which rows of the file these are, counted from 0; None for all. (T,)
-        unknown: Rows of the file that were left out because a value is no number.
-    """
-
-    stamps: Array
-    tick: float = 1.0
-    origin: float = 0.0
-    clock: str
+    stamps: Array  #: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
+    tick: float = 1.0  #: Length of one tick. [s]
+    origin: float = 0.0  #: What has to be added to the stamps to be on the log's own clock. [s]
+    clock: str  #: Which clock the stamps are from, in words.
+    #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
-    signals: Mapping[str, Array]
-    first_row: int = 1
-    wrench_frame: WrenchFrame | None = None
-    joint_names: tuple[str, ...] = ()
-    robot_hint: str | None = None
-    degrees_possible: bool = False
+    signals: Mapping[str, Array]  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+    first_row: int = 1  #: Number in the file of the first sample, counted from 1, for messages.
+    wrench_frame: WrenchFrame | None = None  #: What the log states of its wrench.
+    joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
+    robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.
+    degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
+    #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: tuple[Remark, ...] = ()
+    #: Last values of the columns with the payload: its mass, its centre of mass.
     constants: tuple[float, ...] = ()
-    payload_mass: float | None = None
-    payload_com: tuple[float, ...] | None = None
+    payload_mass: float | None = None  #: Mass the controller was told of. [kg]
+    payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
+    #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     part: str = ""
-    files: tuple[Path, ...] = ()
+    files: tuple[Path, ...] = ()  #: The files of a folder that it was read from; () for all.
+    #: What follows in the file, block by block, where this is the first of several; None where it
+    #: is all.
     rest: "Iterator[RawLog] | None" = None
+    #: Which rows of the file these are, counted from 0; None for all. (T,)
     rows: Indices | None = None
+    #: Rows of the file that were left out because a value is no number.
     unknown: Indices | None = None
 
     def told_payload(self, constants: tuple[float, ...]) -> Self:
@@ -165,60 +139,49 @@ class InOnePieceError(Exception):
     """A log that was to come in blocks has to be read whole: only that tells what is odd."""
 
 
-ARMS = ("left", "right")
-"""Values of ``--arm``."""
-
+ARMS = ("left", "right")  #: Values of ``--arm``.
+#: Value of ``--effort`` → field of Recording; None where the robot's model has to decide.
 EFFORT = {
     "auto": None,
     "current": "current",
     "torque": "torque",
     "torque-without-gravity": "torque_without_gravity",
 }
-"""Value of ``--effort`` → field of Recording; None where the robot's model has to decide."""
-
+#: Values of ``--derive``: the signal that is derived where the log lacks it, or none.
 DERIVE = ("dq", "none")
-"""Values of ``--derive``: the signal that is derived where the log lacks it, or none."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReadChoice:
     """How a log is read, and which part of it is used.
 
-    Attributes:
-        format: Name of a format in `vftcli.readers.READERS`, None to recognise it by its content.
-        columns: The text of ``--columns``, or None.
-        signals: The signals that are wanted; None for all. Others may be left unread.
-        interval: The span that is used, from the first sample, None for all of it. [s]
-        effort: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the
-            robot; None to take what it is called.
-        derive: "dq" to derive the velocities even where the log has some, "none" never to; None to
-            do so where it has none and is fast enough.
-        episode: Number of the episode of a file that holds several, None to leave it to the reader.
-        all_episodes: Whether each episode is wanted, as a log of its own.
-        arm: Which arm of a log of two, a member of `ARMS`; None for the only one.
-        examining: Whether the log is only looked at, where a part and a word say more than a
-            refusal.
-        blocks: Whether a long log may come in blocks, where its format allows it.
-        skips_unknown: Whether rows with a value that is no number are left out and said, not
-            refused.
-        ahead: A log that is being parsed already, or None.
-
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
+    #: Name of a format in `vftcli.readers.READERS`, None to recognise it by its content.
     format: str | None = None
-    columns: str | None = None
+    columns: str | None = None  #: The text of ``--columns``, or None.
+    #: The signals that are wanted; None for all. Others may be left unread.
     signals: frozenset[str] | None = None
+    #: The span that is used, from the first sample, None for all of it. [s]
     interval: tuple[float, float] | None = None
+    #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the robot; None
+    #: to take what it is called.
     effort: str | None = None
+    #: "dq" to derive the velocities even where the log has some, "none" never to; None to do so
+    #: where it has none and is fast enough.
     derive: str | None = None
+    #: Number of the episode of a file that holds several, None to leave it to the reader.
     episode: int | None = None
-    all_episodes: bool = False
-    arm: str | None = None
+    all_episodes: bool = False  #: Whether each episode is wanted, as a log of its own.
+    arm: str | None = None  #: Which arm of a log of two, a member of `ARMS`; None for the only one.
+    #: Whether the log is only looked at, where a part and a word say more than a refusal.
     examining: bool = False
-    blocks: bool = False
+    blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
+    #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
+    #: A log that is being parsed already, or None.
     ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -296,27 +259,18 @@ class ReadChoice:
 
 @dataclass(frozen=True, kw_only=True)
 class Reader:
-    """One log format.
+    """One log format."""
 
-    Attributes:
-        name: Name for ``--format``, and of its words in `formats.toml`.
-        recognises: Whether a file's content is of this format.
-        read: Reads it.
-        general: Whether it takes any table, and is asked only if no other format fits.
-        columns: Whether the columns may be described by ``--columns``.
-        describes: Whether it reads ``--columns`` itself where its files are text.
-        episodes: The numbers of a file's episodes, None for a format that holds one recording.
-        arms: Whether a log may be of two arms.
-    """
-
-    name: str
+    name: str  #: Name for ``--format``, and of its words in `formats.toml`.
+    #: Whether a file's content is of this format.
     recognises: Callable[[LogFile], bool] = field(repr=False)
-    read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)
-    general: bool = False
-    columns: bool = True
-    describes: bool = False
+    read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)  #: Reads it.
+    general: bool = False  #: Whether it takes any table, and is asked only if no other format fits.
+    columns: bool = True  #: Whether the columns may be described by ``--columns``.
+    describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
+    #: The numbers of a file's episodes, None for a format that holds one recording.
     episodes: Callable[[LogFile], Sequence[int]] | None = field(default=None, repr=False)
-    arms: bool = False
+    arms: bool = False  #: Whether a log may be of two arms.
 
     @property
     def words(self) -> Mapping[str, str]:

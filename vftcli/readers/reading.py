@@ -28,8 +28,8 @@ from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
 
+#: Signals that an estimate is made of, beside time and positions; others are only examined.
 COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
-"""Signals that an estimate is made of, beside time and positions; others are only examined."""
 
 
 def read(
@@ -64,11 +64,7 @@ def read(
 
 
 def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Recording:
-    """Read a log whole, as `read` does, in the way a choice says.
-
-    Raises:
-        VftError: As `read` does; also if all episodes are chosen, for this returns one.
-    """
+    """Read a log whole, as `read` does, in the way a choice says."""
     if not isinstance(path, str | Path):
         raise ParameterError(f"the log is {path!r}; expected the name of a file or folder")
     path = Path(path)
@@ -110,11 +106,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
-    """The numbers of the episodes that a file holds, rising.
-
-    Raises:
-        LogError: If it is of a format without episodes.
-    """
+    """The numbers of the episodes that a file holds, rising."""
     file = open_log(Path(path))
     reader = _reader(file, choice.format, choice.columns)
     if reader.episodes is None:
@@ -146,12 +138,7 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
 
 
 def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
-    """Return the reader that a path's content calls for, or that is chosen.
-
-    Raises:
-        UnknownFormatError: If no format fits, or more than one.
-        LogError: If there is nothing at the path, or it cannot be opened.
-    """
+    """Return the reader that a path's content calls for, or that is chosen."""
     choice = choice or ReadChoice()
     return _reader(open_log(Path(path)), choice.format, choice.columns)
 

@@ -21,33 +21,17 @@ TORQUE = "tau_ext"
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceTable:
-    """What a reference file holds.
+    """What a reference file holds."""
 
-    Attributes:
-        t: Its stamps, on the clock of the log it belongs to. (T,) [s]
-        tau: External torque on the robot, or None. (T, n) [N·m]
-        wrench: Force then moment on the robot, or None. (T, 6) [N, N·m]
-        wrench_frame: Frame of the wrench as the columns' description gave it, or None.
-    """
-
-    t: Array
-    tau: Array | None
-    wrench: Array | None
+    t: Array  #: Its stamps, on the clock of the log it belongs to. (T,) [s]
+    tau: Array | None  #: External torque on the robot, or None. (T, n) [N·m]
+    wrench: Array | None  #: Force then moment on the robot, or None. (T, 6) [N, N·m]
+    #: Frame of the wrench as the columns' description gave it, or None.
     wrench_frame: WrenchFrame | None
 
 
 def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
-    """Read a reference file: text, compressed text or Parquet.
-
-    Args:
-        path: The file.
-        columns: Its columns, in the grammar of ``--columns``; None to find ``t`` and the one group
-            of columns whose name ends in ``tau_ext``.
-
-    Raises:
-        LogError: If the file is no table, or its columns cannot be told.
-        ClockError: If its clock does not increase.
-    """
+    """Read a reference file: text, compressed text or Parquet."""
     file = open_log(path)
     table = opened(file)
     spec = parse_columns(columns, log=False) if columns else None
@@ -69,11 +53,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
 
 
 def opened(file: LogFile) -> Table:
-    """The file as a table.
-
-    Raises:
-        LogError: If it is none.
-    """
+    """The file as a table."""
     if file.head.startswith(b"PAR1"):
         return parquet_table(file)
     if not file.lines:
@@ -96,11 +76,7 @@ def as_given(table: Table, picks: Picks) -> Picks:
 
 
 def found(table: Table) -> Picks:
-    """Find the clock, the torques and the wrench by their names.
-
-    Raises:
-        LogError: If no group of columns, or more than one, can be the torques.
-    """
+    """Find the clock, the torques and the wrench by their names."""
     if table.names is None:
         raise LogError(
             f"{table.path}: a table without a header. Say what its {table.width} columns are with "

@@ -5,6 +5,7 @@ from importlib import import_module
 
 from vftcli.readers.reader import Reader
 
+#: Texts that begin as those of one program and no other: the others need not be looked at.
 TEXTS_OF_MAKERS = {
     "ur-csv": "rtde:OFFICIAL",
     "ur-binary": "rtde:BINARY",
@@ -16,8 +17,7 @@ TEXTS_OF_MAKERS = {
     "rostopic": "ros_text:ROSTOPIC",
     "ros2-echo": "ros_text:ROS2_ECHO",
 }
-"""Texts that begin as those of one program and no other: the others need not be looked at."""
-
+#: Format → the module of this room that reads it, and its `Reader` there: one format, one line.
 HOMES = {
     **TEXTS_OF_MAKERS,
     "table": "tables:HEADED",
@@ -37,7 +37,6 @@ HOMES = {
     "db3": "bags.formats:DB3",
     "mcap": "bags.formats:MCAP",
 }
-"""Format → the module of this room that reads it, and its `Reader` there: one format, one line."""
 
 
 class Registry(Mapping[str, Reader]):

@@ -11,11 +11,9 @@ from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
 
+#: How the header of a table by bagpy's message_by_topic begins.
 MESSAGE_START = ("Time", "header.seq", "header.stamp.secs", "header.stamp.nsecs")
-"""How the header of a table by bagpy's message_by_topic begins."""
-
-STAMP = 3
-"""Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id."""
+STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
 
 
 @dataclass
@@ -55,11 +53,7 @@ class EchoTable(TextTable):
 
 
 def joint_names(table: TextTable) -> tuple[str, ...]:
-    """The joints' names that the rows hold, in the order of the columns.
-
-    Raises:
-        LogError: If the rows name different joints.
-    """
+    """The joints' names that the rows hold, in the order of the columns."""
     names = table.names or ()
     columns = [k for k, name in enumerate(names) if name.removeprefix("field.")[:4] == "name"]
     found = [table.words(column) for column in columns]
@@ -76,11 +70,7 @@ def joint_names(table: TextTable) -> tuple[str, ...]:
 
 
 def listed_names(table: TextTable, text: str) -> tuple[str, ...]:
-    """The names of a list as Python prints it.
-
-    Raises:
-        LogError: If it is no list of names.
-    """
+    """The names of a list as Python prints it."""
     try:
         names = ast.literal_eval(text)
     except (ValueError, SyntaxError, RecursionError, MemoryError):

@@ -17,12 +17,10 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
 CLOCK_WORDS = "controller clock (timestamp, seconds since power-on)"
+#: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
-"""Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]"""
-
-E_SERIES_FIELD = "ft_raw_wrench_0"
-"""What only a controller with a sensor on the flange sends."""
-
+E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
+#: Type words of the second line of the official client's binary file.
 BINARY_TYPES = {
     b"DOUBLE": ">f8",
     b"UINT64": ">u8",
@@ -31,15 +29,10 @@ BINARY_TYPES = {
     b"UINT8": "u1",
     b"BOOL": "u1",
 }
-"""Type words of the second line of the official client's binary file."""
 
 
 def read_rtde(table: Table, request: ReadChoice) -> RawLog:
-    """Read a table of RTDE names: timestamp and positions are required, the rest is optional.
-
-    Raises:
-        LogError: If there is no timestamp or no actual_q.
-    """
+    """Read a table of RTDE names: timestamp and positions are required, the rest is optional."""
     names = table.names or ()
     if CLOCK not in names:
         raise LogError(
@@ -116,11 +109,7 @@ class BinaryTable:
 
 
 def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
-    """Names and types of the columns, and where the records begin.
-
-    Raises:
-        LogError: If there is not one known type a column.
-    """
+    """Names and types of the columns, and where the records begin."""
     first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
     second, end_too, _ = rest.partition(b"\n")
     names = tuple(first.decode("ascii", errors="replace").split())

@@ -1,8 +1,7 @@
 """The columns of UR's real-time data exchange by name, whatever file they come in."""
 
-CLOCK = "timestamp"
-"""The controller's clock. [s]"""
-
+CLOCK = "timestamp"  #: The controller's clock. [s]
+#: Field of Recording → RTDE's name; all have six elements, name_0 to name_5.
 JOINT_COLUMNS = {
     "q": "actual_q",
     "dq": "actual_qd",
@@ -15,7 +14,5 @@ JOINT_COLUMNS = {
     "temperature": "joint_temperatures",
     "wrench": "actual_TCP_force",
 }
-"""Field of Recording → RTDE's name; all have six elements, name_0 to name_5."""
-
+#: The payload that the controller was told of; its last value counts.
 PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
-"""The payload that the controller was told of; its last value counts."""

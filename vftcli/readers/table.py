@@ -14,11 +14,9 @@ from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
+#: A cell of a Jacobian among the columns: row, then column.
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
-"""A cell of a Jacobian among the columns: row, then column."""
-
-Column = NDArray[Any]
-"""One column as it is stored: (T,) numbers, or (T, k) for a column of lists."""
+Column = NDArray[Any]  #: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
 
 
 class Table(Protocol):
@@ -57,11 +55,7 @@ class LongTable(Table, Protocol):
         """About how many rows it has."""
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Load columns as `load` does, some thousand rows at a time.
-
-        Raises:
-            InOnePieceError: If only the whole table tells what a row is.
-        """
+        """Load columns as `load` does, some thousand rows at a time."""
 
 
 class Cell(NamedTuple):
@@ -74,23 +68,14 @@ class Cell(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Pick:
-    """The cells that make up one signal.
+    """The cells that make up one signal."""
 
-    Attributes:
-        signal: Field of Recording, or "t".
-        cells: One cell a joint, base to tip.
-        factor: Factor to SI units and to our sign.
-        unit: The unit if it was stated.
-        frame: Frame of a wrench if it was stated.
-        remark: What was turned, if anything was.
-    """
-
-    signal: str
-    cells: tuple[Cell, ...]
-    factor: float = 1.0
-    unit: str | None = None
-    frame: WrenchFrame | None = None
-    remark: Remark | None = None
+    signal: str  #: Field of Recording, or "t".
+    cells: tuple[Cell, ...]  #: One cell a joint, base to tip.
+    factor: float = 1.0  #: Factor to SI units and to our sign.
+    unit: str | None = None  #: The unit if it was stated.
+    frame: WrenchFrame | None = None  #: Frame of a wrench if it was stated.
+    remark: Remark | None = None  #: What was turned, if anything was.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,11 +104,7 @@ class JacobianError(LogError):
 def picks_of(
     table: Table, spec: ColumnSpec, check: Callable[[Table, Picks], Picks] | None = None
 ) -> Picks:
-    """Find the columns that a --columns text means; `check` replaces the check for a log's signals.
-
-    Raises:
-        LogError: If the table lacks a column that is named, or has another number of columns.
-    """
+    """The columns that a --columns text means; `check` replaces the check for signals."""
     if spec.named:
         if table.names is None:
             raise LogError(
@@ -255,12 +236,7 @@ def listed(names: Sequence[str], most: int = 24) -> str:
 
 
 def checked(table: Table, picks: Picks) -> Picks:
-    """Return the picks, or raise unless there are positions and all signals have their width.
-
-    Raises:
-        NoLogError: If q is missing.
-        LogError: If a signal has another number of columns than q.
-    """
+    """Return the picks, or raise unless there are positions and all signals have their width."""
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:
         there = listed(table.names) if table.names else f"{table.width} columns without names"

@@ -22,15 +22,12 @@ from vftcli.readers.table import Column, Table, missing_column, picks_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
+#: What NumPy raises for a header or content that is no array.
 NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
     RecursionError, tokenize.TokenError,
 )  # fmt: skip
-"""What NumPy raises for a header or content that is no array."""
-
-
-WIDEST = 200
-"""Columns beyond which a table without a header is not looked through."""
+WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
 def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
@@ -73,17 +70,7 @@ def states_positions(request: ReadChoice) -> bool:
 
 
 def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
-    """Read a table whose columns are known, but for what a --columns text says of them.
-
-    Args:
-        table: The table.
-        usual: What the columns are, as a --columns text by name.
-        request: What is wanted. A text with positions replaces the usual one but for its clock.
-        more: Further fields of the RawLog.
-
-    Raises:
-        LogError: If a column that is named is not there.
-    """
+    """Read a table whose columns are known, but for what a --columns text says of them."""
     known = parse_columns(usual)
     stated = parse_columns(request.columns) if request.columns is not None else None
     if stated is not None and stated.items and not stated.named:
@@ -102,11 +89,7 @@ def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> Raw
 
 
 def restated(table: Table, item: Item, usual: Item | None) -> Item:
-    """An item of a --columns text, its columns the usual ones where it names none.
-
-    Raises:
-        LogError: If it names none and there are none.
-    """
+    """An item of a --columns text, its columns the usual ones where it names none."""
     if item.pattern is not None or item.rate is not None:
         return item
     if usual is None:
@@ -117,11 +100,7 @@ def restated(table: Table, item: Item, usual: Item | None) -> Item:
 
 
 def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
-    """Read a table without a header whose values settle what its columns are, and say it.
-
-    Raises:
-        LogError: If they do not; with the lines that fit, where some do.
-    """
+    """Read a table without a header whose values settle what its columns are, and say it."""
     columns: dict[int, Column] = {}
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue
@@ -144,19 +123,12 @@ def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  #
 
 @dataclass
 class ArrayTable:
-    """A table whose columns are in memory already: arrays of numbers or of lists.
+    """A table whose columns are in memory already: arrays of numbers or of lists."""
 
-    Attributes:
-        path: What messages call it: the file, and in a bag the topic.
-        columns: Name → (T,) or (T, k).
-        headed: Whether the names are the file's own.
-        remarks: What had to be done to the arrays.
-    """
-
-    path: Path | str
-    columns: Mapping[str, Column]
-    headed: bool = True
-    remarks: tuple[Remark, ...] = ()
+    path: Path | str  #: What messages call it: the file, and in a bag the topic.
+    columns: Mapping[str, Column]  #: Name → (T,) or (T, k).
+    headed: bool = True  #: Whether the names are the file's own.
+    remarks: tuple[Remark, ...] = ()  #: What had to be done to the arrays.
     lists: Mapping[int, int] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -174,11 +146,7 @@ class ArrayTable:
         return len(self.columns)
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Return columns as float64; whole stamps stay whole.
-
-        Raises:
-            LogError: If a column holds no numbers, or the columns differ in length.
-        """
+        """Return columns as float64; whole stamps stay whole."""
         arrays = list(self.columns.values())
         names = list(self.columns)
         lengths = {len(arrays[c]) for c in columns}
@@ -195,11 +163,7 @@ class ArrayTable:
 
 
 def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any readable buffer
-    """One array of an .npy file, never executing what it may carry.
-
-    Raises:
-        LogError: If the array is cut, holds objects, or claims more data than there is.
-    """
+    """One array of an .npy file, never executing what it may carry."""
     try:
         array = np.lib.format.read_array(BytesIO(content), allow_pickle=False)
     except NOT_AN_ARRAY as error:

@@ -10,26 +10,22 @@ from vftcli.readers.opening import HEAD_BYTES
 from vftcli.readers.reader import LogFile
 from vftcli.signals.letters import printable
 
+#: How names of files end that may be logs; only to say so.
 LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag", ".mcap", ".db3",
         ".pkl", ".log", ".bin", ".json", ".jsonl", ".mat", ".hdf5", ".h5", ".feather",
         ".arrow")  # fmt: skip
-"""How names of files end that may be logs; only to say so."""
 
 SHOWN = 4
 
 
 class FileKind(NamedTuple):
-    """A kind of file that is no log.
+    """A kind of file that is no log."""
 
-    Attributes:
-        begins: How its content begins.
-        told: What it is, and what to do.
-    """
-
-    begins: re.Pattern[bytes]
-    told: str
+    begins: re.Pattern[bytes]  #: How its content begins.
+    told: str  #: What it is, and what to do.
 
 
+#: Kinds of files that users give by mistake, by their first bytes.
 KINDS = tuple(
     FileKind(re.compile(begins, re.DOTALL), told)
     for begins, told in (
@@ -66,15 +62,12 @@ KINDS = tuple(
         (rb"\xd0\xcf\x11\xe0", "an old Office document; save the sheet as CSV and give that"),
     )
 )
-"""Kinds of files that users give by mistake, by their first bytes."""
-
-
+#: File inside a zip archive → what the archive is.
 OFFICE = {
     b"xl/workbook": "an Excel workbook; save the sheet as CSV and give that",
     b"word/document": "a Word document; give the log it tells of",
     b"META-INF/manifest": "an OpenDocument; save the sheet as CSV and give that",
 }
-"""File inside a zip archive → what the archive is."""
 
 
 def description(file: LogFile) -> str:

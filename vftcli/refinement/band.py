@@ -29,10 +29,6 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     The band is how far the estimate may be off, as the log itself shows it: see
     `vftcli.observers.error_band`. A Kalman filter's own covariance knows neither model error nor
     lag: it is the filter's own account, and stands apart (`sd`).
-
-    Args:
-        found: The log's baseline, of the terms that the estimate was made from.
-        reading: The estimate, and what it reads where nothing touches the arm.
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     if spectra is None or not len(reading.samples):

@@ -22,39 +22,31 @@ from vftcli.signals.remarks import Remark, caution
 if TYPE_CHECKING:
     from vftcli.refinement.whole_log import WholeLogBias
 
-STANDS = 0.5
-"""A joint that stands in more than this share of the samples is limited by stiction."""
+STANDS = 0.5  #: A joint that stands in more than this share of the samples is limited by stiction.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """What a log shows of itself before any observer has run.
+    """What a log shows of itself before any observer has run."""
 
-    Attributes:
-        motion: The log and its free motion, without samples that stand alone.
-        part: Its free part, None where there is none.
-        spectra: Spectra of the raw disturbance, None where the free part is too short or not free.
-        standing: Where a joint stands still. (T, n)
-        missing: Why there is no free part, or are no spectra; None where there are both.
-        load: A load that the free part carries and the model lacks, None where none shows.
-        correction: The bias of the whole log, off the terms where its guards apply it; None where
-            none was fitted.
-        by_fit: Whether the free part is what the fit of that bias takes for free: no contact that
-            comes and goes, though a load that stays may be in it.
-        on_correction: What was applied of it and what was not, and what stands in for a free part.
-        best: The baseline that `best` runs on, None where it is this one.
-    """
-
-    motion: FreeMotion
-    part: FreePart | None = None
+    motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
+    part: FreePart | None = None  #: Its free part, None where there is none.
+    #: Spectra of the raw disturbance, None where the free part is too short or not free.
     spectra: Spectra | None = None
-    standing: Mask
+    standing: Mask  #: Where a joint stands still. (T, n)
+    #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
+    #: A load that the free part carries and the model lacks, None where none shows.
     load: FreeLoad | None = None
+    #: The bias of the whole log, off the terms where its guards apply it; None where none was
+    #: fitted.
     correction: "WholeLogBias | None" = None
+    #: Whether the free part is what the fit of that bias takes for free: no contact that comes and
+    #: goes, though a load that stays may be in it.
     by_fit: bool = False
+    #: What was applied of it and what was not, and what stands in for a free part.
     on_correction: tuple[Remark, ...] = ()
-    best: "Baseline | None" = None
+    best: "Baseline | None" = None  #: The baseline that `best` runs on, None where it is this one.
     _made: dict[ModelledRun, DynamicsTerms] = field(
         init=False, repr=False, compare=False, default_factory=dict
     )
@@ -89,11 +81,7 @@ class Baseline:
         return self.terms_of(self.motion.log)
 
     def shown(self, *, gains: bool) -> LogSpectra:
-        """What it shows to the observers that are built for the log.
-
-        Args:
-            gains: Whether they are to have the gains that its spectra call for.
-        """
+        """What it shows to the observers that are built for the log."""
         plain = self.tunable
         called_for = gains_of(plain) if gains and plain is not None else None
         return LogSpectra(plain=plain, best=self.under(BEST).tunable, gains=called_for)
@@ -155,11 +143,7 @@ class Baseline:
 
 
 def baseline_of(motion: FreeMotion) -> Baseline:
-    """Find the free part of a log and its spectra, or say why there are none.
-
-    Raises:
-        ParameterError: If a span that is given as free holds no samples of the log, or all.
-    """
+    """Find the free part of a log and its spectra, or say why there are none."""
     log = motion.log
     stands = standing(log.recording.t, log.recording.require("dq"))
     bare = Baseline(motion=motion, standing=stands)
@@ -180,20 +164,14 @@ def baseline_of(motion: FreeMotion) -> Baseline:
 
 
 class FreeReading(NamedTuple):
-    """What one observer reads of a log, and where nothing touches the arm.
+    """What one observer reads of a log, and where nothing touches the arm."""
 
-    Attributes:
-        observer: The observer.
-        estimate: Its estimate of the log.
-        samples: What it reads in the free samples, of all pieces in a row, less a load that the
-            free part carries. (S, n) [N·m]
-        resting: Whether a joint rests in them. (S, n)
-    """
-
-    observer: Observer
-    estimate: ExternalTorque
+    observer: Observer  #: The observer.
+    estimate: ExternalTorque  #: Its estimate of the log.
+    #: What it reads in the free samples, of all pieces in a row, less a load that the free part
+    #: carries. (S, n) [N·m]
     samples: Array
-    resting: Mask
+    resting: Mask  #: Whether a joint rests in them. (S, n)
 
     @property
     def rms(self) -> Array:

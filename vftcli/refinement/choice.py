@@ -4,28 +4,22 @@ from dataclasses import dataclass
 
 from vftcli.signals.parsing import check_known
 
+#: The word for what the log allows: the whole log's bias for `best`, none for the others.
 AUTOMATIC = "auto"
-"""The word for what the log allows: the whole log's bias for `best`, none for the others."""
-
+#: The word for the bias that is fitted to the whole log and taken off before observers run.
 WHOLE_LOG = "whole-log"
-"""The word for the bias that is fitted to the whole log and taken off before observers run."""
-
-REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")
-"""What ``--remove-bias`` takes."""
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``--remove-bias`` takes.
 
 
 @dataclass(frozen=True, kw_only=True)
 class RefinementChoice:
     """What is done with the estimates once the whole log is known.
 
-    Attributes:
-        remove_bias: One of `REMOVALS`.
-
     Raises:
         ParameterError: If there is no such way to remove a bias.
     """
 
-    remove_bias: str = AUTOMATIC
+    remove_bias: str = AUTOMATIC  #: One of `REMOVALS`.
 
     def __post_init__(self) -> None:
         check_known(self.remove_bias, REMOVALS, f"--remove-bias {self.remove_bias!r}")

@@ -22,16 +22,7 @@ from vftcli.signals.remarks import caution, fact
 
 
 def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baseline:
-    """The baseline of a log, and beside it that of `best` where it is another.
-
-    Args:
-        motion: The log and its free motion.
-        choice: Which bias comes off.
-        best: Whether `best` is among the observers.
-
-    Raises:
-        ParameterError: If a span that is given as free holds no samples of the log, or all.
-    """
+    """The baseline of a log, and beside it that of `best` where it is another."""
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
     if not (choice.corrects_all or (best and choice.corrects_best)):

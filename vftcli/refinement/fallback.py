@@ -20,17 +20,11 @@ from vftcli.signals.shown import Shown
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SparedObserver(Shown):
-    """An observer with some of its joints left to another.
+    """An observer with some of its joints left to another."""
 
-    Attributes:
-        observer: Whose name it has.
-        spare: Who does those joints.
-        lost: Which they are. (n,)
-    """
-
-    observer: Observer
-    spare: Observer
-    lost: Mask
+    observer: Observer  #: Whose name it has.
+    spare: Observer  #: Who does those joints.
+    lost: Mask  #: Which they are. (n,)
 
     @property
     def name(self) -> str:
@@ -66,11 +60,6 @@ def with_spare(
     found: Baseline, observer: Observer, estimate: ExternalTorque
 ) -> tuple[Observer, ExternalTorque, tuple[Remark, ...]]:
     """An observer and its estimate, their lost joints left to the momentum observer.
-
-    Args:
-        found: The baseline that the observer runs on.
-        observer: The observer.
-        estimate: Its estimate of the log.
 
     Returns:
         Both as they are where every joint is finite; and what is said of those that are not.

@@ -19,35 +19,22 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
 
+#: The cause that is not part of an error's sum: it says what a standing joint may hide.
 STICTION = "stiction at rest"
-"""The cause that is not part of an error's sum: it says what a standing joint may hide."""
-
-CAUSES = ("noise", "friction", "model", "bandwidth", STICTION)
-"""What an error is divided into."""
-
-SIGN_SPEED = 0.02
-"""Velocity over which the sign of friction turns. [rad/s]"""
-
+CAUSES = ("noise", "friction", "model", "bandwidth", STICTION)  #: What an error is divided into.
+SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
+#: Codes of the remark that holds what the bands let expect: the gains are off the best, or not.
 EXPECTED = ("paper-gains-expected", "paper-gains-expected-level")
-"""Codes of the remark that holds what the bands let expect: the gains are off the best, or not."""
-
+#: The same of the remark that holds what a reference says.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
-"""The same of the remark that holds what a reference says."""
-
-AHEAD = 1.05
-"""The best is ahead where the paper's gains make this many times its error."""
+AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times its error.
 
 
 class Budget(NamedTuple):
-    """Where one observer's error comes from, estimated on the log itself.
+    """Where one observer's error comes from, estimated on the log itself."""
 
-    Attributes:
-        name: The observer.
-        parts: Cause → root mean square. (n,) [N·m]
-    """
-
-    name: str
-    parts: dict[str, Array]
+    name: str  #: The observer.
+    parts: dict[str, Array]  #: Cause → root mean square. (n,) [N·m]
 
     @property
     def total(self) -> Array:
@@ -124,14 +111,7 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
 def expected_gap(
     found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
 ) -> Remark | None:
-    """The expected error with the paper's gains over that of `best`; None where either is unknown.
-
-    Args:
-        found: What the log shows.
-        estimates: The run's estimates, with their bands.
-        gains_of_file: Whether those of the paper's observers ran with the robot file's gains.
-            Where not, or where none of them ran, they run here.
-    """
+    """Expected error with the paper's gains over that of `best`; None where either is unknown."""
     known = {estimate.name: estimate for estimate in estimates}
     if BEST not in known or known[BEST].error_sd is None:
         return None

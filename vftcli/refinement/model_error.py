@@ -30,51 +30,29 @@ from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step
 
-CUTOFF = 6.0
-"""What is faster is noise, or contact: the model's error follows the motion. [Hz]"""
-
-PLAY = 0.3e-3
-"""Presliding length of the friction that may be missing. [rad]"""
-
-SMOOTHING = 0.003
-"""Velocity over which its sign turns. [rad/s]"""
-
+CUTOFF = 6.0  #: What is faster is noise, or contact: the model's error follows the motion. [Hz]
+PLAY = 0.3e-3  #: Presliding length of the friction that may be missing. [rad]
+SMOOTHING = 0.003  #: Velocity over which its sign turns. [rad/s]
+#: A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`. [s]
 WAIT = 1.0
-"""A clock that waits longer counts as waiting so long: six times the period of `CUTOFF`. [s]"""
-
-SHAPES = 5
-"""Columns of friction a joint beside its offset."""
-
+SHAPES = 5  #: Columns of friction a joint beside its offset.
+#: Speed up to which a joint's friction is looked at where its limit is unknown. [rad/s]
 USUAL_SPEED = np.pi
-"""Speed up to which a joint's friction is looked at where its limit is unknown. [rad/s]"""
 
 
 class SmoothMotion(NamedTuple):
-    """A log's motion without what is faster than `CUTOFF`, and the rigid body's torque of it.
+    """A log's motion without what is faster than `CUTOFF`, and the rigid body's torque of it."""
 
-    Attributes:
-        t: Clock without long waits. (T,) [s]
-        q: Positions. (T, n) [rad]
-        dq: Velocities. (T, n) [rad/s]
-        ddq: Accelerations. (T, n) [rad/s²]
-        gravity: Gravity torque. (T, n) [N·m]
-        rigid: Torque of the rigid body and its rotors, without friction. (T, n) [N·m]
-    """
-
-    t: Array
-    q: Array
-    dq: Array
-    ddq: Array
-    gravity: Array
-    rigid: Array
+    t: Array  #: Clock without long waits. (T,) [s]
+    q: Array  #: Positions. (T, n) [rad]
+    dq: Array  #: Velocities. (T, n) [rad/s]
+    ddq: Array  #: Accelerations. (T, n) [rad/s²]
+    gravity: Array  #: Gravity torque. (T, n) [N·m]
+    rigid: Array  #: Torque of the rigid body and its rotors, without friction. (T, n) [N·m]
 
 
 def smooth_motion(run: ModelledRun) -> SmoothMotion:
-    """The smooth motion of a recording.
-
-    Raises:
-        ClockError: If the recording is shorter than two periods of `CUTOFF`.
-    """
+    """The smooth motion of a recording."""
     t, n = without_waits(run.recording.t), run.recording.joints
     both = zero_phase(t, np.hstack([run.recording.q, run.recording.require("dq")]), CUTOFF)
     q, dq = both[:, :n], both[:, n:]
@@ -113,17 +91,11 @@ def friction_shapes(run: ModelledRun, gravity: Array) -> list[Array]:
 
 
 class UsualFriction(NamedTuple):
-    """The friction that a robot's model states, by which its error is judged.
+    """The friction that a robot's model states, by which its error is judged."""
 
-    Attributes:
-        dry: Torque of steady sliding at low speed. (n,) [N·m]
-        viscous: Growth with the speed. (n,) [N·m·s/rad]
-        quadratic: Signed growth with its square. (n,) [N·m·s²/rad²]
-    """
-
-    dry: Array
-    viscous: Array
-    quadratic: Array
+    dry: Array  #: Torque of steady sliding at low speed. (n,) [N·m]
+    viscous: Array  #: Growth with the speed. (n,) [N·m·s/rad]
+    quadratic: Array  #: Signed growth with its square. (n,) [N·m·s²/rad²]
 
 
 def usual_friction(robot: Robot) -> UsualFriction:
@@ -148,21 +120,13 @@ def usual_friction(robot: Robot) -> UsualFriction:
 
 @dataclass(frozen=True, kw_only=True)
 class ModelError:
-    """One value for each column: an error of the model, or how large each is expected to be.
+    """One value for each column: an error of the model, or how large each is expected to be."""
 
-    Attributes:
-        inertial: Of the links' inertial parameters, in the regressor's order. (10n,)
-        rotor: Of the reflected rotor inertias. (n,) [kg·m²]
-        drive: Of the drive constants, as a share. (n,)
-        friction: Of the friction's shapes. (5, n)
-        offset: Of a constant torque. (n,) [N·m]
-    """
-
-    inertial: Array
-    rotor: Array
-    drive: Array
-    friction: Array
-    offset: Array
+    inertial: Array  #: Of the links' inertial parameters, in the regressor's order. (10n,)
+    rotor: Array  #: Of the reflected rotor inertias. (n,) [kg·m²]
+    drive: Array  #: Of the drive constants, as a share. (n,)
+    friction: Array  #: Of the friction's shapes. (5, n)
+    offset: Array  #: Of a constant torque. (n,) [N·m]
 
     def __post_init__(self) -> None:
         seal(self, *vars(self))
@@ -178,10 +142,6 @@ class ModelError:
 
         The rigid body's part is the difference of two inverse dynamics, that of the chain with
         these errors and that of the robot's own, which costs a fiftieth of the regressor.
-
-        Args:
-            run: A recording of the arm.
-            motion: Its smooth motion.
         """
         chain = run.robot.loaded_chain
         wrong = with_parameters(
@@ -255,12 +215,6 @@ def error_columns(
     run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int
 ) -> list[Array]:
     """The rows of A of every joint, each column times its standard deviation.
-
-    Args:
-        run: The log.
-        motion: Its smooth motion.
-        expected: The standard deviations.
-        stride: Every how many samples are taken.
 
     Returns:
         One array a joint, its columns as in `column_numbers`. (S, p)

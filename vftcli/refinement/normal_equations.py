@@ -16,25 +16,16 @@ from vftcli.refinement.model_error import column_numbers
 from vftcli.refinement.slow_load import SlowLoads
 from vftcli.signals.arrays import Array, Mask
 
-BLOCK = 64
-"""Rows that are substituted at a time."""
-
-PENALTY = 2.0
-"""What a column of a load has to gain before it is believed (Akaike's criterion)."""
+BLOCK = 64  #: Rows that are substituted at a time.
+PENALTY = 2.0  #: What a column of a load has to gain before it is believed (Akaike's criterion).
 
 
 class Sums(NamedTuple):
-    """Sums over rows, of which others can be taken off.
+    """Sums over rows, of which others can be taken off."""
 
-    Attributes:
-        matrix: AᵀWA. (P, P)
-        vector: AᵀWd. (P,)
-        constant: dᵀWd.
-    """
-
-    matrix: Array
-    vector: Array
-    constant: float
+    matrix: Array  #: AᵀWA. (P, P)
+    vector: Array  #: AᵀWd. (P,)
+    constant: float  #: dᵀWd.
 
     def without(self, other: "Sums") -> "Sums":
         """The sums over the rows that are left."""
@@ -43,19 +34,12 @@ class Sums(NamedTuple):
 
 
 class FittedError(NamedTuple):
-    """What the rows say of the unknowns.
+    """What the rows say of the unknowns."""
 
-    Attributes:
-        model: Of the model's error, in standard deviations. (P,)
-        loads: Of the slow loads that are believed, in standard deviations. (L,)
-        scale: What the model's standard deviations were multiplied with.
-        factor: Lower Cholesky factor of the matrix of both. (P + L, P + L)
-    """
-
-    model: Array
-    loads: Array
-    scale: float
-    factor: Array
+    model: Array  #: Of the model's error, in standard deviations. (P,)
+    loads: Array  #: Of the slow loads that are believed, in standard deviations. (L,)
+    scale: float  #: What the model's standard deviations were multiplied with.
+    factor: Array  #: Lower Cholesky factor of the matrix of both. (P + L, P + L)
 
     @property
     def covariance(self) -> Array:
@@ -66,17 +50,12 @@ class FittedError(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """The rows of a fit: one a sample and joint.
+    """The rows of a fit: one a sample and joint."""
 
-    Attributes:
-        columns: The model's columns of every joint, as in `column_numbers`. (S, p) each
-        loads: The columns of slow loads.
-        d: What is fitted. (S, n) [N·m]
-    """
-
+    #: The model's columns of every joint, as in `column_numbers`. (S, p) each
     columns: Sequence[Array]
-    loads: SlowLoads
-    d: Array
+    loads: SlowLoads  #: The columns of slow loads.
+    d: Array  #: What is fitted. (S, n) [N·m]
 
     @property
     def joints(self) -> int:
@@ -175,12 +154,6 @@ def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -
 
     The loads' groups are nested, and so are the Cholesky factors with and without them: one factor
     gives the objective of every group, c − Σ z² over its columns, z = L⁻¹AᵀWd.
-
-    Args:
-        sums: Over the rows.
-        unknowns: Number P of the model's columns.
-        sizes: Columns of the loads' groups, each with those before it.
-        scale: What the model's standard deviations are multiplied with.
     """
     scales = np.ones(len(sums.vector))
     scales[:unknowns] = scale

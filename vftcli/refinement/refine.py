@@ -18,23 +18,15 @@ from vftcli.signals.shown import Shown
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Refinement(Shown):
-    """What the complete log makes of its estimates.
+    """What the complete log makes of its estimates."""
 
-    Attributes:
-        estimates: The estimates with their bands.
-        baseline: The log's free part and spectra.
-        curves: Observer that was tuned → the curve that was minimised.
-        budgets: Where each observer's error comes from, one an observer; none without spectra.
-        removed: What ``--remove-bias`` asked for.
-        remarks: What the reader of the estimates should know.
-    """
-
-    estimates: tuple[ExternalTorque, ...]
-    baseline: Baseline
-    curves: Mapping[str, Curve]
+    estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
+    baseline: Baseline  #: The log's free part and spectra.
+    curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
+    #: Where each observer's error comes from, one an observer; none without spectra.
     budgets: tuple[Budget, ...]
-    removed: str
-    remarks: tuple[Remark, ...]
+    removed: str  #: What ``--remove-bias`` asked for.
+    remarks: tuple[Remark, ...]  #: What the reader of the estimates should know.
 
 
 def refine(

@@ -13,78 +13,37 @@ from vftcli.refinement.normal_equations import FittedError, Rows, Sums, solve
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import covered, runs_of
 
-CORRELATED = 0.3
-"""Residuals this close in time count as one. [s]"""
-
-LEAST_SCALE = 0.08
-"""The residual's scale is at least this share of a joint's dry friction. [1]"""
-
-LEAST_TORQUE = 0.02
-"""And at least this. [N·m]"""
-
-NORMAL = 1.4826
-"""Standard deviation of normal noise over the median of its size."""
-
+CORRELATED = 0.3  #: Residuals this close in time count as one. [s]
+LEAST_SCALE = 0.08  #: The residual's scale is at least this share of a joint's dry friction. [1]
+LEAST_TORQUE = 0.02  #: And at least this. [N·m]
+NORMAL = 1.4826  #: Standard deviation of normal noise over the median of its size.
+#: At first the residual's scale comes from so large a quietest share of the samples, …
 QUIET_SHARE = 0.35
-"""At first the residual's scale comes from so large a quietest share of the samples, …"""
-
+#: … whose largest is this share of the median where the samples are normal noise.
 QUIET_QUANTILE = 0.66
-"""… whose largest is this share of the median where the samples are normal noise."""
-
-REACH = 0.15
-"""A sample is as suspicious as the worst within this time. [s]"""
-
-PASSES = 8
-"""Passes of the first fit."""
-
-FIRST = 0.6
-"""Its threshold at first: this quantile of how suspicious the samples are, …"""
-
-NARROWED = 1.6
-"""… divided by this after every pass, …"""
-
-NARROWEST = 3.0
-"""… down to this many scales."""
-
-TRUSTED = 0.25
-"""Samples that weigh more than this set the residual's scale."""
-
-FREE_PASSES = 3
-"""Passes of the second fit."""
-
-CONTACT = 5.0
-"""A sample is contact if a joint's residual is larger than this many scales, …"""
-
-LASTS = 0.08
-"""… for at least so long. [s]"""
-
-GROWN = 0.25
-"""A contact begins so long before, and ends so long after. [s]"""
-
-HUBER = 2.5
-"""Residuals beyond so many scales pull with a constant force."""
-
-FEWEST = 30
-"""With fewer free samples nothing is called contact."""
+REACH = 0.15  #: A sample is as suspicious as the worst within this time. [s]
+PASSES = 8  #: Passes of the first fit.
+FIRST = 0.6  #: Its threshold at first: this quantile of how suspicious the samples are, …
+NARROWED = 1.6  #: … divided by this after every pass, …
+NARROWEST = 3.0  #: … down to this many scales.
+TRUSTED = 0.25  #: Samples that weigh more than this set the residual's scale.
+FREE_PASSES = 3  #: Passes of the second fit.
+CONTACT = 5.0  #: A sample is contact if a joint's residual is larger than this many scales, …
+LASTS = 0.08  #: … for at least so long. [s]
+GROWN = 0.25  #: A contact begins so long before, and ends so long after. [s]
+HUBER = 2.5  #: Residuals beyond so many scales pull with a constant force.
+FEWEST = 30  #: With fewer free samples nothing is called contact.
 
 
 @dataclass(frozen=True, kw_only=True)
 class WholeLogFit:
-    """What a log says of the model's error.
+    """What a log says of the model's error."""
 
-    Attributes:
-        rows: What was fitted.
-        step: Time between two of its samples. [s]
-        free: Samples free of contact. (S,)
-        scale: Size of what neither model nor loads explain. (n,) [N·m]
-        weight: Weight of every row, its scale and its correlation with others in it. (S, n)
-    """
-
-    rows: Rows
-    step: float
-    free: Mask
-    scale: Array
-    weight: Array
+    rows: Rows  #: What was fitted.
+    step: float  #: Time between two of its samples. [s]
+    free: Mask  #: Samples free of contact. (S,)
+    scale: Array  #: Size of what neither model nor loads explain. (n,) [N·m]
+    weight: Array  #: Weight of every row, its scale and its correlation with others in it. (S, n)
 
     def solved(self, sums: Sums, scale: float = 1.0) -> FittedError:
         """The solution for some of its rows."""

@@ -15,40 +15,23 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
 
-FORCE = 50.0
-"""Standard deviation of an external force. [N]"""
-
-MOMENT = 10.0
-"""Standard deviation of an external moment. [N·m]"""
-
-KNOTS = 10.0
-"""Time between two knots of a load, which runs straight from one to the next. [s]"""
-
-CONSTANT = 15.0
-"""In a log shorter than this a load is one constant. [s]"""
-
-MOST_KNOTS = 61
-"""Knots of a log of ten minutes; in a longer one they lie farther apart."""
-
-WRENCH = 6
-"""Components of the wrench at the flange, the first group of loads."""
+FORCE = 50.0  #: Standard deviation of an external force. [N]
+MOMENT = 10.0  #: Standard deviation of an external moment. [N·m]
+KNOTS = 10.0  #: Time between two knots of a load, which runs straight from one to the next. [s]
+CONSTANT = 15.0  #: In a log shorter than this a load is one constant. [s]
+MOST_KNOTS = 61  #: Knots of a log of ten minutes; in a longer one they lie farther apart.
+WRENCH = 6  #: Components of the wrench at the flange, the first group of loads.
 
 
 class SlowLoads(NamedTuple):
-    """Columns of slow external loads along the samples of a fit.
+    """Columns of slow external loads along the samples of a fit."""
 
-    Attributes:
-        torque: External torque, with its sign turned, of one standard deviation of every component:
-            the wrench at the flange, then the forces along the arm. (S, n, m) [N·m]
-        knot: The knot before each sample. (S,)
-        share: How far a sample is on the way to the next one, 0 … 1. (S,)
-        knots: Number of knots.
-    """
-
+    #: External torque, with its sign turned, of one standard deviation of every component: the
+    #: wrench at the flange, then the forces along the arm. (S, n, m) [N·m]
     torque: Array
-    knot: NDArray[np.intp]
-    share: Array
-    knots: int
+    knot: NDArray[np.intp]  #: The knot before each sample. (S,)
+    share: Array  #: How far a sample is on the way to the next one, 0 … 1. (S,)
+    knots: int  #: Number of knots.
 
     @property
     def components(self) -> int:

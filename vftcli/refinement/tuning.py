@@ -26,47 +26,32 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark
 
+#: The smallest expected error, a delay behind a slow ramp [s], a −3 dB bandwidth [Hz], or at most
+#: so many false alarms an hour on each joint, beyond --threshold.
 GOALS = ("rmse", "delay", "bandwidth", "false-alarms")
-"""The smallest expected error, a delay behind a slow ramp [s], a −3 dB bandwidth [Hz], or at most
-so many false alarms an hour on each joint, beyond --threshold."""
 
 
 class TuningGoal(NamedTuple):
-    """What the gains are for.
+    """What the gains are for."""
 
-    Attributes:
-        name: One of `GOALS`.
-        value: Its number, NaN for the smallest error.
-        threshold: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
-    """
-
-    name: str
-    value: float = float("nan")
+    name: str  #: One of `GOALS`.
+    value: float = float("nan")  #: Its number, NaN for the smallest error.
+    #: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
     threshold: Array | None = None
 
 
 class Tuned(NamedTuple):
-    """One observer's gains and what to expect of them.
+    """One observer's gains and what to expect of them."""
 
-    Attributes:
-        observer: Its name at the command line.
-        section: Where its gains stand in a gains file.
-        gains: Parameter → number or one a joint.
-        rate: Natural frequency, cutoff or K. (n,) [rad/s]
-        delay: Lag behind a slow ramp. (n,) [s]
-        rmse: Expected error. (n,) [N·m]
-        alarms: Expected false alarms an hour beyond the goal's threshold; None without one. (n,)
-        running: The observer with these gains.
-    """
-
-    observer: str
-    section: str
-    gains: Mapping[str, Any]
-    rate: Array
-    delay: Array
-    rmse: Array
+    observer: str  #: Its name at the command line.
+    section: str  #: Where its gains stand in a gains file.
+    gains: Mapping[str, Any]  #: Parameter → number or one a joint.
+    rate: Array  #: Natural frequency, cutoff or K. (n,) [rad/s]
+    delay: Array  #: Lag behind a slow ramp. (n,) [s]
+    rmse: Array  #: Expected error. (n,) [N·m]
+    #: Expected false alarms an hour beyond the goal's threshold; None without one. (n,)
     alarms: Array | None = None
-    running: Observer | None = None
+    running: Observer | None = None  #: The observer with these gains.
 
     @property
     def record(self) -> dict[str, Any]:
@@ -80,9 +65,6 @@ def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
     Args:
         text: The word.
         threshold: One number or one a joint, positive. [N·m]
-
-    Raises:
-        ParameterError: If it is none of these, or a threshold is malformed or missing.
     """
     name, equals, number = text.partition("=")
     name = name.strip()
@@ -119,9 +101,6 @@ def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
     """Gains of FDO, GMO, KFO and smoother for a goal, one line an observer.
 
     The smoother has no delay: for a delay it gets the gains with the smallest error.
-
-    Raises:
-        ParameterError: If the goal cannot be reached.
     """
     threshold = goal.threshold
     if threshold is not None and len(threshold) not in {1, spectra.joints}:
@@ -180,13 +159,7 @@ def gains_of(spectra: Spectra) -> Gains:
 def bounds_reached(
     tuned: Sequence[Tuned], spectra: Spectra, goal: TuningGoal
 ) -> tuple[Remark, ...]:
-    """A warning on every gain that ran to a bound of what is tried; a delay or bandwidth has none.
-
-    Args:
-        tuned: What `tune_all` made.
-        spectra: Of these spectra.
-        goal: For this goal.
-    """
+    """A warning on every gain that reached a bound of the search."""
     if goal.name not in {"rmse", "false-alarms"}:
         return ()
     grid = natural_frequencies(spectra.step)
@@ -225,11 +198,7 @@ def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
 
 
 def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
-    """Whether a rate of the grid raises at most so many false alarms an hour on a joint. (G, n)
-
-    Raises:
-        ParameterError: If none does.
-    """
+    """Whether a rate of the grid raises at most so many false alarms an hour on a joint. (G, n)"""
     response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
     columns = range(len(grid))
     few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])

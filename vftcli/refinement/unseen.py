@@ -14,47 +14,28 @@ from vftcli.refinement.normal_equations import FittedError
 from vftcli.refinement.robust_fit import WholeLogFit
 from vftcli.signals.arrays import Array, Mask
 
-FOLDS = 5
-"""Contiguous parts of the free samples, each predicted from the others."""
-
-MARGIN = 0.5
-"""Left out at both ends of a fold: neighbours in time know each other. [s]"""
-
-SCALES = (0.0, 0.1, 0.3, 1.0)
-"""How far the model is let go: factors on its standard deviations."""
-
-LARGEST = 6.0
-"""A residual counts at most so many scales."""
-
-MOVES = 0.02
-"""A joint moves where it is faster than this. [rad/s]"""
-
+FOLDS = 5  #: Contiguous parts of the free samples, each predicted from the others.
+MARGIN = 0.5  #: Left out at both ends of a fold: neighbours in time know each other. [s]
+SCALES = (0.0, 0.1, 0.3, 1.0)  #: How far the model is let go: factors on its standard deviations.
+LARGEST = 6.0  #: A residual counts at most so many scales.
+MOVES = 0.02  #: A joint moves where it is faster than this. [rad/s]
+#: A joint that moves in less than this share of the free samples is judged by all of them.
 SELDOM = 0.2
-"""A joint that moves in less than this share of the free samples is judged by all of them."""
-
-WORTH = 0.9
-"""A joint is corrected in full if at most this share of its unseen error is left, …"""
-
+WORTH = 0.9  #: A joint is corrected in full if at most this share of its unseen error is left, …
+#: … not at all if so much is left, and between the two in part: no sample switches it. A load of
+#: 2.8 kg that the fit cannot hold apart from the model leaves .95.
 WORTHLESS = 0.95
-"""… not at all if so much is left, and between the two in part: no sample switches it. A load of
-2.8 kg that the fit cannot hold apart from the model leaves .95."""
 
 
 class Guarded(NamedTuple):
-    """A model error that has been tried on what it had not seen.
+    """A model error that has been tried on what it had not seen."""
 
-    Attributes:
-        solution: From all free samples, held back as far as predicts best; None if not at all.
-        share: Unseen error with it over that without, while the joint moves. (n,)
-        weight: How much of it each joint gets: 0 where it is not worth having, 1 where it clearly
-            is. (n,)
-        loads: Slow loads that are believed beside it, in standard deviations. (L,)
-    """
-
+    #: From all free samples, held back as far as predicts best; None if not at all.
     solution: FittedError | None
-    share: Array
+    share: Array  #: Unseen error with it over that without, while the joint moves. (n,)
+    #: How much of it each joint gets: 0 where it is not worth having, 1 where it clearly is. (n,)
     weight: Array
-    loads: Array
+    loads: Array  #: Slow loads that are believed beside it, in standard deviations. (L,)
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:

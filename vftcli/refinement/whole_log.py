@@ -33,69 +33,48 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
 
+#: From its first to its last motion a log has to take this long: a shorter one tells inertia from a
+#: push no more, and friction alone is fitted. [s]
 LEAST_MOTION = 10.0
-"""From its first to its last motion a log has to take this long: a shorter one tells inertia from a
-push no more, and friction alone is fitted. [s]"""
-
+#: A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]
 LEAST_FRICTION = 3.0
-"""A log that moves for less tells nothing: ten times the `CORRELATED` of a residual. [s]"""
-
+#: An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose.
 LEAST_SHARE = 0.1
-"""An arm that moves less of the time, and less than `LEAST_MOTION` in all, is held in a pose."""
-
+#: Up to so many times the error of friction that is expected, rms over a short log, its fit is used
+#: in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]
 USUAL = 1.1
-"""Up to so many times the error of friction that is expected, rms over a short log, its fit is used
-in full, … Pieces of 5 s of UR10e logs reach 1.2 on their worst joint. [1]"""
-
+#: … and from so many times on not at all: a hand leads the arm. With a hand of 20 N along the
+#: flange's path the worst joint reads 1.2 to 2.5. [1]
 LED = 1.4
-"""… and from so many times on not at all: a hand leads the arm. With a hand of 20 N along the
-flange's path the worst joint reads 1.2 to 2.5. [1]"""
-
+#: In a short log a joint's friction is corrected in full if so much of its error is left, …
 CLEAR = 0.45
-"""In a short log a joint's friction is corrected in full if so much of its error is left, …"""
-
+#: … and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same led by a
+#: hand .4 to .9, and with both limits they are no worse than a momentum observer. [1]
 UNCLEAR = 0.6
-"""… and not at all if so much is: pieces of 5 s of UR10e logs leave .3 to .9, the same led by a
-hand .4 to .9, and with both limits they are no worse than a momentum observer. [1]"""
-
-RATE = 30.0
-"""Samples a second that are fitted, …"""
-
-LONG = 60.0
-"""… up to a log of this length [s], …"""
-
-LONG_RATE = 10.0
-"""… and in a longer one."""
-
-MOST_SAMPLES = 36_000
-"""Samples that are fitted at most: an hour's."""
+RATE = 30.0  #: Samples a second that are fitted, …
+LONG = 60.0  #: … up to a log of this length [s], …
+LONG_RATE = 10.0  #: … and in a longer one.
+MOST_SAMPLES = 36_000  #: Samples that are fitted at most: an hour's.
 
 
 @dataclass(frozen=True, kw_only=True)
 class WholeLogBias:
-    """The model's bias along a log.
+    """The model's bias along a log."""
 
-    Attributes:
-        weight: How much of the model's error is taken off each joint: 0 on joints left alone, 1
-            where it clearly predicts what it had not seen. (n,)
-        bias: Torque that is taken off, zero on joints left alone. (T, n) [N·m]
-        sd: Standard deviation of the model's error as it was fitted, and of what is taken off where
-            that is a part of it: taken off or left alone, by chance. (T, n) [N·m]
-        free: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
-        load: External torque of the slow loads that the fit believes in, which stays in the
-            estimates; zero where it believes in none. (T, n) [N·m]
-        remarks: What was applied, and what was not and why.
-        fitted: Whether there was a fit; else `free` and `load` say nothing of the log.
-        error: The model's error on the joints left alone too, None where nothing was fitted.
-    """
-
+    #: How much of the model's error is taken off each joint: 0 on joints left alone, 1 where it
+    #: clearly predicts what it had not seen. (n,)
     weight: Array
-    bias: Array
+    bias: Array  #: Torque that is taken off, zero on joints left alone. (T, n) [N·m]
+    #: Standard deviation of the model's error as it was fitted, and of what is taken off where that
+    #: is a part of it: taken off or left alone, by chance. (T, n) [N·m]
     sd: Array
-    free: Mask
+    free: Mask  #: Samples that the fit calls free of contact, all where nothing was fitted. (T,)
+    #: External torque of the slow loads that the fit believes in, which stays in the estimates;
+    #: zero where it believes in none. (T, n) [N·m]
     load: Array
-    remarks: tuple[Remark, ...]
-    fitted: bool = True
+    remarks: tuple[Remark, ...]  #: What was applied, and what was not and why.
+    fitted: bool = True  #: Whether there was a fit; else `free` and `load` say nothing of the log.
+    #: The model's error on the joints left alone too, None where nothing was fitted.
     error: ModelError | None = field(default=None, repr=False)
 
     def __post_init__(self) -> None:
@@ -122,12 +101,7 @@ class WholeLogBias:
 
 
 def whole_log_bias(run: ModelledRun) -> WholeLogBias:
-    """Find the model's bias along a log, joint by joint where that predicts what it has not seen.
-
-    Raises:
-        MissingSignalError: If velocities, or both currents and torques, are missing.
-        RobotError: If the number of joints differs.
-    """
+    """The model's bias along a log, of each joint where it predicts unseen samples."""
     run = run.steadied
     terms = run.terms
     span, refused = motion_of(run)

@@ -11,57 +11,39 @@ from vftcli.signals.lag import lag_fit
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 
-LEAST_OVERLAP = 0.3
-"""Share of the shorter log that must overlap at an admissible shift."""
-
+LEAST_OVERLAP = 0.3  #: Share of the shorter log that must overlap at an admissible shift.
+#: Positions that differ by more than this after alignment are another trajectory. [rad]
 SAME_TRAJECTORY = 0.05
-"""Positions that differ by more than this after alignment are another trajectory. [rad]"""
-
+#: Clocks whose rates differ by more than this share are refused, by less corrected.
 SAME_RATE = 0.01
-"""Clocks whose rates differ by more than this share are refused, by less corrected."""
-
+#: A shift is worth refining if the logs lie within this share of the motion's own spread.
 SHORTLIST = 0.15
-"""A shift is worth refining if the logs lie within this share of the motion's own spread."""
-
+#: A shift fits as well as the closest if the logs lie no more than so many times farther apart.
 ALIKE = 3.0
-"""A shift fits as well as the closest if the logs lie no more than so many times farther apart."""
-
+#: Or within this share of the motion's own spread, which no servo repeats better.
 LEAST_ALIKE = 0.001
-"""Or within this share of the motion's own spread, which no servo repeats better."""
+RIVALS = 40  #: Shifts with a longer overlap that are tried, at most.
+COARSE = 300  #: Instants at which a recording is compared while the shared part is looked for.
 
-RIVALS = 40
-"""Shifts with a longer overlap that are tried, at most."""
-
-COARSE = 300
-"""Instants at which a recording is compared while the shared part is looked for."""
-
+#: At another speed or on another clock a motion lies within this share of its own spread.
+#:
+#: Of true pairs .003 is left, of other motions that a rate seemed to explain 1.3 and more.
 SAME_PATH = 0.1
-"""At another speed or on another clock a motion lies within this share of its own spread.
 
-Of true pairs .003 is left, of other motions that a rate seemed to explain 1.3 and more.
-"""
-
+#: Length of the pieces over which logged velocities are compared with the way travelled. [s]
 TRAVEL = 1.0
-"""Length of the pieces over which logged velocities are compared with the way travelled. [s]"""
-
+#: Clock rates tried to explain why two logs do not fit.
 RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
-"""Clock rates tried to explain why two logs do not fit."""
 
 
 class Alignment(NamedTuple):
-    """How one log lies on another.
+    """How one log lies on another."""
 
-    Attributes:
-        shift: The other log's clock reads rate·t + shift at the same place. [s]
-        rate: Rate of the other log's clock against this one's, 1 for equal clocks.
-        deviation: Root mean square of the remaining position difference over all joints. [rad]
-        overlap: Samples of the log whose partner lies within the other. (T,)
-    """
-
-    shift: float
-    rate: float
+    shift: float  #: The other log's clock reads rate·t + shift at the same place. [s]
+    rate: float  #: Rate of the other log's clock against this one's, 1 for equal clocks.
+    #: Root mean square of the remaining position difference over all joints. [rad]
     deviation: float
-    overlap: Mask
+    overlap: Mask  #: Samples of the log whose partner lies within the other. (T,)
 
 
 def align(recording: Recording, free: Recording) -> Alignment:
@@ -71,10 +53,6 @@ def align(recording: Recording, free: Recording) -> Alignment:
     `LEAST_OVERLAP`, by FFT on a common uniform clock; it and the ratio of the clocks' rates are
     then refined on the logs' own clocks by Gauss–Newton steps, robust against contacts. A motion
     that repeats fits at every whole period alike: of these shifts the one with most overlap counts.
-
-    Raises:
-        ReferenceTorqueError: If the two logs are of other arms, not of the same trajectory, or of
-            speeds or clocks that differ by more than `SAME_RATE`.
     """
     check_same_arm(recording, free)
     closest = lying_at(recording, free, *best_fit(recording, free))

@@ -7,11 +7,9 @@ from pathlib import Path
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.parsing import interval
 
-AUTOMATIC = "auto"
-"""The word for what is chosen by the log at hand."""
-
+AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
+#: Rungs of the alignment ladder, from the lowest; `vftcli.repetition.ladder.RUNGS` makes them.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
-"""Rungs of the alignment ladder, from the lowest; `vftcli.repetition.ladder.RUNGS` makes them."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,24 +18,18 @@ class FreeChoice:
 
     With nothing chosen the free cycles of a repeated motion are found.
 
-    Attributes:
-        logs: Free runs in other logs.
-        spans: Free spans of the log itself, from and to. [s]
-        period: The commanded period of a repeated motion, None to go by the positions alone. [s]
-        cycles: Its free cycles, counted from 1; none to find them.
-        alignment: One of `ALIGNMENTS`, or "auto" for the best for the log at hand.
-        low_pass: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
-
     Raises:
         ReferenceTorqueError: If an alignment does not exist or lacks its period, a period or cutoff
             is not positive, or cycles are named beside other logs.
     """
 
-    logs: tuple[Path, ...] = ()
-    spans: tuple[tuple[float, float], ...] = ()
+    logs: tuple[Path, ...] = ()  #: Free runs in other logs.
+    spans: tuple[tuple[float, float], ...] = ()  #: Free spans of the log itself, from and to. [s]
+    #: The commanded period of a repeated motion, None to go by the positions alone. [s]
     period: float | None = None
-    cycles: tuple[int, ...] = ()
-    alignment: str = AUTOMATIC
+    cycles: tuple[int, ...] = ()  #: Its free cycles, counted from 1; none to find them.
+    alignment: str = AUTOMATIC  #: One of `ALIGNMENTS`, or "auto" for the best for the log at hand.
+    #: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
     low_pass: float | str | None = AUTOMATIC
 
     def __post_init__(self) -> None:
@@ -109,16 +101,12 @@ class FreeChoice:
         )
 
 
+#: Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day.
 DIGITS = 5
-"""Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day."""
 
 
 def cycle_numbers(text: str) -> tuple[int, ...]:
-    """Cycle numbers, counted from 1, of ``1`` or ``1,2`` or ``1-3``.
-
-    Raises:
-        ReferenceTorqueError: If it is something else.
-    """
+    """Cycle numbers, counted from 1, of ``1`` or ``1,2`` or ``1-3``."""
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")

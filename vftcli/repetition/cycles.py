@@ -11,25 +11,17 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 
+#: A sample is on the repeated path if it is there again one period away, within this. [rad]
 ON_PATH = 0.1
-"""A sample is on the repeated path if it is there again one period away, within this. [rad]"""
-
-COMPLETE = 0.97
-"""Share of a cycle that must be in the log for it to count as whole."""
+COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as whole.
 
 
 class Cycles(NamedTuple):
-    """The repeated part of a log.
+    """The repeated part of a log."""
 
-    Attributes:
-        period: Length of a cycle. [s]
-        begin: First instant on the repeated path. [s]
-        end: Last instant on it. [s]
-    """
-
-    period: float
-    begin: float
-    end: float
+    period: float  #: Length of a cycle. [s]
+    begin: float  #: First instant on the repeated path. [s]
+    end: float  #: Last instant on it. [s]
 
     @property
     def whole(self) -> int:
@@ -54,9 +46,6 @@ def segment(recording: Recording, period: Period) -> Cycles:
     log is so short that neither is in it. Contacts push it off for a moment only, so the path
     begins with the first sample after which at least three quarters of a cycle are on it, and ends
     likewise.
-
-    Raises:
-        ReferenceTorqueError: If less than a whole cycle and a part of the next are there.
     """
     t, q = moving_part(recording)
     seconds = period.seconds

@@ -18,32 +18,21 @@ from vftcli.signals.series import median_step
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveRun:
-    """One recording's motion and torque, on its own clock.
+    """One recording's motion and torque, on its own clock."""
 
-    Attributes:
-        name: The recording's name.
-        t: Clock. (T,) [s]
-        q: Joint positions. (T, n) [rad]
-        dq: Joint velocities. (T, n) [rad/s]
-        standing: Where a joint stands still. (T, n)
-        standstill_s: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
-        torque: Drive torque. (T, n) [N·m]
-        model: Drive torque the model expects of the motion without contact, ṗ − Cᵀq̇ + g + F_f,
-            with ṗ by central differences. (T, n) [N·m]
-        momentum: p = M q̇. (T, n) [kg·m²/s]
-        coulomb: Dry friction of each joint by the robot's model, 0 without one. (n,) [N·m]
-    """
-
-    name: str
-    t: Array
-    q: Array
-    dq: Array
-    standing: Mask
+    name: str  #: The recording's name.
+    t: Array  #: Clock. (T,) [s]
+    q: Array  #: Joint positions. (T, n) [rad]
+    dq: Array  #: Joint velocities. (T, n) [rad/s]
+    standing: Mask  #: Where a joint stands still. (T, n)
+    #: Length of the stop a sample belongs to, 0 where the joint moves. (T, n) [s]
     standstill_s: Array
-    torque: Array
+    torque: Array  #: Drive torque. (T, n) [N·m]
+    #: Drive torque the model expects of the motion without contact, ṗ − Cᵀq̇ + g + F_f, with ṗ by
+    #: central differences. (T, n) [N·m]
     model: Array
-    momentum: Array
-    coulomb: Array
+    momentum: Array  #: p = M q̇. (T, n) [kg·m²/s]
+    coulomb: Array  #: Dry friction of each joint by the robot's model, 0 without one. (n,) [N·m]
 
     @property
     def step(self) -> float:
@@ -71,22 +60,12 @@ class DriveRun:
         return replace(self, **series)
 
 
+#: Attributes of a run that have a value for each sample.
 ALONG_TIME = ("t", "q", "dq", "standing", "standstill_s", "torque", "model", "momentum")
-"""Attributes of a run that have a value for each sample."""
 
 
 def drive_run_of(recording: Recording, robot: Robot, terms: DynamicsTerms) -> DriveRun:
-    """Evaluate a recording's drive torque and the model's.
-
-    Args:
-        recording: The recording.
-        robot: For drive constants and the model's torque.
-        terms: Its p and μ.
-
-    Raises:
-        MissingSignalError: If velocities, or both currents and torques, are missing.
-        RobotError: If the number of joints differs.
-    """
+    """Evaluate a recording's drive torque and the model's."""
     torque = drive_torque(recording, robot)
     dq = recording.require("dq")
     return DriveRun(

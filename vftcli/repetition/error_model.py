@@ -11,38 +11,23 @@ from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
+#: Noise is not measured in a band about less than this: contacts live there. [Hz]
 LEAST_BAND = 12.0
-"""Noise is not measured in a band about less than this: contacts live there. [Hz]"""
-
+#: Share of the correction that is wrong even where the model is as good as it gets.
 LEAST_SHARE = 0.05
-"""Share of the correction that is wrong even where the model is as good as it gets."""
-
-PIECE = 0.4
-"""Length of the pieces in which noise is told from slow loads. [s]"""
-
+PIECE = 0.4  #: Length of the pieces in which noise is told from slow loads. [s]
+#: Fewest pieces of which the quietest speak for the noise: one short cycle may be pushed in all.
 LEAST_PIECES = 20
-"""Fewest pieces of which the quietest speak for the noise: one short cycle may be pushed in all."""
-
-QUIET = 0.1
-"""Share of the pieces that are without a fast contact."""
-
-SEED = 15
-"""Of the white noise that the quietest pieces are compared with."""
-
-TRUSTED_SHARE = 0.5
-"""A joint is trusted if it moves in at least this share of the samples."""
+QUIET = 0.1  #: Share of the pieces that are without a fast contact.
+SEED = 15  #: Of the white noise that the quietest pieces are compared with.
+TRUSTED_SHARE = 0.5  #: A joint is trusted if it moves in at least this share of the samples.
 
 
 class ErrorModel(NamedTuple):
-    """Expected error of a difference, from what the logs themselves show.
+    """Expected error of a difference, from what the logs themselves show."""
 
-    Attributes:
-        sd: Standard deviation of each sample, NaN where there is no reference. (T, n) [N·m]
-        standing: Where the joint stands in the log or in the free run. (T, n)
-    """
-
-    sd: Array
-    standing: Mask
+    sd: Array  #: Standard deviation of each sample, NaN where there is no reference. (T, n) [N·m]
+    standing: Mask  #: Where the joint stands in the log or in the free run. (T, n)
 
     @property
     def standing_share(self) -> Array:

@@ -14,26 +14,18 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.remarks import Remark, fact
 
+#: A cycle is free too if its difference from the freest is within this many expected errors.
 ALIKE = 1.5
-"""A cycle is free too if its difference from the freest is within this many expected errors."""
-
-MOST_LAID = 8
-"""Free cycles that are laid under the others, at most."""
-
-SETTLES = 2.0
-"""A cycle is taken with what is around it, in which filters settle. [s]"""
+MOST_LAID = 8  #: Free cycles that are laid under the others, at most.
+SETTLES = 2.0  #: A cycle is taken with what is around it, in which filters settle. [s]
 
 
 class FreeCycles(NamedTuple):
-    """Cycles taken to be free.
+    """Cycles taken to be free."""
 
-    Attributes:
-        numbers: Counted from 0.
-        residuals: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of
-            one that lies in a gap; None where they were given. (cycles,)
-    """
-
-    numbers: tuple[int, ...]
+    numbers: tuple[int, ...]  #: Counted from 0.
+    #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of one that
+    #: lies in a gap; None where they were given. (cycles,)
     residuals: Array | None
 
     @property
@@ -75,9 +67,6 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
 
     The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
     each joint relative to that joint's smallest, averaged over the joints.
-
-    Raises:
-        ReferenceTorqueError: If the log holds no whole cycle beside another part of one.
     """
     number = cycles.number(motion.t)
     if cycles.whole < 1:
@@ -121,12 +110,7 @@ def residuals(motion: DriveRun, cycles: Cycles) -> Array:
 
 
 def differs_by_noise(motion: DriveRun, pairing: Pairing) -> bool:
-    """Whether a cycle differs from its partner by no more than the difference's own error.
-
-    Args:
-        motion: The log in that cycle.
-        pairing: Where in another cycle its samples belong.
-    """
+    """Whether a cycle differs from its partner by no more than the difference's own error."""
     laid = LaidOver(motion=motion, pairings=[pairing])
     found = difference(laid, "model", band(motion.step, None)[0])
     shown = found.error.rms_moving(found.tau)

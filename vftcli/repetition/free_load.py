@@ -28,54 +28,29 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
 
-LEAST = 0.4
-"""A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]"""
-
-SURE = 4.0
-"""Standard deviations that it has to be."""
-
-PARTLY = 0.8
-"""Share of the free part's disturbance that it may leave at most."""
-
-CUTOFF = 6.0
-"""Where the disturbance is low-passed before it is weighed. [Hz]"""
-
+LEAST = 0.4  #: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
+SURE = 4.0  #: Standard deviations that it has to be.
+PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
+CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
+#: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]
 HEARD = 2.0
-"""Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]"""
-
-RATE = 30.0
-"""Samples a second that are weighed."""
-
+RATE = 30.0  #: Samples a second that are weighed.
+#: Time over which the model's errors resemble one another: so much counts as one sample. [s]
 MEMORY = 0.3
-"""Time over which the model's errors resemble one another: so much counts as one sample. [s]"""
-
-SIGN_SPEED = 0.02
-"""Velocity over which the sign of friction turns. [rad/s]"""
-
-PASSES = 4
-"""Fits, each with the joints' errors that the last one left."""
-
-WIDE = (20.0, 5.0, 5.0, 5.0)
-"""Standard deviations of a load's mass and first moment. [kg, kg·m]"""
+SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
+PASSES = 4  #: Fits, each with the joints' errors that the last one left.
+WIDE = (20.0, 5.0, 5.0, 5.0)  #: Standard deviations of a load's mass and first moment. [kg, kg·m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FreeLoad:
-    """A load in the free part.
+    """A load in the free part."""
 
-    Attributes:
-        mass: Its mass. [kg]
-        moment: Mass times its centre, in flange axes. (3,) [kg·m]
-        sd: Standard deviation of the mass. [kg]
-        moment_sd: That of the moment. (3,) [kg·m]
-        share: What is left of the free part's disturbance with it.
-    """
-
-    mass: float
-    moment: Array
-    sd: float
-    moment_sd: Array
-    share: float
+    mass: float  #: Its mass. [kg]
+    moment: Array  #: Mass times its centre, in flange axes. (3,) [kg·m]
+    sd: float  #: Standard deviation of the mass. [kg]
+    moment_sd: Array  #: That of the moment. (3,) [kg·m]
+    share: float  #: What is left of the free part's disturbance with it.
 
     def __post_init__(self) -> None:
         seal(self, "moment", "moment_sd")
@@ -119,17 +94,11 @@ class FreeLoad:
 
 
 class Weighing(NamedTuple):
-    """A fit of the free part.
+    """A fit of the free part."""
 
-    Attributes:
-        weights: Of the columns. (m,)
-        sd: Their standard deviations. (m,)
-        left: Root mean square of what is left, joint by joint. (n,) [N·m]
-    """
-
-    weights: Array
-    sd: Array
-    left: Array
+    weights: Array  #: Of the columns. (m,)
+    sd: Array  #: Their standard deviations. (m,)
+    left: Array  #: Root mean square of what is left, joint by joint. (n,) [N·m]
 
 
 def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:

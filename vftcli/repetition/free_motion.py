@@ -21,52 +21,32 @@ if TYPE_CHECKING:
     from vftcli.repetition.free_cycles import FreeCycles
     from vftcli.repetition.periodicity import Period
 
+#: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
-"""A cycle counts as inside a span if it sticks out by no more than this share of itself."""
 
 
 class FreePiece(NamedTuple):
-    """Samples of one recording that nobody touched.
+    """Samples of one recording that nobody touched."""
 
-    Attributes:
-        run: The recording they are in: the log itself or a free run.
-        inside: Which of its samples they are. (S,)
-    """
-
-    run: ModelledRun
-    inside: Mask
+    run: ModelledRun  #: The recording they are in: the log itself or a free run.
+    inside: Mask  #: Which of its samples they are. (S,)
 
 
 class FreePart(NamedTuple):
-    """Everything that is free of contact, of the log and of free runs.
+    """Everything that is free of contact, of the log and of free runs."""
 
-    Attributes:
-        pieces: One a recording, the log's own first.
-        own: Samples of the log itself that are free. (T,)
-        remarks: What it is and how it was found.
-    """
-
-    pieces: tuple[FreePiece, ...]
-    own: Mask
-    remarks: tuple[Remark, ...]
+    pieces: tuple[FreePiece, ...]  #: One a recording, the log's own first.
+    own: Mask  #: Samples of the log itself that are free. (T,)
+    remarks: tuple[Remark, ...]  #: What it is and how it was found.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FreeMotion(Shown):
-    """The free motion of one log. What is asked of it is found or made once, when first asked for.
+    """The free motion of one log; each part is found once, when first asked for."""
 
-    Attributes:
-        log: The log.
-        choice: What the user says is free.
-        runs: Free runs in other recordings.
-
-    Raises:
-        ReferenceTorqueError: If a free run is the log itself, or two free runs are one.
-    """
-
-    log: ModelledRun
-    choice: FreeChoice = field(default_factory=FreeChoice)
-    runs: tuple[FreeRun, ...] = ()
+    log: ModelledRun  #: The log.
+    choice: FreeChoice = field(default_factory=FreeChoice)  #: What the user says is free.
+    runs: tuple[FreeRun, ...] = ()  #: Free runs in other recordings.
 
     def __post_init__(self) -> None:
         refuse_repeated_runs(self.log.recording, [run.recording for run in self.runs])
@@ -82,33 +62,21 @@ class FreeMotion(Shown):
 
     @cached_property
     def period(self) -> "Period":
-        """The period of the log's motion.
-
-        Raises:
-            ReferenceTorqueError: If the log repeats nothing.
-        """
+        """The period of the log's motion."""
         from vftcli.repetition.periodicity import find_period
 
         return find_period(self.log.recording, self.choice.period)
 
     @cached_property
     def cycles(self) -> "Cycles":
-        """The cycles of the log.
-
-        Raises:
-            ReferenceTorqueError: If the log repeats nothing.
-        """
+        """The cycles of the log."""
         from vftcli.repetition.cycles import segment
 
         return segment(self.log.recording, self.period)
 
     @cached_property
     def cycles_given(self) -> tuple[int, ...]:
-        """Cycles the user says are free, counted from 0: named, or whole inside a free span.
-
-        Raises:
-            ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
-        """
+        """Cycles the user says are free, counted from 0: named, or whole inside a free span."""
         cycles, whole = self.cycles, self.cycles.whole
         for number in self.choice.cycles:
             if not 1 <= number <= whole:
@@ -127,11 +95,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def free_cycles(self) -> "FreeCycles":
-        """The free cycles of the log: those the user says, else those found by what they show.
-
-        Raises:
-            ReferenceTorqueError: If the log repeats nothing, or has no such cycle.
-        """
+        """The free cycles of the log: those the user says, else those found by what they show."""
         from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
 
         if self.cycles_given:
@@ -140,12 +104,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def part(self) -> FreePart:
-        """The free part: what is given of the log itself and of other runs, else its free cycles.
-
-        Raises:
-            ReferenceTorqueError: If nothing is given and the log repeats nothing.
-            ParameterError: If a given span holds no samples, or the whole log.
-        """
+        """The free part: the given spans and runs, else the free cycles of the log."""
         log, choice = self.log, self.choice
         own, t = self.within_spans, log.recording.t
         remarks = [
@@ -175,11 +134,7 @@ class FreeMotion(Shown):
 
     @property
     def within_spans(self) -> Mask:
-        """Samples of the log inside the spans that are given as free. (T,)
-
-        Raises:
-            ParameterError: If they are none, or all.
-        """
+        """Samples of the log inside the spans that are given as free. (T,)"""
         recording, spans = self.log.recording, self.choice.spans
         t = recording.t
         inside = np.zeros(len(t), dtype=bool)

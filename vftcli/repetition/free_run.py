@@ -21,22 +21,17 @@ if TYPE_CHECKING:
     from vftcli.repetition.drive_run import DriveRun
     from vftcli.repetition.pairing import Pairing
 
+#: Samples from which on a recording's terms do not stay in memory beside its results.
 LONG = 1 << 17
-"""Samples from which on a recording's terms do not stay in memory beside its results."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class ModelledRun(Shown):
-    """A recording and what the robot's model says of it, evaluated once, when first asked for.
+    """A recording and what the robot's model says of it, evaluated once, when first asked for."""
 
-    Attributes:
-        recording: The recording.
-        robot: The arm, its payload mounted.
-        literal: Whether `terms` come from the paper's numeric method; equal to a millionth.
-    """
-
-    recording: Recording
-    robot: Robot
+    recording: Recording  #: The recording.
+    robot: Robot  #: The arm, its payload mounted.
+    #: Whether `terms` come from the paper's numeric method; equal to a millionth.
     literal: bool = False
 
     @cached_property
@@ -97,11 +92,7 @@ class Models:
         self._runs: list[ModelledRun] = []
 
     def of(self, recording: Recording, robot: Robot, *, literal: bool = False) -> ModelledRun:
-        """The recording with this robot's model, the one that is there if there is one.
-
-        Raises:
-            VftError: If they are of different joints, or something else.
-        """
+        """The recording with this robot's model, the one that is there if there is one."""
         check_joints(recording, robot)
         for run in self._runs:
             if run.recording is recording and run.robot is robot and run.literal == literal:
@@ -115,14 +106,10 @@ class FreeRun:
     """A motion in another recording that nobody touched, beside the log it serves.
 
     Everything that is asked of it, by references, zero and bands, is made once.
-
-    Attributes:
-        run: The free run.
-        log: The log.
     """
 
-    run: ModelledRun
-    log: ModelledRun
+    run: ModelledRun  #: The free run.
+    log: ModelledRun  #: The log.
 
     @cached_property
     def _alignment(self) -> "Alignment | ReferenceTorqueError":
@@ -145,22 +132,14 @@ class FreeRun:
 
     @property
     def alignment(self) -> "Alignment":
-        """How it lies on the log.
-
-        Raises:
-            ReferenceTorqueError: If it is another motion, of another arm, or on another clock.
-        """
+        """How it lies on the log."""
         if isinstance(self._alignment, ReferenceTorqueError):
             raise self._alignment
         return self._alignment
 
     @cached_property
     def pairing(self) -> "Pairing":
-        """Where in the free run each sample of the log belongs.
-
-        Raises:
-            ReferenceTorqueError: If it is another motion, of another arm, or on another clock.
-        """
+        """Where in the free run each sample of the log belongs."""
         from vftcli.repetition.pairing import pair_with_run
 
         found = self.alignment

@@ -18,35 +18,28 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Where, fact
 
-NEAR = 2
-"""A sample is compared with so many before it and so many behind it, by their median."""
-
+NEAR = 2  #: A sample is compared with so many before it and so many behind it, by their median.
+#: How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise. One
+#: sample in a hundred may be bad, and three bends in a hundred with it.
 USUAL = 0.97
-"""How far samples usually stand out: this quantile of their bends, 2.7 sd of white noise. One
-sample in a hundred may be bad, and three bends in a hundred with it."""
-
+#: Beyond so many times that a sample stands alone: 16 sd of white noise. On 36 sound logs of eight
+#: arms one sample does in most of those of a UR10e, at most 11 in 1896, and none in 24 of them.
 FAR = 6.0
-"""Beyond so many times that a sample stands alone: 16 sd of white noise. On 36 sound logs of eight
-arms one sample does in most of those of a UR10e, at most 11 in 1896, and none in 24 of them."""
-
+#: And beyond this share of what a velocity or an effort spans but for its outer hundredths: of
+#: smooth motion without noise the bends tell nothing. What an angle spans is no measure.
 SPREAD = 0.03
-"""And beyond this share of what a velocity or an effort spans but for its outer hundredths: of
-smooth motion without noise the bends tell nothing. What an angle spans is no measure."""
 
+#: Angles and velocities off by less never stand alone: less than what turns the dry friction of a
+#: joint round, on which a gear's teeth give, and less than a speed at which a joint stands.
+#: [rad, rad/s]
 LEAST = {"q": 5e-4, "dq": 1e-2}
-"""Angles and velocities off by less never stand alone: less than what turns the dry friction of a
-joint round, on which a gear's teeth give, and less than a speed at which a joint stands.
-[rad, rad/s]"""
 
+#: The first and last samples may be so many times as far off: a line of six samples bends.
 END = 4.0
-"""The first and last samples may be so many times as far off: a line of six samples bends."""
-
+#: An effort is no further off than so many times what its three closest neighbours in size differ
+#: by: a tap of three samples is a tap. Two samples of one stand alone.
 PEAK = 2.0
-"""An effort is no further off than so many times what its three closest neighbours in size differ
-by: a tap of three samples is a tap. Two samples of one stand alone."""
-
-FINEST = 1e-6
-"""And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]"""
+FINEST = 1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 of 100 N·m. [A, N·m]
 
 
 def without_isolated(recording: Recording) -> Recording:

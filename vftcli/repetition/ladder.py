@@ -14,29 +14,21 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.remarks import Remark, fact
 
-LOW_PASS = 12.0
-"""Default cutoff of the zero-phase low-pass. [Hz]"""
-
+LOW_PASS = 12.0  #: Default cutoff of the zero-phase low-pass. [Hz]
+#: A rung further up, or the low-pass, must bring the expected error down to this share.
 WORTH = 0.97
-"""A rung further up, or the low-pass, must bring the expected error down to this share."""
 
 
 class Rung(NamedTuple):
-    """One way of alignment.
+    """One way of alignment."""
 
-    Attributes:
-        clock: The pairing it starts from: "commanded" or "found".
-        phase: Whether partners are moved to the nearest place on the joint-space path.
-        corrected: Whether the model's torque of the remaining motion difference is taken off.
-        title: What it does, in words.
-    """
-
-    clock: str
-    phase: bool
-    corrected: bool
-    title: str
+    clock: str  #: The pairing it starts from: "commanded" or "found".
+    phase: bool  #: Whether partners are moved to the nearest place on the joint-space path.
+    corrected: bool  #: Whether the model's torque of the remaining motion difference is taken off.
+    title: str  #: What it does, in words.
 
 
+#: Name at the command line → rung, from the lowest.
 RUNGS: dict[str, Rung] = {
     "commanded": Rung("commanded", False, False, "the stated period as it is"),
     "period": Rung("found", False, False, "the period (or shift) found on the joint positions"),
@@ -45,23 +37,15 @@ RUNGS: dict[str, Rung] = {
         "found", True, True, "joint-space phase and the model's torque of the motion difference"
     ),
 }
-"""Name at the command line → rung, from the lowest."""
 
 
 class Difference(NamedTuple):
-    """A two-cycle difference made on one rung.
+    """A two-cycle difference made on one rung."""
 
-    Attributes:
-        rung: Its name in `RUNGS`.
-        cutoff: Cutoff of the zero-phase low-pass, None without. [Hz]
-        tau: τ_ext, NaN where there is no partner. (T, n) [N·m]
-        error: What is known of its own error.
-    """
-
-    rung: str
-    cutoff: float | None
-    tau: Array
-    error: ErrorModel
+    rung: str  #: Its name in `RUNGS`.
+    cutoff: float | None  #: Cutoff of the zero-phase low-pass, None without. [Hz]
+    tau: Array  #: τ_ext, NaN where there is no partner. (T, n) [N·m]
+    error: ErrorModel  #: What is known of its own error.
 
     def remark(self, code: str, **values: Any) -> Remark:  # noqa: ANN401 - any value
         """A remark on this rung, by another code, -filtered, where it is low-passed."""
@@ -110,9 +94,6 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
 
     With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
     bracket is exact; without it the two motions are taken to be the same.
-
-    Raises:
-        ReferenceTorqueError: If hardly a sample has a partner.
     """
     motion, known = laid.motion, laid.known
     if np.count_nonzero(known) < 16:
@@ -133,15 +114,10 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
 
 
 class Climbed(NamedTuple):
-    """What the rungs brought.
+    """What the rungs brought."""
 
-    Attributes:
-        chosen: The difference that is most certain.
-        floors: The floor of each rung.
-    """
-
-    chosen: Difference
-    floors: tuple[Remark, ...]
+    chosen: Difference  #: The difference that is most certain.
+    floors: tuple[Remark, ...]  #: The floor of each rung.
 
 
 def most_certain(made: Iterable[Difference]) -> Climbed:

@@ -10,15 +10,13 @@ from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import Pairing, mean_of
 from vftcli.signals.arrays import Array, Mask
 
+#: A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]
 STUCK = 0.3
-"""A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]"""
-
+#: Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
+#: e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]
 HEARD = 2.0
-"""Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
-e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]"""
-
+#: Share of the stiction that cancels between two stops of the same length at the same place.
 REPEATED = 0.5
-"""Share of the stiction that cancels between two stops of the same length at the same place."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,15 +24,11 @@ class LaidOver:
     """A log and its free runs, each sample of the log with its partners.
 
     Every rung of the alignment ladder and every low-pass starts from these; each is made once.
-
-    Attributes:
-        motion: The log.
-        pairings: Its free runs.
-        found: What else was found of them, by what it is and the cutoff that it was found for.
     """
 
-    motion: DriveRun
-    pairings: Sequence[Pairing]
+    motion: DriveRun  #: The log.
+    pairings: Sequence[Pairing]  #: Its free runs.
+    #: What else was found of them, by what it is and the cutoff that it was found for.
     found: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
 
     def once(self, what: str, cutoff: float, find: Callable[[], Array]) -> Array:

@@ -11,26 +11,16 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
 from vftcli.signals.series import resample_columns
 
-GAP = 5.5
-"""A gap of more than this many median steps is not interpolated across."""
-
-FARTHEST = 0.1
-"""How far phase may lie from the clock's word, as the low-passed shift. [s]"""
-
-PHASE_CUTOFF = 8.0
-"""Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]"""
+GAP = 5.5  #: A gap of more than this many median steps is not interpolated across.
+FARTHEST = 0.1  #: How far phase may lie from the clock's word, as the low-passed shift. [s]
+PHASE_CUTOFF = 8.0  #: Cutoff of the joint-space phase shift: a servo's compliance is slower. [Hz]
 
 
 class Pairing(NamedTuple):
-    """A free run, and where in it each sample of the log belongs.
+    """A free run, and where in it each sample of the log belongs."""
 
-    Attributes:
-        free: The free run; the log itself where cycles of one log are compared.
-        times: Instant on the free run's clock, NaN where there is none. (T,) [s]
-    """
-
-    free: DriveRun
-    times: Array
+    free: DriveRun  #: The free run; the log itself where cycles of one log are compared.
+    times: Array  #: Instant on the free run's clock, NaN where there is none. (T,) [s]
 
     @property
     def known(self) -> Mask:

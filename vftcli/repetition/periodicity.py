@@ -11,44 +11,28 @@ from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 
-LEAST_REPEATED = 0.15
-"""Share of the moving part of the log that must be there twice."""
+LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
 
+#: Positions return if a quarter of them come back within this share of their own spread.
+#:
+#: A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
 RETURNS = 0.015
-"""Positions return if a quarter of them come back within this share of their own spread.
 
-A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
-"""
-
+#: A valley is worth refining if a quarter of the samples come back within this share.
 SHORTLIST = 0.15
-"""A valley is worth refining if a quarter of the samples come back within this share."""
-
-CANDIDATES = 40
-"""Valleys looked at, the deepest ones."""
-
-MULTIPLES = 12
-"""Multiples of the period that refine it."""
-
-AROUND = 0.03
-"""How far from a stated period the true one is looked for, relative: clocks drift."""
-
-
-ENOUGH = 2560
-"""Samples that refine a period: more of them only take longer."""
-
+CANDIDATES = 40  #: Valleys looked at, the deepest ones.
+MULTIPLES = 12  #: Multiples of the period that refine it.
+AROUND = 0.03  #: How far from a stated period the true one is looked for, relative: clocks drift.
+ENOUGH = 2560  #: Samples that refine a period: more of them only take longer.
+#: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0
-"""Spans this many times what the samples fill at their usual step are gaps, not motion."""
 
 
 class Period(NamedTuple):
-    """A motion's period.
+    """A motion's period."""
 
-    Attributes:
-        seconds: On the log's own clock. [s]
-        deviation: Lower quartile over time of the joint-position distance after one period. [rad]
-    """
-
-    seconds: float
+    seconds: float  #: On the log's own clock. [s]
+    #: Lower quartile over time of the joint-position distance after one period. [rad]
     deviation: float
 
 
@@ -63,9 +47,6 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     Args:
         recording: The log.
         stated: The commanded period, if known: the search stays within `AROUND` of it. [s]
-
-    Raises:
-        ReferenceTorqueError: If the arm does not move, or its positions do not return.
     """
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))
@@ -119,11 +100,7 @@ def check_stated(recording: Recording, stated: float | None, duration: float) ->
 
 
 def moving_part(recording: Recording) -> tuple[Array, Array]:
-    """Clock [s] and positions [rad] without the rest before and after the motion.
-
-    Raises:
-        ReferenceTorqueError: If the arm does not move at all.
-    """
+    """Clock [s] and positions [rad] without the rest before and after the motion."""
     t, q = recording.t, recording.q
     if recording.samples < 8:
         raise ReferenceTorqueError(

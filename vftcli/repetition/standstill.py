@@ -6,17 +6,10 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import grown, runs_of
 from vftcli.signals.series import median_step
 
-STILL = 0.01
-"""Speed below which a joint counts as standing. [rad/s]"""
-
-LEAST = 0.25
-"""Shorter stops are reversals, which the friction model's account of them covers. [s]"""
-
-BREAKAWAY = 0.1
-"""Time around a stop in which the joint settles or breaks away. [s]"""
-
-AROUND = 0.15
-"""Time before and after a sample that says whether the joint rests in it. [s]"""
+STILL = 0.01  #: Speed below which a joint counts as standing. [rad/s]
+LEAST = 0.25  #: Shorter stops are reversals, which the friction model's account of them covers. [s]
+BREAKAWAY = 0.1  #: Time around a stop in which the joint settles or breaks away. [s]
+AROUND = 0.15  #: Time before and after a sample that says whether the joint rests in it. [s]
 
 
 def duration(t: Array, dq: Array) -> Array:

@@ -21,25 +21,18 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
-BLOCK = 1.0
-"""Length of the pieces whose scatter tells chance from change. [s]"""
-
+BLOCK = 1.0  #: Length of the pieces whose scatter tells chance from change. [s]
+#: Standard errors from which on a change is believed: contacts alone rarely look like one.
 SURE = 3.0
-"""Standard errors from which on a change is believed: contacts alone rarely look like one."""
 
 
 class Partners(NamedTuple):
-    """A log's free motion, laid under it.
+    """A log's free motion, laid under it."""
 
-    Attributes:
-        clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
-        remarks: How they were found.
-        free: Whether a sample is itself free, so that its difference is all error. (T,)
-    """
-
+    #: "found" and, where a period is stated, "commanded" → one pairing a free run.
     clocks: Mapping[str, Sequence[Pairing]]
-    remarks: tuple[Remark, ...]
-    free: Mask
+    remarks: tuple[Remark, ...]  #: How they were found.
+    free: Mask  #: Whether a sample is itself free, so that its difference is all error. (T,)
 
 
 def two_cycle_difference(
@@ -73,10 +66,6 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
     or more cycles of the same log, which then have no reference of their own unless there are two,
     or other logs of the same motion.
-
-    Raises:
-        ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
-        MissingSignalError: If a log has neither currents nor torques, or no velocities.
     """
     log, choice = motion.log, motion.choice
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -140,11 +129,7 @@ def partners_in_log(motion: FreeMotion) -> Partners:
 
 
 def partners_in_logs(motion: FreeMotion) -> Partners:
-    """Free runs in other logs, laid under a log.
-
-    Raises:
-        ReferenceTorqueError: If one is not of the same motion, or cycles of the log are asked for.
-    """
+    """Free runs in other logs, laid under a log."""
     if motion.choice.cycles or motion.choice.period is not None:
         raise ReferenceTorqueError(
             "--period and --free-cycles are for cycles of one log; leave them away with --free"
@@ -168,11 +153,7 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
 
 
 def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None, ...]:
-    """Cutoffs of the low-pass to make: both none and the default for "auto". [Hz]
-
-    Raises:
-        ReferenceTorqueError: If it is not below half the sample rate.
-    """
+    """Cutoffs of the low-pass to make: both none and the default for "auto". [Hz]"""
     if low_pass is None:
         return (None,)
     if isinstance(low_pass, str):
@@ -203,11 +184,7 @@ def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
 
 
 def pair_runs(first: Pairing, second: Pairing) -> Pairing:
-    """Pair one free run with another by way of the log both are laid under.
-
-    Raises:
-        ReferenceTorqueError: If they share no part of the motion.
-    """
+    """Pair one free run with another by way of the log both are laid under."""
     both = first.known & second.known
     if np.count_nonzero(both) < 2:
         raise ReferenceTorqueError(

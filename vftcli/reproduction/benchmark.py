@@ -24,23 +24,14 @@ from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
-SAMPLES = 30_060
-"""Samples of the paper's Table II."""
-
+SAMPLES = 30_060  #: Samples of the paper's Table II.
+#: Length of the part that counts as free for the observers that the log tunes. [s]
 FREE_SECONDS = 8.0
-"""Length of the part that counts as free for the observers that the log tunes. [s]"""
-
-TUNED = ("kfo-auto", "rts-auto")
-"""Observers that are timed with their tuning."""
-
-SMOOTHER = "wrench smoother"
-"""Name of the smoother of the whole log's wrench."""
-
-LOOKING_BACK = (BEST, "kfo-rts", *TUNED)
-"""Observers that need a complete log."""
-
+TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
+SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
+LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
+#: The paper's total times over 30 060 samples on its laptop. [s]
 PAPER_TABLE_2 = {"fdo": 10.869, "gmo": 10.541, "kfo-fe": 17.578, "kfo-zoh": 58.363}
-"""The paper's total times over 30 060 samples on its laptop. [s]"""
 
 
 @dataclass

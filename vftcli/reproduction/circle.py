@@ -17,22 +17,17 @@ from vftcli.simulation import load_scenario, simulate
 
 SCENARIO = "ur5-table1"
 
-EQUAL = "at 1.59 Hz"
-"""Every observer moved to FDO's bandwidth, 10 rad/s."""
-
+EQUAL = "at 1.59 Hz"  #: Every observer moved to FDO's bandwidth, 10 rad/s.
+#: Variant → its observers.
 VARIANTS = {
     AS_PRINTED: ObserverChoice(names=PAPER, as_printed=True),
     CORRECTED: ObserverChoice(names=PAPER),
     DENSITY: ObserverChoice.parsed(observer=PAPER, assignments=["kfo.noise_convention=density"]),
     EQUAL: ObserverChoice.parsed(observer=PAPER, match="bandwidth=1.59"),
 }
-"""Variant → its observers."""
-
+#: The paper's difference: cycle by cycle, neither corrected nor filtered.
 PRINTED_REFERENCE = FreeChoice(period=4.0, alignment="period", low_pass=None)
-"""The paper's difference: cycle by cycle, neither corrected nor filtered."""
-
-FREE = 4.0
-"""Length of the free cycle, and from when on its estimates are judged. [s]"""
+FREE = 4.0  #: Length of the free cycle, and from when on its estimates are judged. [s]
 
 
 def tapped_circle(seed: int) -> RunResult:

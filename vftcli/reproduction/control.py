@@ -25,36 +25,19 @@ from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.sensing import log_rate
 
+#: Variant → how the sensor's Kalman filter reads R and Q.
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
-"""Variant → how the sensor's Kalman filter reads R and Q."""
-
+#: Variant → the same with a traditional controller that the whole force always drives.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
-"""Variant → the same with a traditional controller that the whole force always drives."""
-
-ALPHAS = (1.0, 1.3, 1.6, 1.9)
-"""Values of α that Figs. 7 and 10 compare."""
-
-CONTACTS = 2
-"""Times that the hand takes hold, in either scenario."""
-
-HOLD = 2.5
-"""A drag of a contact begins within this time of its force. [s]"""
-
+ALPHAS = (1.0, 1.3, 1.6, 1.9)  #: Values of α that Figs. 7 and 10 compare.
+CONTACTS = 2  #: Times that the hand takes hold, in either scenario.
+HOLD = 2.5  #: A drag of a contact begins within this time of its force. [s]
+#: Deviations up to which a release is tried: from .1 on the turn comes ever sooner. [m, rad]
 FARTHEST_RELEASE = 0.5
-"""Deviations up to which a release is tried: from .1 on the turn comes ever sooner. [m, rad]"""
 
 
 def closed_loop(scenario: str, figures: tuple[str, str], seed: int) -> RunResult:
-    """Latencies of a controller in the loop, and its force through controllers of every α.
-
-    Args:
-        scenario: The hand's.
-        figures: The items that show its traces and those of the comparison.
-        seed: Of everything drawn.
-
-    Raises:
-        UnstableError: If the arm runs away.
-    """
+    """Latencies of a controller in the loop, and its force through controllers of every α."""
     values: Values = {}
     charts: dict[str, Chart] = {}
     for variant in CONVENTIONS:

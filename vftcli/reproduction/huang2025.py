@@ -30,14 +30,14 @@ from vftcli.reproduction.paper import (
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.wrench import AXES
 
+#: Numbers to tune: 1, n and 3n.
 NUMBERS = {"fdo": "1", "gmo": "6", "kfo-fe": "18", "kfo-zoh": "18"}
-"""Numbers to tune: 1, n and 3n."""
-
+#: Zero drift of the virtual sensor on the unloaded Panda, Sec. IV-D. [N, N·m]
 DRIFT = ("-0.43166", "-0.53348", "0.83768", "-0.16294", "0.13407", "0.09103")
-"""Zero drift of the virtual sensor on the unloaded Panda, Sec. IV-D. [N, N·m]"""
 
 XI_1 = "ξ = 1"
 
+#: The longest first: two processes then end at about the same time.
 EXPERIMENTS = {
     "drag": Experiment("the UR5 dragged, controller in the loop (ur5-drag)", control.drag),
     "twist": Experiment("the UR5 twisted, controller in the loop (ur5-twist)", control.twist),
@@ -57,7 +57,6 @@ EXPERIMENTS = {
     "turns": Experiment("the latest turn of a released UR5", control.latest_turns, (0,)),
     "time": Experiment("computing time", computing_time, (0,), alone=True),
 }
-"""The longest first: two processes then end at about the same time."""
 
 
 def picture(label: str, title: str, why: str) -> PaperItem:
@@ -66,8 +65,7 @@ def picture(label: str, title: str, why: str) -> PaperItem:
 
 
 SEVERAL = (AS_PRINTED, CORRECTED, DENSITY)
-COMPARED = (*SEVERAL, *control.UNGATED.values())
-"""Columns of Figs. 6 and 9, and of 7 and 10."""
+COMPARED = (*SEVERAL, *control.UNGATED.values())  #: Columns of Figs. 6 and 9, and of 7 and 10.
 
 ITEMS = {
     "table1": PaperItem(

@@ -4,8 +4,8 @@ from vftcli.observers import PAPER
 from vftcli.reproduction.control import ALPHAS
 from vftcli.reproduction.paper import PrintedLine
 
+#: Observer → what the paper calls it.
 NAMES = {"fdo": "FDO", "gmo": "GMO", "kfo-fe": "KFO-FE", "kfo-zoh": "KFO-ZOH"}
-"""Observer → what the paper calls it."""
 
 
 def each(

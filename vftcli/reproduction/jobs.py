@@ -18,29 +18,20 @@ from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem
 from vftcli.reproduction.papers import paper_of
 from vftcli.signals.errors import VftError
 
-MOST_WORKERS = 2
-"""Processes beside one another: what a full run was measured with."""
+MOST_WORKERS = 2  #: Processes beside one another: what a full run was measured with.
 
 
 class Job(NamedTuple):
-    """One experiment with one seed.
+    """One experiment with one seed."""
 
-    Attributes:
-        paper: Name of the paper.
-        experiment: Name of the experiment.
-        seed: Of everything drawn.
-    """
-
-    paper: str
-    experiment: str
-    seed: int
+    paper: str  #: Name of the paper.
+    experiment: str  #: Name of the experiment.
+    seed: int  #: Of everything drawn.
 
 
+#: Told how many jobs are done, how many there are, and which one ended.
 Told = Callable[[int, int, str], None]
-"""Told how many jobs are done, how many there are, and which one ended."""
-
-Result = RunResult | str
-"""What a job gave, or the one line on why it failed."""
+Result = RunResult | str  #: What a job gave, or the one line on why it failed.
 
 
 def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
@@ -81,13 +72,7 @@ def end_with_terminal() -> None:
 
 
 def run_jobs(jobs: Sequence[Job], tell: Told, workers: int | None = None) -> dict[Job, Result]:
-    """Run jobs, those that take the time last and by themselves.
-
-    Args:
-        jobs: They.
-        tell: Who is told of each that ended.
-        workers: Processes at most; None for as many as there are cores, `MOST_WORKERS` at most.
-    """
+    """Run jobs, those that take the time last and by themselves."""
     alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
     beside = [job for job in jobs if job not in alone]
     count = min(workers or min(cores(), MOST_WORKERS), len(beside))

@@ -17,14 +17,12 @@ from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
 
-PAGE, TEXT = "index.html", "reproduction.md"
-"""The page, and the same in Markdown."""
-
+PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and the same in Markdown.
+#: What the overview compares.
 RATIOS = (
     "Ours / print: the median of the lines that print a number, in brackets the range, of the "
     "column that stands behind it."
 )
-"""What the overview compares."""
 
 
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:

@@ -28,39 +28,25 @@ from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
-KFO = ("kfo-fe",)
-"""The observer that the paper's virtual sensor takes."""
-
+KFO = ("kfo-fe",)  #: The observer that the paper's virtual sensor takes.
+#: Variant → its observer.
 VARIANTS = {
     AS_PRINTED: ObserverChoice(names=KFO, as_printed=True),
     CORRECTED: ObserverChoice(names=KFO),
     DENSITY: ObserverChoice.parsed(observer=KFO, assignments=["kfo.noise_convention=density"]),
 }
-"""Variant → its observer."""
-
-ZEROED = "zero removed"
-"""Corrected, and the mean of an unloaded span taken off."""
-
+ZEROED = "zero removed"  #: Corrected, and the mean of an unloaded span taken off.
+#: Corrected, on an arm with a soft position loop: its joints slide where a stiff one holds them.
 SOFT = "soft servo"
-"""Corrected, on an arm with a soft position loop: its joints slide where a stiff one holds them."""
-
-UNTOUCHED = 0.5
-"""True force on the flange below which nothing touches the arm. [N]"""
-
+UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm. [N]
+#: Where the simulated sensor sits on the flange, as its scenario says. [m, rad]
 SENSOR_POSE = "0,0,0.02,0,0,0.5"
-"""Where the simulated sensor sits on the flange, as its scenario says. [m, rad]"""
-
-UNLOADED = {"ur5": (0.5, 2.8), "panda": (2.0, 3.9)}
-"""When nothing touches the arm. [s]"""
-
-HUNG = (6.0, 8.7)
-"""When the bearing alone hangs on the Panda. [s]"""
-
+UNLOADED = {"ur5": (0.5, 2.8), "panda": (2.0, 3.9)}  #: When nothing touches the arm. [s]
+HUNG = (6.0, 8.7)  #: When the bearing alone hangs on the Panda. [s]
+#: What is done with the Panda, and when. [s]
 PHASES = {"guided": (9.2, 12.0), "pressed": (13.8, 16.4), "knocked": (23.8, 26.4)}
-"""What is done with the Panda, and when. [s]"""
-
+#: The Panda's sampling interval: the control period that no thread of its own would need. [s]
 SAMPLED = 0.001
-"""The Panda's sampling interval: the control period that no thread of its own would need. [s]"""
 
 
 def dragged_sensor(seed: int) -> RunResult:

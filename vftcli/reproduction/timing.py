@@ -14,14 +14,11 @@ from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 
+#: Samples the paper's way runs over, one after another; its time is scaled to all samples.
 SCRIPT_SAMPLES = 1_500
-"""Samples the paper's way runs over, one after another; its time is scaled to all samples."""
-
-ROUNDS = 3
-"""Interleaved repetitions; the median counts."""
-
+ROUNDS = 3  #: Interleaved repetitions; the median counts.
+#: Observer → key of how much more the zero-order hold costs.
 RATIOS = {"fdo": "zoh/fdo", "kfo-fe": "zoh/kfo-fe"}
-"""Observer → key of how much more the zero-order hold costs."""
 
 
 def computing_time(_seed: int) -> RunResult:

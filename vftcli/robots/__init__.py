@@ -10,6 +10,7 @@ from vftcli.robots.robot_file import DESCRIPTIONS
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean
 
+#: Maker → its built-in profiles.
 MAKERS = {
     "Universal Robots": (
         *("ur3", "ur5", "ur10"),
@@ -21,14 +22,12 @@ MAKERS = {
     "UFACTORY": ("xarm6", "xarm7"),
     "Doosan Robotics": ("m1013",),
 }
-"""Maker → its built-in profiles."""
-
+#: Built-in profile name → its file.
 PROFILES: dict[str, Path] = {
     name: Path(__file__).parent / "profiles" / f"{name}.toml"
     for names in MAKERS.values()
     for name in names
 }
-"""Built-in profile name → its file."""
 
 
 def plain_name(word: str) -> str:

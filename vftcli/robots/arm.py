@@ -13,49 +13,27 @@ from vftcli.robots.tree import BodyTree, TreeJoint
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean
 
-BEFORE_A_HAND = 4
-"""Joints that an arm has at least before what it branches into may be a hand."""
-
-HAND = 0.25
-"""Share of the arm's mass that a finger stays below, with all that it carries."""
-
-LISTED = 12
-"""Names that a message lists."""
+BEFORE_A_HAND = 4  #: Joints that an arm has at least before what it branches into may be a hand.
+HAND = 0.25  #: Share of the arm's mass that a finger stays below, with all that it carries.
+LISTED = 12  #: Names that a message lists.
 
 
 class TreeArm(NamedTuple):
-    """The joints of an arm, and where it ends.
+    """The joints of an arm, and where it ends."""
 
-    Attributes:
-        joints: Its joints, base to tip.
-        end: The link that is the flange, "" where the usual names decide.
-    """
-
-    joints: tuple[TreeJoint, ...]
-    end: str
+    joints: tuple[TreeJoint, ...]  #: Its joints, base to tip.
+    end: str  #: The link that is the flange, "" where the usual names decide.
 
 
 @dataclass(frozen=True)
 class ArmSearch:
-    """A tree some of whose joints are locked, and the arms in it.
+    """A tree some of whose joints are locked, and the arms in it."""
 
-    Attributes:
-        tree: The tree.
-        locked: Names of joints that are held whatever they are.
-    """
-
-    tree: BodyTree
-    locked: Set[str]
+    tree: BodyTree  #: The tree.
+    locked: Set[str]  #: Names of joints that are held whatever they are.
 
     def find(self, tip: str = "") -> TreeArm:
-        """The arm, or the one that a tip names.
-
-        Args:
-            tip: A link or a joint at the arm's end.
-
-        Raises:
-            RobotError: If there is none, or there are several alike.
-        """
+        """The arm, or the one that a tip names."""
         if tip:
             return self.to(tip)
         arms = {arm: None for leaf in self.leaves() if (arm := self.along(leaf))}
@@ -134,11 +112,7 @@ class ArmSearch:
                 yield joint
 
     def along(self, leaf: TreeJoint) -> tuple[str, ...]:
-        """The joints of the arm on the way to a leaf; none where nothing turns.
-
-        Raises:
-            RobotError: If one of its joints follows another.
-        """
+        """The joints of the arm on the way to a leaf; none where nothing turns."""
         path = self.tree.path_to(leaf.child)
         run = self.longest(path)
         arm = self.without_hand(run)
@@ -175,11 +149,7 @@ class ArmSearch:
         return run
 
     def refuse_followers(self, path: Sequence[TreeJoint], run: Sequence[TreeJoint]) -> None:
-        """Refuse a joint within the arm that follows another; fingers behind it may.
-
-        Raises:
-            RobotError: If there is one between joints that turn by themselves.
-        """
+        """Refuse a joint within the arm that follows another; fingers behind it may."""
         turning = [k for k, joint in enumerate(path) if joint.turns and self.moves(joint)]
         for k, joint in enumerate(path):
             if joint.follows and run and turning[0] < k < turning[-1]:

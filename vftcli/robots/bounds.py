@@ -11,17 +11,11 @@ from typing import NamedTuple
 
 
 class Bound(NamedTuple):
-    """The range of a number of a robot file, its ends included.
+    """The range of a number of a robot file, its ends included."""
 
-    Attributes:
-        low: Smallest value.
-        high: Largest value.
-        unit: What both are in, "" for a pure number.
-    """
-
-    low: float
-    high: float
-    unit: str
+    low: float  #: Smallest value.
+    high: float  #: Largest value.
+    unit: str  #: What both are in, "" for a pure number.
 
     def broken(self, key: str, values: Sequence[float]) -> str:
         """Say which of the values of a key lies outside, or "" if none does."""
@@ -45,9 +39,9 @@ ANGLE = either_way(4.0 * math.pi, "rad")  # two turns; degrees written for radia
 TRAVEL = either_way(1e4, "rad")  # a joint may turn on and on, as a winch does
 TORQUE = either_way(1e6, "N·m")
 TENSOR = either_way(1e6, "kg·m²")  # the heaviest body at a tenth of the longest lever
+#: Smallest value of what is divided by: no drive constant, velocity or rate is smaller.
 TINY = 1e-9
-"""Smallest value of what is divided by: no drive constant, velocity or rate is smaller."""
-
+#: Key of a robot file → its bound; in a list every number is held to it.
 BOUNDS: dict[str, Bound] = {
     "a": LENGTH,
     "d": LENGTH,
@@ -94,13 +88,9 @@ BOUNDS: dict[str, Bound] = {
     "slope": either_way(1e6, "s/rad"),
     "shift": either_way(1e3, "rad/s"),
 }
-"""Key of a robot file → its bound; in a list every number is held to it."""
-
-UNNAMED = either_way(1e6, "")
-"""The bound of a number whose key is not listed."""
-
+UNNAMED = either_way(1e6, "")  #: The bound of a number whose key is not listed.
+#: Least mass of all moving bodies together: the lightest arms have servos of a few grams. [kg]
 LIGHTEST = 0.05
-"""Least mass of all moving bodies together: the lightest arms have servos of a few grams. [kg]"""
 
 
 def out_of_bounds(key: str, values: Sequence[float]) -> str:

@@ -19,17 +19,11 @@ from vftcli.signals.shown import Shown
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Payload(Shown):
-    """A rigid load on the flange.
+    """A rigid load on the flange."""
 
-    Attributes:
-        mass: Mass. [kg]
-        com: Centre of mass in flange axes, from the flange origin. (3,) [m]
-        inertia: Inertia tensor about the centre of mass, in flange axes. (3, 3) [kg·m²]
-    """
-
-    mass: float
-    com: Array
-    inertia: Array
+    mass: float  #: Mass. [kg]
+    com: Array  #: Centre of mass in flange axes, from the flange origin. (3,) [m]
+    inertia: Array  #: Inertia tensor about the centre of mass, in flange axes. (3, 3) [kg·m²]
 
     def __post_init__(self) -> None:
         seal(self, "com", "inertia")
@@ -41,31 +35,19 @@ class Payload(Shown):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Chain(Shown):
-    """Geometry and inertia of an n-joint revolute serial arm at rest on its base.
+    """Geometry and inertia of an n-joint revolute serial arm at rest on its base."""
 
-    Attributes:
-        names: Joint names, base to tip.
-        rotation: Orientation of frame j in frame j−1 at q = 0. (n, 3, 3)
-        translation: Origin of frame j in frame j−1. (n, 3) [m]
-        mass: Link masses. (n,) [kg]
-        com: Centres of mass in the link's own frame. (n, 3) [m]
-        inertia: Inertia tensors about the centre of mass, in the link's axes. (n, 3, 3) [kg·m²]
-        rotor_inertia: Rotor inertia reflected to the joint side. (n,) [kg·m²]
-        gravity: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
-        flange_rotation: Orientation of the flange in frame n. (3, 3)
-        flange_translation: Origin of the flange in frame n. (3,) [m]
-    """
-
-    names: tuple[str, ...]
-    rotation: Array
-    translation: Array
-    mass: Array
-    com: Array
+    names: tuple[str, ...]  #: Joint names, base to tip.
+    rotation: Array  #: Orientation of frame j in frame j−1 at q = 0. (n, 3, 3)
+    translation: Array  #: Origin of frame j in frame j−1. (n, 3) [m]
+    mass: Array  #: Link masses. (n,) [kg]
+    com: Array  #: Centres of mass in the link's own frame. (n, 3) [m]
+    #: Inertia tensors about the centre of mass, in the link's axes. (n, 3, 3) [kg·m²]
     inertia: Array
-    rotor_inertia: Array
-    gravity: Array
-    flange_rotation: Array
-    flange_translation: Array
+    rotor_inertia: Array  #: Rotor inertia reflected to the joint side. (n,) [kg·m²]
+    gravity: Array  #: Gravity vector in base axes, (0, 0, −9.81) for an upright base. (3,) [m/s²]
+    flange_rotation: Array  #: Orientation of the flange in frame n. (3, 3)
+    flange_translation: Array  #: Origin of the flange in frame n. (3,) [m]
 
     def __post_init__(self) -> None:
         n = self.joints

@@ -10,33 +10,28 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import assignment, check_known
 from vftcli.signals.recording import Recording
 
+#: Values of ``--friction``: the robot file's, none at all, or that of a simulator's description.
 FRICTION = ("profile", "none", "model")
-"""Values of ``--friction``: the robot file's, none at all, or that of a simulator's description."""
-DECLARED = "log"
-"""Value of ``--payload``: what the log says that the controller was told of."""
+DECLARED = "log"  #: Value of ``--payload``: what the log says that the controller was told of.
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotChoice:
     """Which arm made a log, and how it is modelled.
 
-    Attributes:
-        name: Profile name, robot file or description, None to take what the log settles.
-        friction: "profile", "none" or "model".
-        payload: Name of a ``[payload.NAME]`` of the robot file to mount, "log" for the payload that
-            the log says the controller was told of, or None.
-        tip: The link or joint at the arm's end in a description, "" where that is not said.
-        arguments: Arguments of a xacro, each ``NAME=VALUE``.
-
     Raises:
         ParameterError: If friction is none of these, or an argument no NAME=VALUE.
     """
 
+    #: Profile name, robot file or description, None to take what the log settles.
     name: str | None = None
-    friction: str = "profile"
+    friction: str = "profile"  #: "profile", "none" or "model".
+    #: Name of a ``[payload.NAME]`` of the robot file to mount, "log" for the payload that the log
+    #: says the controller was told of, or None.
     payload: str | None = None
+    #: The link or joint at the arm's end in a description, "" where that is not said.
     tip: str = ""
-    arguments: tuple[str, ...] = ()
+    arguments: tuple[str, ...] = ()  #: Arguments of a xacro, each ``NAME=VALUE``.
 
     def __post_init__(self) -> None:
         check_known(self.friction, FRICTION, f"--friction {self.friction!r}")
@@ -114,11 +109,7 @@ def choices_for(recording: Recording) -> str:
 
 
 def declared_payload(recording: Recording) -> Payload:
-    """The payload that the controller was told of; nobody tells it an inertia.
-
-    Raises:
-        RobotError: If the log does not say one.
-    """
+    """The payload that the controller was told of; nobody tells it an inertia."""
     mass, com = recording.payload_mass, recording.payload_com
     if mass is None:
         raise RobotError(

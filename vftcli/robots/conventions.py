@@ -18,17 +18,12 @@ from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_matrix
 
 
 class Kinematics(NamedTuple):
-    """What a convention yields.
+    """What a convention yields."""
 
-    Attributes:
-        placements: Pose of chain frame j in chain frame j−1 at q = 0, one a joint.
-        inertial_frames: Pose of the table's inertial frame in chain frame j, one a joint.
-        tip: Pose of the tip in chain frame n.
-    """
-
-    placements: list[Pose]
+    placements: list[Pose]  #: Pose of chain frame j in chain frame j−1 at q = 0, one a joint.
+    #: Pose of the table's inertial frame in chain frame j, one a joint.
     inertial_frames: list[Pose]
-    tip: Pose
+    tip: Pose  #: Pose of the tip in chain frame n.
 
 
 Joint = Mapping[str, Any]

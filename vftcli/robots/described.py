@@ -31,37 +31,24 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
+#: First element of a description → who reads it.
 READERS: dict[str, Callable[[Path, ET.Element], BodyTree]] = {
     "robot": urdf_tree,
     "mujoco": mjcf_tree,
 }
-"""First element of a description → who reads it."""
-
+#: First element of what is no description that can be read → what it is, and what to do.
 CONVERSIONS = {
     "sdf": "an SDF; take the robot's URDF, or convert it (sdf2urdf of pysdf, sdformat_urdf of ROS)",
     "mujocoinclude": "a part of an MJCF; take the file that includes it",
     "COLLADA": "a mesh; take the URDF that names it",
 }
-"""First element of what is no description that can be read → what it is, and what to do."""
-
+#: Motion for which the effect of a changed tensor is stated. [rad/s], [rad/s²]
 SPEED, ACCELERATION = 1.0, 2.0
-"""Motion for which the effect of a changed tensor is stated. [rad/s], [rad/s²]"""
-
-POSES = 64
-"""Poses that it is the worst of."""
+POSES = 64  #: Poses that it is the worst of.
 
 
 def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
-    """Read an arm from a URDF, xacro or MJCF, and from the TOML beside it.
-
-    Args:
-        path: The description.
-        tip: The link or joint at the arm's end; "" for the TOML's, or the only arm there is.
-        arguments: A xacro's arguments, each ``NAME=VALUE``.
-
-    Raises:
-        RobotError: If it is none, is unphysical, or has no arm or several.
-    """
+    """Read an arm from a URDF, xacro or MJCF, and from the TOML beside it."""
     text = robot_text(path)
     root = xml_root(text, path)
     remarks: tuple[Remark, ...] = ()
@@ -98,11 +85,7 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
 
 
 def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
-    """The robot of an arm: its chain and limits, the rest from the TOML beside it if there is one.
-
-    Raises:
-        RobotError: If the arm has no mass, or the TOML is wrong.
-    """
+    """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
     chain, name = lumped.chain(), lumped.tree.name
     if why := weightless(float(np.sum(chain.mass))):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
@@ -135,11 +118,7 @@ def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
 
 
 def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:
-    """The joints that `lock = {joint = angle}` holds, whatever they are. [rad or m]
-
-    Raises:
-        RobotError: If it is no such table, or names a joint that does not exist.
-    """
+    """The joints that `lock = {joint = angle}` holds, whatever they are. [rad or m]"""
     table = file.section("lock")
     names = [joint.name for joint in tree.joints if joint.kind != "fixed"]
     for name, value in table.values.items():
@@ -153,11 +132,7 @@ def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:
 
 
 def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]:
-    """The ``[[joints]]`` of the TOML in the chain's order; those of locked joints are left out.
-
-    Raises:
-        RobotError: If one is not in the description.
-    """
+    """The ``[[joints]]`` of the TOML in the chain's order; those of locked joints are left out."""
     tables = {str(table.get("name")): (j, table) for j, table in enumerate(file.tables("joints"))}
     known = {joint.name for joint in tree.joints}
     if unknown := [name for name in tables if name not in known]:

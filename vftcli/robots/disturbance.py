@@ -9,8 +9,7 @@ from vftcli.signals.arrays import Array, Mask, is_uniform
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.series import gaps_of, median_step, resample_columns
 
-GAP = 5.5
-"""A step of more than this many median steps is a gap; no stretch reaches across."""
+GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
 
 def raw_disturbance(terms: DynamicsTerms) -> Array:
@@ -35,23 +34,14 @@ def disturbance_impulse(terms: DynamicsTerms) -> Array:
 
 
 class Blocks(NamedTuple):
-    """The raw disturbance averaged over blocks of time that follow one another.
+    """The raw disturbance averaged over blocks of time that follow one another."""
 
-    Attributes:
-        t: Middle of each block. (K,) [s]
-        length: How long it lasts. (K,) [s]
-        d: Mean disturbance over it. (K, n) [N·m]
-        q: Joint positions at its middle. (K, n) [rad]
-        velocity: Mean joint velocity over it, from the positions. (K, n) [rad/s]
-        known: Whether its disturbance is known: not across a gap of the clock. (K,)
-    """
-
-    t: Array
-    length: Array
-    d: Array
-    q: Array
-    velocity: Array
-    known: Mask
+    t: Array  #: Middle of each block. (K,) [s]
+    length: Array  #: How long it lasts. (K,) [s]
+    d: Array  #: Mean disturbance over it. (K, n) [N·m]
+    q: Array  #: Joint positions at its middle. (K, n) [rad]
+    velocity: Array  #: Mean joint velocity over it, from the positions. (K, n) [rad/s]
+    known: Mask  #: Whether its disturbance is known: not across a gap of the clock. (K,)
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""

@@ -10,17 +10,13 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.recording import Recording
 
+#: How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
+#: the constants of a UR10e's maker. [1]
 CONSTANT_SD, SENSOR_SD = 0.03, 0.01
-"""How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
-the constants of a UR10e's maker. [1]"""
 
 
 def check_joints(recording: Recording, robot: Robot) -> None:
-    """Raise a RobotError unless the log and the robot have the same number of joints.
-
-    Raises:
-        ParameterError: If either is something else, as the name of one.
-    """
+    """Raise a RobotError unless the log and the robot have the same number of joints."""
     check_kind(recording, Recording, "the recording", "vftcli.read(LOG)")
     check_kind(robot, Robot, "the robot", "vftcli.load_robot('ur5')")
     if recording.joints != robot.joints:
@@ -61,10 +57,6 @@ def drive_torque(recording: Recording, robot: Robot) -> Array:
     by currents whose log has only torques uses the torques, and the other way round if its file
     has torque constants. Torques without gravity get the gravity torque g(q) of the arm with its
     payload: τ = e + g(q).
-
-    Raises:
-        MissingSignalError: If the log has neither, or currents without drive constants.
-        RobotError: If the number of joints differs.
     """
     check_joints(recording, robot)
     if all(getattr(recording, name) is None for name in EFFORTS):

@@ -22,11 +22,10 @@ from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
+#: Keys of the presliding friction that may stand beside every model: a [N·m] and s₀ [rad].
 PRESLIDING = ("presliding", "presliding_length")
-"""Keys of the presliding friction that may stand beside every model: a [N·m] and s₀ [rad]."""
-
+#: Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]
 SMOOTHING = 0.01
-"""Velocity at which the smoothed sign tanh(q̇/smoothing) reaches tanh(1), by default. [rad/s]"""
 
 
 def coulomb_viscous(
@@ -165,6 +164,7 @@ def bent_line(
     return torque
 
 
+#: Name in a robot file → function of velocity and the file's parameters.
 MODELS: dict[str, Callable[..., Array]] = {
     "coulomb-viscous": coulomb_viscous,
     "coulomb-viscous-offset": coulomb_viscous,
@@ -175,7 +175,6 @@ MODELS: dict[str, Callable[..., Array]] = {
     "points": bent_line,
     "sigmoid": sigmoid,
 }
-"""Name in a robot file → function of velocity and the file's parameters."""
 
 
 def friction_torque(
@@ -200,9 +199,6 @@ def friction_torque(
             joints. (T, n)
         temperature: Joint temperatures, NaN where not measured; None for those at which the models
             were taken. (T, n) [°C]
-
-    Raises:
-        ParameterError: If a model's name is unknown.
     """
     torque = empty_series(*dq.shape)
     if not friction:
@@ -286,23 +282,14 @@ def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[R
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:
-    """Torque of each joint's dry friction, unloaded: what can hold it at rest. (n,) [N·m]
-
-    Args:
-        friction: One model a joint; empty for a frictionless arm.
-        joints: Number of joints n.
-    """
+    """Torque of each joint's dry friction, unloaded: what can hold it at rest. (n,) [N·m]"""
     if not friction:
         return np.zeros(joints)
     return np.array([float(dry_torque(joint)) for joint in friction])
 
 
 def dry_torques(robot: Robot) -> Array:
-    """Dry friction of every joint, of a sigmoid its whole amplitude; 0 where none is known. (n,)
-
-    Args:
-        robot: The arm.
-    """
+    """Dry friction of every joint, of a sigmoid its whole amplitude; 0 where none is known. (n,)"""
     dry = dry_friction(robot.friction, robot.joints)
     whole = [abs(joint.parameters.get("amplitude", 0.0)) for joint in robot.friction]
     return np.maximum(dry, whole) if whole else dry
@@ -327,27 +314,23 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     return np.asarray(coulomb + parameters.get("load_coulomb", 0.0) * np.abs(load))
 
 
+#: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and of the
+#: difference of two such torques: analytic.
 ONE_STOP, TWO_STOPS = np.sqrt(1.0 / 3.0), np.sqrt(2.0 / 3.0)
-"""Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and of the
-difference of two such torques: analytic."""
 
+#: The same of two torques where the whole arm rests at the same place after the same motion, as
+#: long as nobody touches it: three runs of one motion of a UR10e differ by .05 to .5 of F_c, .13 in
+#: the mean.
 REPEATED_STOP = 0.13
-"""The same of two torques where the whole arm rests at the same place after the same motion, as
-long as nobody touches it: three runs of one motion of a UR10e differ by .05 to .5 of F_c, .13 in
-the mean."""
 
+#: What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c.
 HELD = 0.45
-"""What an observer reads on a joint at rest, rms: on real UR10e logs .31 to .61 of F_c."""
-
+#: Standard deviation of the wrench smoother's model error at rest, by the same logs.
 REST_SHARE = 0.5
-"""Standard deviation of the wrench smoother's model error at rest, by the same logs."""
-
+#: The same of the list of contacts: what it adds at rest to what was learned, the least that these
+#: logs show, and what it draws anew in the block in which a joint comes to rest.
 CREEP_SHARE, STOP_SHARE = 0.3, 0.7
-"""The same of the list of contacts: what it adds at rest to what was learned, the least that these
-logs show, and what it draws anew in the block in which a joint comes to rest."""
-
+#: The same of both for a joint that rests under a contact: the push re-settles its stiction.
 PUSHED_SHARE = 0.6
-"""The same of both for a joint that rests under a contact: the push re-settles its stiction."""
-
+#: Standard deviation of a momentum observer near a rest: .6 of F_c are the 95 % bound.
 NEAR_REST_SHARE = 0.6 / 1.96
-"""Standard deviation of a momentum observer near a rest: .6 of F_c are the 95 % bound."""

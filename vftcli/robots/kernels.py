@@ -31,29 +31,20 @@ from vftcli.robots.tape import NOTHING, ZERO, Program, Tape, Value, Vector, cons
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.pose import skew
 
+#: Samples worked on at a time: so many that calling an operation costs little beside it; more than
+#: some 6000 gain nothing. Blocks of a long log hold whole chunks.
 CHUNK = 8192
-"""Samples worked on at a time: so many that calling an operation costs little beside it; more than
-some 6000 gain nothing. Blocks of a long log hold whole chunks."""
-
-KEPT = 4
-"""Programs that are kept, some 4 MB each: those of the arm in hand."""
-
+KEPT = 4  #: Programs that are kept, some 4 MB each: those of the arm in hand.
+#: An entry of a rotation, or of an inertia relative to its largest, that is zero but for this.
 ROUNDING = 1e-15
-"""An entry of a rotation, or of an inertia relative to its largest, that is zero but for this."""
 
 
 class MomentumTerms(NamedTuple):
-    """The pieces of the equations of motion that need no acceleration.
+    """The pieces of the equations of motion that need no acceleration."""
 
-    Attributes:
-        p: Generalised momentum M q̇. (T, n) [kg·m²/s]
-        coriolis_transpose_dq: Cᵀq̇. (T, n) [N·m]
-        gravity: Gravity torque g(q). (T, n) [N·m]
-    """
-
-    p: Array
-    coriolis_transpose_dq: Array
-    gravity: Array
+    p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
+    coriolis_transpose_dq: Array  #: Cᵀq̇. (T, n) [N·m]
+    gravity: Array  #: Gravity torque g(q). (T, n) [N·m]
 
 
 def felt_bodies(chain: Chain) -> tuple[Array, Array]:
@@ -134,8 +125,8 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
     return on, results
 
 
+#: The programs that a thread used last; each works in memory of its own.
 PROGRAMS = threading.local()
-"""The programs that a thread used last; each works in memory of its own."""
 
 
 def program_of(chain: Chain, wanted: tuple[str, ...]) -> Program:

@@ -10,15 +10,10 @@ from vftcli.signals.parsing import check_kind
 
 
 class LinkPoses(NamedTuple):
-    """Poses of the chain's frames in the base frame, the flange last.
+    """Poses of the chain's frames in the base frame, the flange last."""
 
-    Attributes:
-        rotation: Orientations. (T, n+1, 3, 3)
-        translation: Origins. (T, n+1, 3) [m]
-    """
-
-    rotation: Array
-    translation: Array
+    rotation: Array  #: Orientations. (T, n+1, 3, 3)
+    translation: Array  #: Origins. (T, n+1, 3) [m]
 
 
 def link_poses(chain: Chain, q: Array) -> LinkPoses:

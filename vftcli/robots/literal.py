@@ -13,8 +13,7 @@ from vftcli.robots.kernels import MomentumTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.packages import needed
 
-STEP = 1e-7
-"""Δq of (10). [rad]"""
+STEP = 1e-7  #: Δq of (10). [rad]
 
 
 def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  # noqa: ANN401

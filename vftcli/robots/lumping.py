@@ -13,27 +13,20 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import IDENTITY, Pose, rotation_onto
 
+#: What a flange is called, with or without a robot's prefix; the first that is there.
 FLANGE_NAMES = (
     "flange", "tool0", "link8", "ee_link", "tcp", "hand_tcp", "attachment_site", "ee",
 )  # fmt: skip
-"""What a flange is called, with or without a robot's prefix; the first that is there."""
-
-BASE = -1
-"""The group of the links that do not move."""
+BASE = -1  #: The group of the links that do not move.
 
 
 @dataclass(frozen=True)
 class LumpedArm:
-    """An arm of a tree with everything else locked.
+    """An arm of a tree with everything else locked."""
 
-    Attributes:
-        tree: The tree.
-        arm: Its arm.
-        angles: Position of each locked joint that is not at zero, by name. [rad or m]
-    """
-
-    tree: BodyTree
-    arm: TreeArm
+    tree: BodyTree  #: The tree.
+    arm: TreeArm  #: Its arm.
+    #: Position of each locked joint that is not at zero, by name. [rad or m]
     angles: Mapping[str, float]
 
     @cached_property
@@ -71,11 +64,7 @@ class LumpedArm:
 
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
-        """The arm's links with all that is locked on them, each in its joint's frame.
-
-        Raises:
-            RobotError: If one of them is unphysical beyond what rounding and carelessness explain.
-        """
+        """The arm's links with all that is locked on them, each in its joint's frame."""
         parts: list[list[Body]] = [[] for _ in self.arm.joints]
         for link in self.tree.links:
             group, (R, r) = self.groups[link]

@@ -20,24 +20,16 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.pose import Pose
 
+#: Pinocchio's name of a joint → its kind; all others are of no use in an arm.
 KINDS = {
     r"JointModelR[XYZ]|JointModelRevoluteUnaligned": "revolute",
     r"JointModelRUB[XYZ]|JointModelRevoluteUnboundedUnaligned": "continuous",
     r"JointModelP[XYZ]|JointModelPrismaticUnaligned": "prismatic",
 }
-"""Pinocchio's name of a joint → its kind; all others are of no use in an arm."""
 
 
 def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
-    """The tree that an MJCF describes: its armature is the rotor inertia.
-
-    Args:
-        path: The file.
-        root: Its element <mujoco>.
-
-    Raises:
-        RobotError: If Pinocchio is not installed, cannot read it, or finds what no robot has.
-    """
+    """The tree that an MJCF describes: its armature is the rotor inertia."""
     if (part := root.find(".//include")) is not None:
         raise RobotError(
             f"{path}: includes {part.get('file')!r}, which Pinocchio would leave out; have MuJoCo "
@@ -104,11 +96,7 @@ def pose_of(placement: Any) -> Pose:  # noqa: ANN401
 
 
 def checked_body(model: Any, index: int, path: Path) -> Body:  # noqa: ANN401
-    """What a joint moves, what is fixed to it included.
-
-    Raises:
-        RobotError: If a number is not finite, or none that a robot has.
-    """
+    """What a joint moves, what is fixed to it included."""
     found = model.inertias[index]
     R = model.jointPlacements[index].rotation
     if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):

@@ -18,9 +18,6 @@ def paired(recording: Recording, robot: Robot) -> Recording:
     """Lay a log on its robot: joints in the robot's order, positions and torques of the link.
 
     Where both have joint names these alone decide, and joints that the robot has not are left out.
-
-    Raises:
-        RobotError: If the log's joints do not cover the robot's; with both lists.
     """
     named = recording.joint_names
     tables = robot.document.get("joints", ())

@@ -21,20 +21,14 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 
-BLOCK = 32
-"""Samples in a block: the Python loop has this length, once a level."""
+BLOCK = 32  #: Samples in a block: the Python loop has this length, once a level.
 
 
 class Play(NamedTuple):
-    """The play operator along a stretch of a log.
+    """The play operator along a stretch of a log."""
 
-    Attributes:
-        state: s, the share of full deflection. (T, n)
-        centre: c after the last sample, from which the next stretch goes on. (n,) [rad]
-    """
-
-    state: Array
-    centre: Array
+    state: Array  #: s, the share of full deflection. (T, n)
+    centre: Array  #: c after the last sample, from which the next stretch goes on. (n,) [rad]
 
 
 def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:

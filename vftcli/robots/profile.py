@@ -24,6 +24,9 @@ SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
 ORIGIN = (0.0, 0.0, 0.0)
 
+#: Friction model → its required and its optional keys in ``[joints.friction]``.
+#:
+#: Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
 FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "coulomb-viscous": (("coulomb", "viscous"), ("smoothing",)),
     "coulomb-viscous-offset": (("coulomb", "viscous"), ("offset", "smoothing")),
@@ -43,19 +46,10 @@ FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
     "points": ((), ("load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing")),
     "sigmoid": (("amplitude", "slope", "shift"), ()),
 }
-"""Friction model → its required and its optional keys in ``[joints.friction]``.
-
-Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
-"""
 
 
 def load_profile(path: Path) -> Robot:
-    """Read a robot file.
-
-    Raises:
-        RobotError: If the file is missing, incomplete or describes no physical arm; the message
-            names the line.
-    """
+    """Read a robot file."""
     root = RobotFile(path).root
     schema = root.values.get("schema", SCHEMA)
     if isinstance(schema, bool) or schema != SCHEMA:
@@ -164,13 +158,7 @@ def build_chain(root: Section, joints: Sequence[Section], kinematics: Kinematics
 def checked_body(
     table: Section, default: Sequence[float] | None = None
 ) -> tuple[float, Array, Array]:
-    """Return mass [kg], centre of mass (3,) [m] and tensor (3, 3) [kg·m²] that a body can have.
-
-    Args:
-        table: Where they stand.
-        default: Six numbers to take for the tensor, and three for the centre, where they are left
-            out; None if they must be given.
-    """
+    """Return mass [kg], centre of mass (3,) [m] and tensor (3, 3) [kg·m²] that a body can have."""
     mass, com = table.number("mass"), table.vector("com", 3, default and default[:3])
     tensor = symmetric(table.vector("inertia", 6, default).tolist())
     if why := unphysical(mass, tensor):

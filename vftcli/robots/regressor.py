@@ -14,14 +14,11 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import cross, skew
 
-LINK = 10
-"""Inertial parameters a link."""
-
+LINK = 10  #: Inertial parameters a link.
+#: Their names, in order.
 INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
-"""Their names, in order."""
-
+#: Row and column of the six tensor entries, in order.
 TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
-"""Row and column of the six tensor entries, in order."""
 
 
 def rotate_z(vectors: Array, cosine: Array, sine: Array) -> Array:

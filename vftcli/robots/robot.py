@@ -13,36 +13,28 @@ from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
 from vftcli.signals.shown import Shown
 
+#: Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]
 REFERENCE = 35.0
-"""Joint temperature that friction is taken for where nobody says one: a warm arm's. [°C]"""
 
 TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class JointFriction(Shown):
-    """Friction of one joint: a model's name and its parameters (the keys of the robot file).
+    """Friction of one joint: a model's name and its parameters (the keys of the robot file)."""
 
-    Attributes:
-        model: A name in `vftcli.robots.friction.MODELS`, or "none".
-        parameters: The model's numbers by key, in SI units of torque, rad and rad/s; beside those
-            of the model `presliding` [N·m] and `presliding_length` [rad], both or neither.
-        speeds: Speeds of the model "points", rising. [rad/s]
-        torques: Friction at these speeds. [N·m]
-        temperature: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
-            `vftcli.robots.temperature`; none where it is not known to follow one.
-        temperature_at: Joint temperature at which the model's numbers hold, None where nobody
-            says. [°C]
-        confidence: Where the numbers come from, in words.
-    """
-
-    model: str = "none"
+    model: str = "none"  #: A name in `vftcli.robots.friction.MODELS`, or "none".
+    #: The model's numbers by key, in SI units of torque, rad and rad/s; beside those of the model
+    #: `presliding` [N·m] and `presliding_length` [rad], both or neither.
     parameters: Mapping[str, float] = field(default_factory=dict)
-    speeds: tuple[float, ...] = ()
-    torques: tuple[float, ...] = ()
+    speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
+    torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
+    #: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
+    #: `vftcli.robots.temperature`; none where it is not known to follow one.
     temperature: tuple[float, ...] = ()
+    #: Joint temperature at which the model's numbers hold, None where nobody says. [°C]
     temperature_at: float | None = None
-    confidence: str = ""
+    confidence: str = ""  #: Where the numbers come from, in words.
 
     @property
     def reference_temperature(self) -> float:
@@ -66,21 +58,13 @@ class JointFriction(Shown):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Limits(Shown):
-    """Joint limits; NaN where the description gives none.
+    """Joint limits; NaN where the description gives none."""
 
-    Attributes:
-        q_min: Lower position limits. (n,) [rad]
-        q_max: Upper position limits. (n,) [rad]
-        qd_max: Speed limits. (n,) [rad/s]
-        tau_max: Torque limits. (n,) [N·m]
-        qdd_max: Acceleration limits. (n,) [rad/s²]
-    """
-
-    q_min: Array
-    q_max: Array
-    qd_max: Array
-    tau_max: Array
-    qdd_max: Array
+    q_min: Array  #: Lower position limits. (n,) [rad]
+    q_max: Array  #: Upper position limits. (n,) [rad]
+    qd_max: Array  #: Speed limits. (n,) [rad/s]
+    tau_max: Array  #: Torque limits. (n,) [N·m]
+    qdd_max: Array  #: Acceleration limits. (n,) [rad/s²]
 
     def __post_init__(self) -> None:
         seal(self, *vars(self))
@@ -88,19 +72,12 @@ class Limits(Shown):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SensorNoise(Shown):
-    """Standard deviations of the joint measurements; NaN where unknown.
+    """Standard deviations of the joint measurements; NaN where unknown."""
 
-    Attributes:
-        current: Motor current. (n,) [A]
-        tau: Joint torque. (n,) [N·m]
-        q: Position. (n,) [rad]
-        qd: Velocity. (n,) [rad/s]
-    """
-
-    current: Array
-    tau: Array
-    q: Array
-    qd: Array
+    current: Array  #: Motor current. (n,) [A]
+    tau: Array  #: Joint torque. (n,) [N·m]
+    q: Array  #: Position. (n,) [rad]
+    qd: Array  #: Velocity. (n,) [rad/s]
 
     def __post_init__(self) -> None:
         seal(self, *vars(self))
@@ -108,64 +85,51 @@ class SensorNoise(Shown):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Robot(Shown):
-    """One arm: chain, drives, friction, limits and the gains its observers start from.
+    """One arm: chain, drives, friction, limits and the gains its observers start from."""
 
-    Attributes:
-        name: Short name, as used with ``--robot``.
-        title: Name for headings.
-        chain: Geometry and inertia of the bare arm.
-        torque_source: What a log of this arm measures: "current", "link_torque" or "joint_torque".
-        torque_constant: Joint torque per motor current, gear included. (n,) [N·m/A]
-        gear: Motor turns per turn of the joint, for a log of the motors' side; None for one of the
-            joints. (n,)
-        efficiency: Share of the motors' torque that arrives behind it, None for all. (n,)
-        friction: One model a joint.
-        limits: Joint limits.
-        noise: Measurement noise.
-        sample_rate_hz: The vendor's own rate, NaN if not given. [Hz]
-        ros_state: ROS 2 message in which its driver publishes the whole state, "" where it has none
-            but JointState.
-        endless: Names of joints that turn on and on: their positions may be logged within a turn.
-        simulated_friction: The friction that a simulator's description gives the joints, for
-            ``--friction model``; empty where there is none.
-        payload: The load mounted on the flange, or None.
-        payloads: Further loads by name, for ``--payload NAME``.
-        gains: Observer name → parameter → number, list or word, as in ``[observers.*]``.
-        tools: Poses of tools in the flange frame, from ``[tool]`` (under "") and ``[tool.NAME]``.
-        sensors: Poses of force/torque sensors in the flange frame, likewise.
-        admittance: The parameters of ``[admittance]``, as the file has them; empty without any.
-        sources: Where the file's numbers come from: keys id, what and ref, in words.
-        published: The publication whose numbers of this arm the tables stand beside, and these.
-        document: The whole parsed robot file, for writing a changed one.
-        remarks: What a user of the numbers should know.
-        path: The file it was loaded from, None for one made in memory.
-    """
-
-    name: str
-    chain: Chain
-    title: str = ""
+    name: str  #: Short name, as used with ``--robot``.
+    chain: Chain  #: Geometry and inertia of the bare arm.
+    title: str = ""  #: Name for headings.
+    #: What a log of this arm measures: "current", "link_torque" or "joint_torque".
     torque_source: str = "joint_torque"
+    #: Joint torque per motor current, gear included. (n,) [N·m/A]
     torque_constant: Array | None = None
+    #: Motor turns per turn of the joint, for a log of the motors' side; None for one of the joints.
+    #: (n,)
     gear: Array | None = None
+    #: Share of the motors' torque that arrives behind it, None for all. (n,)
     efficiency: Array | None = None
-    friction: tuple[JointFriction, ...] = ()
-    limits: Limits
-    noise: SensorNoise
-    sample_rate_hz: float = float("nan")
+    friction: tuple[JointFriction, ...] = ()  #: One model a joint.
+    limits: Limits  #: Joint limits.
+    noise: SensorNoise  #: Measurement noise.
+    sample_rate_hz: float = float("nan")  #: The vendor's own rate, NaN if not given. [Hz]
+    #: ROS 2 message in which its driver publishes the whole state, "" where it has none but
+    #: JointState.
     ros_state: str = ""
+    #: Names of joints that turn on and on: their positions may be logged within a turn.
     endless: tuple[str, ...] = ()
+    #: The friction that a simulator's description gives the joints, for ``--friction model``; empty
+    #: where there is none.
     simulated_friction: tuple[JointFriction, ...] = ()
-    payload: Payload | None = None
+    payload: Payload | None = None  #: The load mounted on the flange, or None.
+    #: Further loads by name, for ``--payload NAME``.
     payloads: Mapping[str, Payload] = field(default_factory=dict)
+    #: Observer name → parameter → number, list or word, as in ``[observers.*]``.
     gains: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    #: Poses of tools in the flange frame, from ``[tool]`` (under "") and ``[tool.NAME]``.
     tools: Mapping[str, Pose] = field(default_factory=dict)
+    #: Poses of force/torque sensors in the flange frame, likewise.
     sensors: Mapping[str, Pose] = field(default_factory=dict)
+    #: The parameters of ``[admittance]``, as the file has them; empty without any.
     admittance: Mapping[str, Any] = field(default_factory=dict)
+    #: Where the file's numbers come from: keys id, what and ref, in words.
     sources: tuple[Mapping[str, Any], ...] = ()
+    #: The publication whose numbers of this arm the tables stand beside, and these.
     published: Mapping[str, Any] = field(default_factory=dict)
+    #: The whole parsed robot file, for writing a changed one.
     document: Mapping[str, Any] = field(default_factory=dict)
-    remarks: tuple[Remark, ...] = ()
-    path: Path | None = None
+    remarks: tuple[Remark, ...] = ()  #: What a user of the numbers should know.
+    path: Path | None = None  #: The file it was loaded from, None for one made in memory.
 
     def __post_init__(self) -> None:
         n = self.joints

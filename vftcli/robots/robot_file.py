@@ -13,11 +13,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.parsing import shown, toml_tables
 
+#: Endings of robot descriptions; what they are their content decides.
 DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
-"""Endings of robot descriptions; what they are their content decides."""
-
-LARGEST = 16 << 20
-"""Largest robot file; one with all its words has a hundredth of it. [B]"""
+LARGEST = 16 << 20  #: Largest robot file; one with all its words has a hundredth of it. [B]
 
 
 class RobotFile:
@@ -62,18 +60,12 @@ class RobotFile:
 
 
 class Section(NamedTuple):
-    """A table of a robot file, whose values are checked as they are read.
+    """A table of a robot file, whose values are checked as they are read."""
 
-    Attributes:
-        file: The file.
-        values: The table.
-        table: Its dotted name, "" for the whole document.
-        joint: Which ``[[joints]]`` it is or belongs to, from 0, or None outside of them.
-    """
-
-    file: RobotFile
-    values: Mapping[str, Any]
-    table: str = ""
+    file: RobotFile  #: The file.
+    values: Mapping[str, Any]  #: The table.
+    table: str = ""  #: Its dotted name, "" for the whole document.
+    #: Which ``[[joints]]`` it is or belongs to, from 0, or None outside of them.
     joint: int | None = None
 
     def refuse(self, message: str, key: str = "") -> NoReturn:
@@ -201,11 +193,7 @@ def joint_label(document: Mapping[str, Any], index: int) -> str:
 
 
 def robot_text(path: Path) -> str:
-    """The text of a robot file, whatever its format.
-
-    Raises:
-        RobotError: If it cannot be read, is no text, or larger than any robot file.
-    """
+    """The text of a robot file, whatever its format."""
     try:
         if not path.is_file():
             raise RobotError(f"{path}: no such robot file")

@@ -45,9 +45,6 @@ class RunningFriction:
             load: Gravity torques of the loaded arm. (T, n) [N·m]
             temperature: Joint temperatures, NaN where not measured; None for those at which the
                 models were taken. (T, n) [°C]
-
-        Raises:
-            ParameterError: If a model's name is unknown.
         """
         return friction_torque(
             self.friction, dq, load, deflection=self.deflection(q), temperature=temperature

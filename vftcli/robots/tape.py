@@ -15,15 +15,10 @@ from vftcli.signals.arrays import Array
 
 
 class Value(NamedTuple):
-    """A number of the equations: a constant, or a row of samples with a sign.
+    """A number of the equations: a constant, or a row of samples with a sign."""
 
-    Attributes:
-        factor: The constant; of a row its sign, 1 or −1.
-        row: Number of the row; None for a constant.
-    """
-
-    factor: float
-    row: int | None = None
+    factor: float  #: The constant; of a row its sign, 1 or −1.
+    row: int | None = None  #: Number of the row; None for a constant.
 
     def __neg__(self) -> "Value":
         """The same row with the other sign: no operation."""
@@ -35,8 +30,7 @@ ZERO = Value(0.0)
 Vector = tuple[Value, Value, Value]
 NOTHING: Vector = (ZERO, ZERO, ZERO)
 
-Operand = int | np.float64
-"""Of an operation: the number of a row, or a constant."""
+Operand = int | np.float64  #: Of an operation: the number of a row, or a constant.
 
 
 class Operation(NamedTuple):
@@ -146,12 +140,7 @@ class Program:
     """
 
     def __init__(self, tape: Tape, outputs: Sequence[Value]) -> None:
-        """Plan the operations.
-
-        Args:
-            tape: The recorded operations.
-            outputs: What is wanted.
-        """
+        """Plan the operations."""
         wanted = rows_of_their_own(tape, outputs)
         self._inputs = slice(len(outputs), len(outputs) + tape.inputs)
         self._constants = {k: v.factor for k, v in enumerate(outputs) if v.row is None}

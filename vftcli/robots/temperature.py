@@ -18,8 +18,8 @@ from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
+#: Temperatures that a joint can have; a reading beyond them, as a constant zero, is none. [°C]
 COLDEST, WARMEST = 1.0, 100.0
-"""Temperatures that a joint can have; a reading beyond them, as a constant zero, is none. [°C]"""
 
 
 def warmth(law: Sequence[float], temperature: Array | float) -> Array:

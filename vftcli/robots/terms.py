@@ -27,41 +27,27 @@ from vftcli.signals.shown import Shown
 
 
 class Instant(NamedTuple):
-    """The terms of one sample, from which those of the next block of a log go on.
+    """The terms of one sample, from which those of the next block of a log go on."""
 
-    Attributes:
-        t: Time. [s]
-        p: Generalised momentum. (n,) [kg·m²/s]
-        mu: μ. (n,) [N·m]
-    """
-
-    t: float
-    p: Array
-    mu: Array
+    t: float  #: Time. [s]
+    p: Array  #: Generalised momentum. (n,) [kg·m²/s]
+    mu: Array  #: μ. (n,) [N·m]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class DynamicsTerms(Shown):
-    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33).
+    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33)."""
 
-    Attributes:
-        t: Time. (T,) [s]
-        p: Generalised momentum M q̇. (T, n) [kg·m²/s]
-        mu: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
-        log_clock: The whole log's clock where these are a block of it; None for a whole log.
-        before: The sample before the first, where these are a later block of a log.
-        room: Memory for `d`, if it is there already. (T, n)
-        d: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model
-            leaves unexplained: the one input of every observer. Zero at a log's first sample.
-            (T, n) [N·m·s]
-    """
-
-    t: Array
-    p: Array
-    mu: Array
+    t: Array  #: Time. (T,) [s]
+    p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
+    mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    #: The whole log's clock where these are a block of it; None for a whole log.
     log_clock: Clock | None = None
+    #: The sample before the first, where these are a later block of a log.
     before: Instant | None = None
-    room: InitVar[Array | None] = None
+    room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
+    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model leaves
+    #: unexplained: the one input of every observer. Zero at a log's first sample. (T, n) [N·m·s]
     d: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self, room: Array | None) -> None:
@@ -144,10 +130,6 @@ class RunningTerms:
         """Evaluate p and μ along the next block, chunk by chunk.
 
         Beside the recording and the results it needs memory for one chunk only.
-
-        Raises:
-            MissingSignalError: If velocities, or both currents and torques, are missing.
-            RobotError: If the number of joints differs.
         """
         check_joints(recording, self.robot)
         q, dq = recording.q, recording.require("dq")

@@ -13,11 +13,8 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import IDENTITY, Pose, exp_matrix
 
-MOST = 1000
-"""Links and joints of a description: a humanoid with two hands has a fifth of it."""
-
-TURNING = ("revolute", "continuous")
-"""Kinds of joints that an arm is made of."""
+MOST = 1000  #: Links and joints of a description: a humanoid with two hands has a fifth of it.
+TURNING = ("revolute", "continuous")  #: Kinds of joints that an arm is made of.
 
 
 class Body(NamedTuple):
@@ -30,38 +27,25 @@ class Body(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TreeJoint:
-    """A joint between two links.
+    """A joint between two links."""
 
-    Attributes:
-        name: Its name.
-        kind: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move
-            within an arm.
-        parent: The link that carries it.
-        child: The link that it moves; its frame is the joint's.
-        placement: Pose of the child's frame in the parent's at zero.
-        axis: Unit axis in the child's frame. (3,)
-        limits: Fields of `vftcli.robots.robot.Limits` that the description gives.
-        follows: The joint whose position this one's follows, "" for one of its own.
-        multiplier: How far it goes of the other's position.
-        offset: Where it is when the other is at zero. [rad or m]
-        rotor_inertia: Reflected rotor inertia. [kg·m²]
-        damping: Viscous friction that a simulator uses. [N·m·s/rad]
-        dry_friction: Dry friction that a simulator uses. [N·m]
-    """
-
-    name: str
+    name: str  #: Its name.
+    #: "revolute", "continuous", "prismatic", "fixed", or another kind, which cannot move within an
+    #: arm.
     kind: str
-    parent: str
-    child: str
-    placement: Pose = IDENTITY
+    parent: str  #: The link that carries it.
+    child: str  #: The link that it moves; its frame is the joint's.
+    placement: Pose = IDENTITY  #: Pose of the child's frame in the parent's at zero.
+    #: Unit axis in the child's frame. (3,)
     axis: Array = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    #: Fields of `vftcli.robots.robot.Limits` that the description gives.
     limits: Mapping[str, float] = field(default_factory=dict)
-    follows: str = ""
-    multiplier: float = 1.0
-    offset: float = 0.0
-    rotor_inertia: float = 0.0
-    damping: float = 0.0
-    dry_friction: float = 0.0
+    follows: str = ""  #: The joint whose position this one's follows, "" for one of its own.
+    multiplier: float = 1.0  #: How far it goes of the other's position.
+    offset: float = 0.0  #: Where it is when the other is at zero. [rad or m]
+    rotor_inertia: float = 0.0  #: Reflected rotor inertia. [kg·m²]
+    damping: float = 0.0  #: Viscous friction that a simulator uses. [N·m·s/rad]
+    dry_friction: float = 0.0  #: Dry friction that a simulator uses. [N·m]
 
     @property
     def turns(self) -> bool:
@@ -80,24 +64,14 @@ class TreeJoint:
 
 @dataclass(frozen=True, kw_only=True)
 class BodyTree:
-    """Links and joints of a description.
+    """Links and joints of a description."""
 
-    Attributes:
-        name: The robot's name.
-        path: The file.
-        bodies: Each link's inertia, None where the description gives none.
-        joints: The joints.
-        gravity: Gravity in the root's axes. (3,) [m/s²]
-
-    Raises:
-        RobotError: If two links or joints share a name, or they do not make one tree.
-    """
-
-    name: str
-    path: Path
+    name: str  #: The robot's name.
+    path: Path  #: The file.
+    #: Each link's inertia, None where the description gives none.
     bodies: Mapping[str, Body | None]
-    joints: Sequence[TreeJoint]
-    gravity: Array
+    joints: Sequence[TreeJoint]  #: The joints.
+    gravity: Array  #: Gravity in the root's axes. (3,) [m/s²]
 
     def __post_init__(self) -> None:
         if len(self.joints) > MOST:

@@ -18,27 +18,14 @@ from vftcli.signals.pose import Pose, rpy_matrix
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d{1,3})?")
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-MOVING = ("revolute", "continuous", "prismatic", "planar")
-"""Types of joints that have an axis."""
-
-KINDS = (*MOVING, "fixed", "floating")
-"""Types of joints."""
-
+MOVING = ("revolute", "continuous", "prismatic", "planar")  #: Types of joints that have an axis.
+KINDS = (*MOVING, "fixed", "floating")  #: Types of joints.
+#: Attribute of <limit> → field of `vftcli.robots.robot.Limits`.
 LIMITS = {"lower": "q_min", "upper": "q_max", "velocity": "qd_max", "effort": "tau_max"}
-"""Attribute of <limit> → field of `vftcli.robots.robot.Limits`."""
 
 
 def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
-    """The tree that a URDF describes.
-
-    Args:
-        path: The file.
-        root: Its element <robot>.
-
-    Raises:
-        RobotError: If it is empty, links and joints make no tree, or a number is missing, no
-            number, or none that a robot has; the message names the link or the joint.
-    """
+    """The tree that a URDF describes."""
     links = [UrdfPart(path, element) for element in root.iterfind("link")]
     joints = [UrdfPart(path, element) for element in root.iterfind("joint")]
     if max(len(links), len(joints)) > MOST:
@@ -75,11 +62,7 @@ class UrdfPart:
 
     @property
     def name(self) -> str:
-        """Its name.
-
-        Raises:
-            RobotError: If it has none.
-        """
+        """Its name."""
         if not (name := self.element.get("name", "")):
             self.refuse("it needs a name")
         return name
@@ -171,15 +154,7 @@ class UrdfPart:
     def bounded(
         self, parent: ET.Element, tag: str, key: str, length: int, bound: str
     ) -> list[float]:
-        """The numbers of an attribute of an element below `parent`, held to a robot file's bound.
-
-        Args:
-            parent: What holds the element.
-            tag: What it is called.
-            key: The attribute.
-            length: How many numbers it has.
-            bound: Key of `vftcli.robots.bounds.BOUNDS`.
-        """
+        """The numbers of an attribute of an element below `parent`, within their bound."""
         found = parent.find(tag)
         if found is None:
             self.refuse(f"<{parent.tag}> has no <{tag}>")

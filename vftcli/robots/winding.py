@@ -17,10 +17,6 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
 
     A position that changes by more than half a turn between two samples has been taken back into
     one turn by who logged it. The log itself is returned where none does.
-
-    Args:
-        recording: The log.
-        robot: Its arm, which says which joints are endless.
     """
     columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
     if recording.joints != robot.joints:
@@ -45,11 +41,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
 
 
 class Winding:
-    """Winds the positions of endless joints up, one block of a long log after another.
-
-    Args:
-        joints: Their columns.
-    """
+    """Winds the positions of endless joints up, one block of a long log after another."""
 
     def __init__(self, joints: Sequence[int]) -> None:
         self.joints = list(joints)

@@ -17,8 +17,7 @@ from vftcli.signals.pose import rpy_angles
 
 Table = dict[str, Any]
 
-AGREES = 1e-12
-"""Relative difference below which a number of the file is taken to be unchanged."""
+AGREES = 1e-12  #: Relative difference below which a number of the file is taken to be unchanged.
 
 
 def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:
@@ -26,10 +25,6 @@ def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:
 
     Sections and keys of the file the robot came from that are not physical numbers of the arm
     (gains, sources, words) are kept as they are.
-
-    Args:
-        robot: The robot; its `document` holds what is kept.
-        heading: Comment lines for the top of the file.
     """
     comments = "".join(f"# {line}\n" for line in heading)
     return comments + "".join(lines_of(robot_document(robot)))
@@ -153,11 +148,7 @@ def quoted(text: str) -> str:
 
 
 def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
-    """A value as TOML; floats with as many digits as tell them apart.
-
-    Raises:
-        RobotError: If the value is none that TOML has.
-    """
+    """A value as TOML; floats with as many digits as tell them apart."""
     match value:
         case bool():
             return "true" if value else "false"

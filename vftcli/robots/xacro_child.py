@@ -22,11 +22,7 @@ def limit(seconds: int, memory: int) -> None:
 
 
 def refuse_variable(name: str) -> str:
-    """Refuse a variable of the user's environment.
-
-    Raises:
-        PermissionError: Always.
-    """
+    """Refuse a variable of the user's environment."""
     raise PermissionError(
         f"it reads the environment variable {name}, which may hold anything; write its value there"
     )

@@ -18,43 +18,24 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import assignment, did_you_mean
 
+#: How the tag of an element of xacro begins: a description with one still has to be expanded.
 NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
-"""How the tag of an element of xacro begins: a description with one still has to be expanded."""
-
+#: A declaration of an argument, which has a default.
 DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
-"""A declaration of an argument, which has a default."""
-
+#: A use of an argument; one that is not declared has to be given.
 USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
-"""A use of an argument; one that is not declared has to be given."""
-
-NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
-"""The name of a package in its manifest."""
+NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
 
 FORM = "NAME=VALUE"
-ABOVE = 5
-"""Folders above the file in which packages are looked for."""
-
+ABOVE = 5  #: Folders above the file in which packages are looked for.
+#: Time of a processor in which a xacro must be expanded; large ones take below one. [s]
 SECONDS = 10
-"""Time of a processor in which a xacro must be expanded; large ones take below one. [s]"""
-
-WAITED = 6
-"""How many times as long it may take where others keep the processors busy."""
-
-MEMORY = 1 << 30
-"""Memory in which it must be expanded; large ones take a tenth. [B]"""
+WAITED = 6  #: How many times as long it may take where others keep the processors busy.
+MEMORY = 1 << 30  #: Memory in which it must be expanded; large ones take a tenth. [B]
 
 
 def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
-    """The URDF that a xacro writes.
-
-    Args:
-        path: The file.
-        arguments: What its arguments shall be, each ``NAME=VALUE``.
-
-    Raises:
-        RobotError: If xacro is not installed, an argument is unknown or missing, or the xacro
-            cannot be expanded.
-    """
+    """The URDF that a xacro writes."""
     given = dict(assignment(word, "--robot-arg", FORM) for word in arguments)
     line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
     otherwise = f"; or give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
@@ -83,11 +64,7 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
 
 
 def expanded(path: Path, arguments: Mapping[str, str]) -> dict[str, Any]:
-    """What `vftcli.robots.xacro_child` makes of a xacro, within its limits.
-
-    Raises:
-        RobotError: If it does not end within them.
-    """
+    """What `vftcli.robots.xacro_child` makes of a xacro, within its limits."""
     asked = {
         "path": str(path),
         "arguments": arguments,

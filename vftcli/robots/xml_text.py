@@ -6,16 +6,12 @@ from xml.etree import ElementTree as ET
 
 from vftcli.signals.errors import RobotError
 
+#: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
 DEEPEST = 500
-"""Elements within one another: a URDF has four, an MJCF one more than its arm has links."""
 
 
 class GuardedBuilder(ET.TreeBuilder):
-    """A tree builder that takes no document type, which defines entities, and no deep nesting.
-
-    Args:
-        path: The file, for the messages.
-    """
+    """A tree builder that takes no document type, which defines entities, and no deep nesting."""
 
     def __init__(self, path: Path) -> None:
         super().__init__()
@@ -31,11 +27,7 @@ class GuardedBuilder(ET.TreeBuilder):
         )
 
     def start(self, tag: str, attrs: dict[Any, Any], /) -> ET.Element:
-        """Begin an element.
-
-        Raises:
-            RobotError: If it stands too deep.
-        """
+        """Begin an element."""
         self._depth += 1
         if self._depth > DEEPEST:
             raise RobotError(f"{self._path}: more than {DEEPEST} elements within one another")
@@ -48,15 +40,7 @@ class GuardedBuilder(ET.TreeBuilder):
 
 
 def xml_root(text: str, path: Path) -> ET.Element:
-    """The first element of an XML text.
-
-    Args:
-        text: The text.
-        path: The file, for the messages.
-
-    Raises:
-        RobotError: If it is no XML, has a document type, or nests too deep.
-    """
+    """The first element of an XML text."""
     parser = ET.XMLParser(target=GuardedBuilder(path))
     try:
         parser.feed(text)

@@ -7,14 +7,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from vftcli.signals.errors import ClockError, ShapeError
 
+#: A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``.
 Array = NDArray[np.float64]
-"""A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``."""
-
+#: True or false, sample by sample or joint by joint, named for what is true.
 Mask = NDArray[np.bool_]
-"""True or false, sample by sample or joint by joint, named for what is true."""
-
-Indices = NDArray[np.int64]
-"""Numbers of rows or samples, counted from 0."""
+Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
 def frozen(value: ArrayLike) -> Array:
@@ -51,11 +48,7 @@ def handed_over(value: Array) -> Array:
 
 
 def number_array(value: ArrayLike, name: str, owner: str) -> Array:
-    """Return `frozen` of what a user gives for an array.
-
-    Raises:
-        ShapeError: If it is no array of numbers, as a word, or rows of unequal length.
-    """
+    """Return `frozen` of what a user gives for an array."""
     try:
         return frozen(value)
     except (TypeError, ValueError):
@@ -65,11 +58,7 @@ def number_array(value: ArrayLike, name: str, owner: str) -> Array:
 
 
 def seal(owner: object, *names: str) -> None:
-    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None.
-
-    Raises:
-        ShapeError: If one of them is no array of numbers.
-    """
+    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
@@ -107,9 +96,6 @@ def check_clock(t: Array, what: str) -> None:
     Args:
         t: Time. (T,) [s]
         what: Whose clock it is, for the message.
-
-    Raises:
-        ClockError: If the clock stands still, runs backwards or holds a non-finite value.
     """
     if np.ndim(t) != 1:
         raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
@@ -135,14 +121,7 @@ def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: s
 
 
 def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) -> None:
-    """Raise a ShapeError unless `value` is (T, n).
-
-    Args:
-        value: One column a joint.
-        joints: n, None for any number.
-        name: What it is called.
-        owner: Whose it is.
-    """
+    """Raise a ShapeError unless `value` is (T, n)."""
     shape = np.shape(value)
     if len(shape) != 2 or joints not in {None, shape[1]}:
         wanted = "n" if joints is None else joints
@@ -161,8 +140,7 @@ def median(values: Array) -> float:
     return 0.5 * float(lower + upper)
 
 
-EVEN = 1e-6
-"""How far the steps of an even clock are from their median at most, relative to it."""
+EVEN = 1e-6  #: How far the steps of an even clock are from their median at most, relative to it.
 
 
 def is_uniform(t: Array, tolerance: float = EVEN) -> bool:

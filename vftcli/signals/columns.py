@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 TORQUE, FORCE = "N·m", "N and N·m"
 
+#: First part of a column's name → its unit and what it is.
 COLUMNS: dict[str, tuple[str, str]] = {
     "t": ("s", "time"),
     "t_src_ns": ("ns", "time on the log's own clock"),
@@ -43,31 +44,18 @@ COLUMNS: dict[str, tuple[str, str]] = {
     "sigma_min": ("m", "smallest singular value of J, angular rows × 0.3 m"),
     "contact": ("1", "number of the contact in the list that the sample lies in, null outside"),
 }
-"""First part of a column's name → its unit and what it is."""
-
-ON_ROBOT = "on the robot"
-"""Whose force it is: the environment's on the robot."""
+ON_ROBOT = "on the robot"  #: Whose force it is: the environment's on the robot.
 
 
 class StatedFrame(NamedTuple):
-    """What is known of some columns that hold wrenches.
+    """What is known of some columns that hold wrenches."""
 
-    Attributes:
-        frame: Axes and reference point, in words.
-        sign: Whose force it is.
-    """
-
-    frame: str
-    sign: str = ON_ROBOT
+    frame: str  #: Axes and reference point, in words.
+    sign: str = ON_ROBOT  #: Whose force it is.
 
 
 def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]:
-    """Unit, meaning, and where they matter sign and frame of a column; {} of an unknown one.
-
-    Args:
-        name: As in the table: ``tau_ext/gmo/1``, ``wrench/best/fx``.
-        frames: Name without its last part → what is known of these wrenches.
-    """
+    """Unit, meaning, and where they matter sign and frame of a column; {} of an unknown one."""
     kind, group, last = name.partition("/")[0], *name.rpartition("/")[::2]
     if kind not in COLUMNS:
         return {}
@@ -95,11 +83,6 @@ def described_schema(
     """The table's pyarrow schema with what each column holds, for ``write_parquet``.
 
     None without pyarrow: polars then writes the columns, and nothing beside them.
-
-    Args:
-        table: The table.
-        frames: As in `column_facts`.
-        metadata: What is said of the table.
     """
     if not installed("pyarrow"):
         return None

@@ -8,23 +8,16 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 
+#: Where the derivative is cut off, twice. [Hz]
+#:
+#: Positions of UR10e logs, rounded to 1e-4 rad at 100 Hz, give velocities off by .0024 to .0031
+#: rad/s rms so, and by .10 to .44 as plain differences; 5 and 20 Hz differ little.
 CUTOFF = 12.0
-"""Where the derivative is cut off, twice. [Hz]
-
-Positions of UR10e logs, rounded to 1e-4 rad at 100 Hz, give velocities off by .0024 to .0031 rad/s
-rms so, and by .10 to .44 as plain differences; 5 and 20 Hz differ little.
-"""
-OF_NYQUIST = 0.4
-"""The same in a slow log, as a share of half its rate."""
-
+OF_NYQUIST = 0.4  #: The same in a slow log, as a share of half its rate.
+#: Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz.
 BLUNTED = 0.48
-"""Cutoff times length of the pushes below which the filter blunts them: 40 ms at 12 Hz."""
-
-ONE_TURN = 2 * np.pi + 0.1
-"""How far positions travel at most that are logged within a turn. [rad]"""
-
-RATE = 50.0
-"""Rate from which velocities are derived without being asked for. [Hz]"""
+ONE_TURN = 2 * np.pi + 0.1  #: How far positions travel at most that are logged within a turn. [rad]
+RATE = 50.0  #: Rate from which velocities are derived without being asked for. [Hz]
 
 
 def with_velocity(recording: Recording) -> Recording:

@@ -21,38 +21,29 @@ from vftcli.signals.shown import Shown, frame_of, joined, per_joint
 if TYPE_CHECKING:
     import polars as pl
 
-ALL = slice(None)
-"""All rows."""
-
-COVERS = 1.96
-"""Half width of a 95 % band, in standard deviations."""
+ALL = slice(None)  #: All rows.
+COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ExternalTorque(Shown):
-    """Torque the environment exerts on the robot, positive along each joint axis.
+    """Torque the environment exerts on the robot, positive along each joint axis."""
 
-    Attributes:
-        name: Short name of the observer or of the reference, as used in tables and column names.
-        t: Time on the recording's clock. (T,) [s]
-        tau: External torque; NaN where it is not known. (T, n) [N·m]
-        sd: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
-        floor: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
-        error_sd: One standard deviation of the error of `tau` as the log itself shows it, model
-            error and lag included; None where no free part is known to measure it on. (T, n) [N·m]
-        moving: Whether the joint moves, so that the sample may be relied on; where it stands,
-            stiction hides what `tau` cannot know. None where that was not looked at. (T, n)
-        remarks: What a reader of the numbers should know.
-    """
-
+    #: Short name of the observer or of the reference, as used in tables and column names.
     name: str
-    t: Array
-    tau: Array
+    t: Array  #: Time on the recording's clock. (T,) [s]
+    tau: Array  #: External torque; NaN where it is not known. (T, n) [N·m]
+    #: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
     sd: Array | None = None
+    #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
     floor: Array | None = None
+    #: One standard deviation of the error of `tau` as the log itself shows it, model error and lag
+    #: included; None where no free part is known to measure it on. (T, n) [N·m]
     error_sd: Array | None = None
+    #: Whether the joint moves, so that the sample may be relied on; where it stands, stiction hides
+    #: what `tau` cannot know. None where that was not looked at. (T, n)
     moving: Mask | None = None
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
         seal(self, "t", "tau", "sd", "floor", "error_sd")

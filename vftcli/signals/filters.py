@@ -18,29 +18,20 @@ from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.steady_filter import steady_filter
 
+#: Order of the Butterworth filter; run forwards and backwards it attenuates twice as much.
 ORDER = 2
-"""Order of the Butterworth filter; run forwards and backwards it attenuates twice as much."""
-
+#: Order of one pass where what is behind the filter is differentiated: its noise above the cutoff
+#: has to be gone.
 STEEP = 4
-"""Order of one pass where what is behind the filter is differentiated: its noise above the cutoff
-has to be gone."""
-
-Kind = Literal["lowpass", "bandpass"]
-"""What a filter lets pass."""
-
+Kind = Literal["lowpass", "bandpass"]  #: What a filter lets pass.
+#: Steps that differ from their median by a larger share are resampled; a clock that jitters by less
+#: is filtered as an even one.
 UNEVEN = 0.05
-"""Steps that differ from their median by a larger share are resampled; a clock that jitters by less
-is filtered as an even one."""
-
-
+#: Zeros of a band pass' section, at 0 and at half the sample rate, as a polynomial in z⁻¹.
 BAND_ZEROS = np.array([1.0, 0.0, -1.0])
-"""Zeros of a band pass' section, at 0 and at half the sample rate, as a polynomial in z⁻¹."""
-
-FREQUENCIES = 1024
-"""Frequencies at which a filter's power is summed."""
-
+FREQUENCIES = 1024  #: Frequencies at which a filter's power is summed.
+#: An even clock of more than so many times the log's samples would be filled with gaps alone.
 MOSTLY_GAP = 100
-"""An even clock of more than so many times the log's samples would be filled with gaps alone."""
 
 
 def low_pass(
@@ -59,9 +50,6 @@ def low_pass(
         order: Order of one pass.
         settling: Length by which the ends are continued, mirrored about their value, for the
             filter to settle; None for the least that its order needs. [s]
-
-    Raises:
-        ParameterError: If the cutoff is not below half the sample rate.
     """
     return filter_columns(t, x, butterworth(median_step(t), cutoff, "lowpass", order), settling)
 
@@ -75,9 +63,6 @@ def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
         t: Time. (T,) [s]
         signals: One column a signal. (T, m)
         cutoff: Frequency at which one pass loses 3 dB. [Hz]
-
-    Raises:
-        ClockError: If the log is shorter than two periods of the cutoff.
     """
     if t[-1] - t[0] < 2.0 / cutoff:
         raise ClockError(
@@ -142,11 +127,7 @@ def cascade(sections: Array, x: Array) -> Array:
 
 
 def even_clock(t: Array, step: float) -> Array:
-    """Instants about `step` [s] apart from a clock's first sample to its last. (K,) [s]
-
-    Raises:
-        ClockError: If nearly all of them would lie in gaps.
-    """
+    """Instants about `step` [s] apart from a clock's first sample to its last. (K,) [s]"""
     samples = max(2, round(float(t[-1] - t[0]) / step) + 1)
     refuse_mostly_gap(t, step)
     return np.linspace(t[0], t[-1], samples)
@@ -165,11 +146,7 @@ def refuse_mostly_gap(t: Array, step: float) -> None:
 def butterworth(
     step: float, cutoff: float | tuple[float, float], kind: Kind, order: int = ORDER
 ) -> Array:
-    """Second-order sections of a Butterworth filter for a sample time. [s]
-
-    Raises:
-        ParameterError: If a cutoff is not between zero and half the sample rate.
-    """
+    """Second-order sections of a Butterworth filter for a sample time. [s]"""
     if not (np.all(np.asarray(cutoff) > 0) and np.all(np.asarray(cutoff) < 0.5 / step)):
         raise ParameterError(
             f"a filter at {cutoff} Hz is not possible on a log of {1.0 / step:.4g} Hz; "

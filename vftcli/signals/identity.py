@@ -22,15 +22,7 @@ def same_run(one: Recording, other: Recording) -> bool:
 
 
 def refuse_repeated_logs(logs: Sequence[Recording], option: str = "LOG") -> None:
-    """Refuse logs of one command that are the same run: their agreement would count as evidence.
-
-    Args:
-        logs: The logs.
-        option: How they were given, for the message.
-
-    Raises:
-        ParameterError: If two are the same run.
-    """
+    """Refuse logs of one command that are the same run: their agreement would count as evidence."""
     for one, other in combinations(logs, 2):
         if same_run(one, other):
             raise ParameterError(
@@ -40,11 +32,7 @@ def refuse_repeated_logs(logs: Sequence[Recording], option: str = "LOG") -> None
 
 
 def refuse_repeated_runs(recording: Recording, free: Sequence[Recording]) -> None:
-    """Refuse free runs that are the log itself, or one another.
-
-    Raises:
-        ReferenceTorqueError: If two of them all are the same run.
-    """
+    """Refuse free runs that are the log itself, or one another."""
     for run in free:
         if same_run(recording, run):
             raise ReferenceTorqueError(

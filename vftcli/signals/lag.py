@@ -13,18 +13,10 @@ from numpy.typing import NDArray
 from vftcli.signals.arrays import Array, Mask, is_uniform
 from vftcli.signals.series import bridge_unknown, median_step, resample_columns
 
-LONGEST = 1.0
-"""Longest delay looked for. [s]"""
-
-LEAD = 0.2
-"""Longest lead looked for: a two-sided estimate may come early. [s]"""
-
-LEAST_FIT = 0.3
-"""Below this correlation at the best delay there is nothing to tell a delay by."""
-
-
-BLOCK = 8192
-"""Samples that one Fourier transform takes, unless the lags looked for need more."""
+LONGEST = 1.0  #: Longest delay looked for. [s]
+LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]
+LEAST_FIT = 0.3  #: Below this correlation at the best delay there is nothing to tell a delay by.
+BLOCK = 8192  #: Samples that one Fourier transform takes, unless the lags looked for need more.
 
 
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
@@ -131,15 +123,10 @@ def parabola(before: float, here: float, after: float) -> float:
 
 
 class Offset(NamedTuple):
-    """How far one series runs behind another.
+    """How far one series runs behind another."""
 
-    Attributes:
-        lag: Time by which the first is late. [s]
-        correlation: Correlation once that is taken out.
-    """
-
-    lag: float
-    correlation: float
+    lag: float  #: Time by which the first is late. [s]
+    correlation: float  #: Correlation once that is taken out.
 
 
 def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
@@ -171,18 +158,13 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
 
 
 class LagFit(NamedTuple):
-    """How well two series fit at every lag of the first behind the second.
+    """How well two series fit at every lag of the first behind the second."""
 
-    Attributes:
-        lag: (L,) [samples]
-        difference: Mean squared difference of what overlaps, all columns together; infinite where
-            too little does. (L,)
-        overlap: Samples that overlap. (L,)
-    """
-
-    lag: NDArray[np.int64]
+    lag: NDArray[np.int64]  #: (L,) [samples]
+    #: Mean squared difference of what overlaps, all columns together; infinite where too little
+    #: does. (L,)
     difference: Array
-    overlap: NDArray[np.int64]
+    overlap: NDArray[np.int64]  #: Samples that overlap. (L,)
 
     @property
     def closest(self) -> float:
@@ -190,11 +172,7 @@ class LagFit(NamedTuple):
         return float(self.lag[int(np.argmin(self.difference))])
 
     def rivals(self, most: float) -> list[float]:
-        """Lags of other valleys whose series overlap longer than at the closest lag, longest first.
-
-        Args:
-            most: Mean squared difference up to which a valley counts.
-        """
+        """Lags of other valleys with a longer overlap than at the closest lag, longest first."""
         inner, best = self.difference[1:-1], int(np.argmin(self.difference))
         valley = (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
         found = 1 + np.flatnonzero(valley & (self.overlap[1:-1] > self.overlap[best]))

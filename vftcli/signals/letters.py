@@ -3,12 +3,11 @@
 import re
 import unicodedata
 
+#: What no UTF-8 holds: a byte of a file name that is no letter, or half a letter from JSON.
 HALVES = re.compile(r"[\ud800-\udfff]")
-"""What no UTF-8 holds: a byte of a file name that is no letter, or half a letter from JSON."""
-
+#: Unicode categories that a terminal would act on, or show as nothing: control characters, marks
+#: that turn the direction of writing, ends of lines.
 HIDDEN = {"Cc", "Cf", "Co", "Zl", "Zp"}
-"""Unicode categories that a terminal would act on, or show as nothing: control characters, marks
-that turn the direction of writing, ends of lines."""
 
 
 def whole(text: str) -> str:

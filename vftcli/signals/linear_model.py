@@ -21,50 +21,30 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 
-SPIKE = 40.0
-"""Variance of a spike, in variances of the innovation."""
-
+SPIKE = 40.0  #: Variance of a spike, in variances of the innovation.
+#: A state whose predicted variance is no larger is certain: nothing is carried back to it.
 LEAST_VARIANCE = 1e-14
-"""A state whose predicted variance is no larger is certain: nothing is carried back to it."""
-
-STRETCH = 512
-"""Blocks whose innovations and gains back are worked on at once."""
+STRETCH = 512  #: Blocks whose innovations and gains back are worked on at once.
 
 
 class LinearModel(NamedTuple):
-    """Models side by side along K blocks; arrays but `decay` may have axes of length 1 for all.
+    """Models side by side along K blocks; arrays but `decay` may have axes of length 1 for all."""
 
-    Attributes:
-        d: What is measured. (K, …, n)
-        observation: H. (K, …, N, n)
-        white: R. (K, …, n)
-        decay: f. (K, …, N)
-        added: q. (K, …, N)
-    """
-
-    d: Array
-    observation: Array
-    white: Array
-    decay: Array
-    added: Array
+    d: Array  #: What is measured. (K, …, n)
+    observation: Array  #: H. (K, …, N, n)
+    white: Array  #: R. (K, …, n)
+    decay: Array  #: f. (K, …, N)
+    added: Array  #: q. (K, …, N)
 
 
 class FilteredBlock(NamedTuple):
-    """The filter at one block.
+    """The filter at one block."""
 
-    Attributes:
-        mean: State given the blocks up to this one. (…, N)
-        covariance: (…, N, N)
-        predicted: Covariance before the block's own d is used. (…, N, N)
-        square: νᵀS⁻¹ν of the innovation, as if it were no spike. (…)
-        spread: Its covariance S, likewise. (…, n, n)
-    """
-
-    mean: Array
-    covariance: Array
-    predicted: Array
-    square: Array
-    spread: Array
+    mean: Array  #: State given the blocks up to this one. (…, N)
+    covariance: Array  #: (…, N, N)
+    predicted: Array  #: Covariance before the block's own d is used. (…, N, N)
+    square: Array  #: νᵀS⁻¹ν of the innovation, as if it were no spike. (…)
+    spread: Array  #: Its covariance S, likewise. (…, n, n)
 
 
 def beside_errors(H: Array) -> Array:

@@ -1,5 +1,6 @@
 """The signals of a log by name: what each is, and which of them belong together."""
 
+#: Fields of a Recording that hold a signal → what that is.
 MEANINGS = {
     "q": "joint positions",
     "dq": "joint velocities",
@@ -14,18 +15,13 @@ MEANINGS = {
     "temperature": "joint temperatures",
     "wrench": "wrenches",
 }
-"""Fields of a Recording that hold a signal → what that is."""
-
+#: Those of them that hold one column a joint.
 JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
-"""Those of them that hold one column a joint."""
-
+#: Signals whose columns in tables are called otherwise than the field of a Recording.
 COLUMN_NAMES = {"torque": "tau"}
-"""Signals whose columns in tables are called otherwise than the field of a Recording."""
-
+#: Those that say what the drives do; a log has one of them or several.
 EFFORTS = ("current", "torque", "torque_without_gravity")
-"""Those that say what the drives do; a log has one of them or several."""
-
+#: Signals that an examination looks at beside time and positions.
 EXAMINED = frozenset(
     ("dq", *EFFORTS, "target_dq", "target_current", "target_torque", "tau_ext", "temperature")
 )
-"""Signals that an examination looks at beside time and positions."""

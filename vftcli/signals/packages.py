@@ -11,6 +11,7 @@ from typing import Any
 
 from vftcli.signals.errors import PackageError, VftError
 
+#: Module → the package that holds it, and how to install it.
 PACKAGES = {
     "pinocchio": ("pin", "pip install pin"),
     "rerun": ("rerun-sdk", "pip install rerun-sdk"),
@@ -20,7 +21,6 @@ PACKAGES = {
     "xacrodoc": ("xacrodoc", "pip install 'vftcli[xacro]'"),
     "matplotlib": ("matplotlib", "pip install 'vftcli[figures]'"),
 }
-"""Module → the package that holds it, and how to install it."""
 
 if sys.platform == "win32":
     PACKAGES["pinocchio"] = ("pin", "conda install -c conda-forge pinocchio")  # no wheel there
@@ -37,11 +37,7 @@ def remedy(module: str) -> str:
 
 
 def check_installed(module: str, what: str) -> None:
-    """See whether the package that something needs is there; it is not loaded.
-
-    Raises:
-        PackageError: If it is not.
-    """
+    """See whether the package that something needs is there; it is not loaded."""
     if not installed(module):
         needed(module, what)
 
@@ -49,17 +45,7 @@ def check_installed(module: str, what: str) -> None:
 def needed(
     module: str, what: str, otherwise: str = "", error: type[VftError] = PackageError
 ) -> Any:  # noqa: ANN401 - a module
-    """The module that something needs.
-
-    Args:
-        module: Name of the module, also one inside a package.
-        what: What needs it, as the first words of the message.
-        otherwise: What else one can do, as its last words.
-        error: The class of what is raised.
-
-    Raises:
-        VftError: If it is not installed, or cannot be loaded.
-    """
+    """The module that something needs."""
     try:
         return import_module(module)
     except ImportError as failure:

@@ -7,8 +7,8 @@ from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
+#: Share of two words' letters that must agree in order: one slip in four letters, two in eight.
 LIKE = 0.74
-"""Share of two words' letters that must agree in order: one slip in four letters, two in eight."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -32,11 +32,7 @@ def check_known(word: str, known: Iterable[str], complaint: str) -> None:
 
 
 def interval(text: str) -> tuple[float, float]:
-    """First and last time of ``A:B``, infinite where an end is left out. [s]
-
-    Raises:
-        ParameterError: If it is malformed or ends before it starts.
-    """
+    """First and last time of ``A:B``, infinite where an end is left out. [s]"""
     left, colon, right = text.partition(":")
     try:
         start = float(left) if left.strip() else float("-inf")
@@ -64,16 +60,7 @@ def numbers(text: str) -> tuple[float, ...] | None:
 
 
 def assignment(text: str, option: str, form: str) -> tuple[str, str]:
-    """Key and value of ``KEY=VALUE``, without the blanks around them.
-
-    Args:
-        text: The word.
-        option: The option it was given to, for the message.
-        form: What the word is to look like, for the message.
-
-    Raises:
-        ParameterError: If there is no equals sign, or nothing before or behind it.
-    """
+    """Key and value of ``KEY=VALUE``, without the blanks around them."""
     key, _, value = text.partition("=")
     if not key.strip() or not value.strip():
         raise ParameterError(f"{option} {text!r} is not {form}")
@@ -81,14 +68,7 @@ def assignment(text: str, option: str, form: str) -> tuple[str, str]:
 
 
 def check_kind(value: object, kind: type, name: str, how: str) -> None:
-    """Raise a ParameterError unless what a caller gives is of a kind.
-
-    Args:
-        value: It.
-        kind: What is expected.
-        name: What it is called.
-        how: What gives one.
-    """
+    """Raise a ParameterError unless what a caller gives is of a kind."""
     if not isinstance(value, kind):
         told = shown(value) if isinstance(value, str) else type(value).__name__
         raise ParameterError(f"{name} is {told}; expected {kind.__name__}: {how} is one")
@@ -100,16 +80,11 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-LONGEST = 10_000
-"""Letters of a line of TOML; 50 000 dots in one take Python's parser 15 s."""
+LONGEST = 10_000  #: Letters of a line of TOML; 50 000 dots in one take Python's parser 15 s.
 
 
 def toml_tables(text: str) -> dict[str, Any]:
-    """The tables of a TOML text.
-
-    Raises:
-        ParameterError: If it is none, or a line is too long.
-    """
+    """The tables of a TOML text."""
     for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > LONGEST:
             raise ParameterError(

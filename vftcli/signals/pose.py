@@ -13,8 +13,8 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 
+#: Angle below which the series replaces the quotient; the next term is below 1e-25. [rad]
 SMALL = 1e-6
-"""Angle below which the series replaces the quotient; the next term is below 1e-25. [rad]"""
 
 
 class Pose(NamedTuple):
@@ -29,8 +29,7 @@ class Pose(NamedTuple):
         )
 
 
-IDENTITY = Pose(np.eye(3), np.zeros(3))
-"""The pose of a frame in itself."""
+IDENTITY = Pose(np.eye(3), np.zeros(3))  #: The pose of a frame in itself.
 
 
 def inverse(pose: Pose) -> Pose:

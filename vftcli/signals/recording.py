@@ -28,22 +28,18 @@ from vftcli.signals.wrench import WrenchFrame, per_axis
 if TYPE_CHECKING:
     import polars as pl
 
+#: What is done to one block of a long log after another.
 Change = Callable[["Recording"], "Recording"]
-"""What is done to one block of a long log after another."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LongLog:
-    """A log that is read block by block, each block a recording, each time it is asked for.
+    """A log that is read block by block, each block a recording, each time it is asked for."""
 
-    Attributes:
-        timing: What is known of its clock.
-        read: Reads it in blocks of so many samples, but for the last.
-        changes: Make what is done to the blocks since; anew for each time it is read.
-    """
-
-    timing: Timing
+    timing: Timing  #: What is known of its clock.
+    #: Reads it in blocks of so many samples, but for the last.
     read: Callable[[int], Iterator["Recording"]]
+    #: Make what is done to the blocks since; anew for each time it is read.
     changes: tuple[Callable[[], Change], ...] = ()
 
     def blocks(self, samples: int) -> Iterator["Recording"]:
@@ -62,52 +58,35 @@ class LongLog:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Recording(Shown):
-    """Measurements of an n-joint robot at T instants. A signal the log lacks is None, never zeros.
+    """Measurements of an n-joint robot at T instants; a missing signal is None, never zeros."""
 
-    Attributes:
-        t: Time since the first sample, strictly increasing. (T,) [s]
-        q: Joint positions. (T, n) [rad]
-        dq: Joint velocities. (T, n) [rad/s]
-        current: Motor currents. (T, n) [A]
-        torque: Measured drive torques, gravity included. (T, n) [N·m]
-        torque_without_gravity: Drive torques less what holds the arm and its payload against
-            gravity, as newer UR drivers publish them. (T, n) [N·m]
-        target_q: Commanded positions. (T, n) [rad]
-        target_dq: Commanded velocities. (T, n) [rad/s]
-        target_current: The controller's expected currents. (T, n) [A]
-        target_torque: The controller's inverse-dynamics torques. (T, n) [N·m]
-        tau_ext: The vendor's estimate of the external torque ON the robot. (T, n) [N·m]
-        temperature: Joint temperatures. (T, n) [°C]
-        wrench: Force then moment, in the sign and axes that `wrench_frame` names. (T, 6) [N, N·m]
-        wrench_frame: What the log states of `wrench`; None where it states nothing.
-        joint_names: The joints' names in the log's order, or empty.
-        robot_hint: Name of the profile the log itself settles, or None.
-        payload_mass: Mass of the payload the controller was told of, None if not logged. [kg]
-        payload_com: Its centre of mass in flange axes. (3,) [m]
-        source: Where it came from and what was repaired.
-        long: The log that these samples are stretches of, evenly drawn, where it is too long to be
-            held whole; None where they are all.
-    """
-
-    t: Array
-    q: Array
-    dq: Array | None = None
-    current: Array | None = None
-    torque: Array | None = None
+    t: Array  #: Time since the first sample, strictly increasing. (T,) [s]
+    q: Array  #: Joint positions. (T, n) [rad]
+    dq: Array | None = None  #: Joint velocities. (T, n) [rad/s]
+    current: Array | None = None  #: Motor currents. (T, n) [A]
+    torque: Array | None = None  #: Measured drive torques, gravity included. (T, n) [N·m]
+    #: Drive torques less what holds the arm and its payload against gravity, as newer UR drivers
+    #: publish them. (T, n) [N·m]
     torque_without_gravity: Array | None = None
-    target_q: Array | None = None
-    target_dq: Array | None = None
-    target_current: Array | None = None
-    target_torque: Array | None = None
+    target_q: Array | None = None  #: Commanded positions. (T, n) [rad]
+    target_dq: Array | None = None  #: Commanded velocities. (T, n) [rad/s]
+    target_current: Array | None = None  #: The controller's expected currents. (T, n) [A]
+    target_torque: Array | None = None  #: The controller's inverse-dynamics torques. (T, n) [N·m]
+    #: The vendor's estimate of the external torque ON the robot. (T, n) [N·m]
     tau_ext: Array | None = None
-    temperature: Array | None = None
+    temperature: Array | None = None  #: Joint temperatures. (T, n) [°C]
+    #: Force then moment, in the sign and axes that `wrench_frame` names. (T, 6) [N, N·m]
     wrench: Array | None = None
+    #: What the log states of `wrench`; None where it states nothing.
     wrench_frame: WrenchFrame | None = None
-    joint_names: tuple[str, ...] = ()
-    robot_hint: str | None = None
+    joint_names: tuple[str, ...] = ()  #: The joints' names in the log's order, or empty.
+    robot_hint: str | None = None  #: Name of the profile the log itself settles, or None.
+    #: Mass of the payload the controller was told of, None if not logged. [kg]
     payload_mass: float | None = None
-    payload_com: tuple[float, ...] | None = None
-    source: Source = IN_MEMORY
+    payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
+    source: Source = IN_MEMORY  #: Where it came from and what was repaired.
+    #: The log that these samples are stretches of, evenly drawn, where it is too long to be held
+    #: whole; None where they are all.
     long: LongLog | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -25,42 +25,29 @@ from vftcli.signals.shown import Shown
 if TYPE_CHECKING:
     import polars as pl
 
+#: A fact informs, a caution limits what can be said, a warning can make results wrong.
 Level = Literal["fact", "caution", "warning"]
-"""A fact informs, a caution limits what can be said, a warning can make results wrong."""
-
-WORDS = Path(__file__).parent / "words"
-"""The catalogue: a file a room."""
+WORDS = Path(__file__).parent / "words"  #: The catalogue: a file a room.
 
 
 class Where(NamedTuple):
-    """What a remark is about.
+    """What a remark is about."""
 
-    Attributes:
-        about: An observer, log or file by its name; "" where it is the run as a whole.
-        joints: Joints, counted from 1; none where it holds for all alike.
-        span: First and last time, None where it holds throughout. [s]
-    """
-
-    about: str = ""
-    joints: tuple[int, ...] = ()
+    about: str = ""  #: An observer, log or file by its name; "" where it is the run as a whole.
+    joints: tuple[int, ...] = ()  #: Joints, counted from 1; none where it holds for all alike.
+    #: First and last time, None where it holds throughout. [s]
     span: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, repr=False)
 class Remark(Shown):
-    """What a reader of the numbers should know.
+    """What a reader of the numbers should know."""
 
-    Attributes:
-        code: Which remark it is: a table of the catalogue.
-        level: How much it matters.
-        values: Its numbers and names; a number's unit ends its key, as in ``shift_s``.
-        where: What it is about.
-    """
-
-    code: str
-    level: Level = "fact"
+    code: str  #: Which remark it is: a table of the catalogue.
+    level: Level = "fact"  #: How much it matters.
+    #: Its numbers and names; a number's unit ends its key, as in ``shift_s``.
     values: Mapping[str, Any] = field(default_factory=dict)
-    where: Where = field(default_factory=Where)
+    where: Where = field(default_factory=Where)  #: What it is about.
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "values", MappingProxyType(dict(self.values)))
@@ -120,11 +107,7 @@ def warning(code: str, where: Where = Where(), **values: object) -> Remark:  # n
 
 
 def sentence(remark: Remark) -> str:
-    """A remark's short words, headed by what it is about.
-
-    Raises:
-        LookupError: If the catalogue does not have its code.
-    """
+    """A remark's short words, headed by what it is about."""
     return heading(remark) + filled(words(remark.code)["short"], remark)
 
 
@@ -160,11 +143,7 @@ class ListFormatter(string.Formatter):
 
 
 def words(code: str) -> Mapping[str, str]:
-    """A code's entry of the catalogue.
-
-    Raises:
-        LookupError: If there is none.
-    """
+    """A code's entry of the catalogue."""
     for text in catalogue():
         # Reading TOML takes longer than finding the one file of a room that has the code.
         if f"[{code}]" in text:

@@ -10,15 +10,10 @@ from vftcli.signals.errors import ClockError
 
 
 class Clock(NamedTuple):
-    """How a log is sampled.
+    """How a log is sampled."""
 
-    Attributes:
-        uniform: Whether all steps are equal, so that constant coefficients are exact.
-        step: Nominal sample time. [s]
-    """
-
-    uniform: bool
-    step: float
+    uniform: bool  #: Whether all steps are equal, so that constant coefficients are exact.
+    step: float  #: Nominal sample time. [s]
 
 
 def clock_of(t: Array) -> Clock:
@@ -39,9 +34,6 @@ def median_step(t: Array) -> float:
     """Median time between samples, the nominal sample time of a clock (T,). [s]
 
     The median rather than the mean, because a gap belongs to no sample time.
-
-    Raises:
-        ClockError: If there are fewer than two samples.
     """
     if len(t) < 2:
         raise ClockError("one sample has no sample time")

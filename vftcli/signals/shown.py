@@ -14,14 +14,10 @@ from vftcli.signals.letters import printable
 if TYPE_CHECKING:
     import polars as pl
 
-LONGEST = 160
-"""Letters of a line at most."""
-
+LONGEST = 160  #: Letters of a line at most.
+#: An array of so many numbers, one a joint of most arms, is shown; of a larger one its shape.
 FEW = 7
-"""An array of so many numbers, one a joint of most arms, is shown; of a larger one its shape."""
-
-UNKNOWN = "–"
-"""What stands for a number that is not known."""
+UNKNOWN = "–"  #: What stands for a number that is not known.
 
 
 class Shown:

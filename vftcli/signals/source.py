@@ -11,22 +11,14 @@ from vftcli.signals.shown import Shown
 
 
 class Cut(NamedTuple):
-    """Samples that were cut out because no arm can have made them.
+    """Samples that were cut out because no arm can have made them."""
 
-    Attributes:
-        code: The finding that says why.
-        start: Time of the first. [s]
-        stop: Time of the last. [s]
-        rows: How many there are.
-        joints: The joints whose signals say so, from 1.
-        size: The largest of what says so, in the unit of the finding's words; else its length in s.
-    """
-
-    code: str
-    start: float
-    stop: float
-    rows: int
-    joints: tuple[int, ...]
+    code: str  #: The finding that says why.
+    start: float  #: Time of the first. [s]
+    stop: float  #: Time of the last. [s]
+    rows: int  #: How many there are.
+    joints: tuple[int, ...]  #: The joints whose signals say so, from 1.
+    #: The largest of what says so, in the unit of the finding's words; else its length in s.
     size: float
 
 
@@ -54,42 +46,30 @@ class Awaited:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Source(Shown):
-    """Where a recording came from and what was done to it on the way in.
+    """Where a recording came from and what was done to it on the way in."""
 
-    Attributes:
-        path: The file or bag directory, or None for a recording made in memory.
-        format: The reader's name.
-        label: What the log is called in tables, unique within a command; the file's name where
-            that is unique.
-        sha256: Hex digest of the file's bytes (of all files of a directory, in name order), by
-            which a run is known again; reading it waits until it is computed.
-        clock: Which clock the stamps are from, in words.
-        t0: The log's own stamp of the first sample. [s]
-        t0_ns: The same stamp in whole nanoseconds where the log counts them. [ns]
-        rows: Samples the file held before any were dropped.
-        duplicates: Rows dropped because their stamp repeated the one before.
-        derived: Signals that were made of others here and stand in no log.
-        remarks: Facts on what was dropped, turned or derived; cautions and warnings on what looks
-            suspicious but was left as it is.
-        part: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
-        cuts: Samples that were cut out because no arm can have made them.
-        row_samples: The sample that each of the rows is, or repeats; −1 for one that was dropped
-            otherwise. None where each row is the sample of its number. (rows,)
-    """
-
-    path: Path | None = None
+    path: Path | None = None  #: The file or bag directory, or None for a recording made in memory.
+    #: What the log is called in tables, unique within a command; the file's name where that is
+    #: unique.
     label: str = ""
-    format: str = "memory"
+    format: str = "memory"  #: The reader's name.
+    #: Hex digest of the file's bytes (of all files of a directory, in name order), by which a run
+    #: is known again; reading it waits until it is computed.
     sha256: Awaited = Awaited()
-    clock: str = "as given"
-    t0: float = 0.0
-    t0_ns: int | None = None
-    rows: int = 0
-    duplicates: int = 0
-    derived: tuple[str, ...] = ()
+    clock: str = "as given"  #: Which clock the stamps are from, in words.
+    t0: float = 0.0  #: The log's own stamp of the first sample. [s]
+    t0_ns: int | None = None  #: The same stamp in whole nanoseconds where the log counts them. [ns]
+    rows: int = 0  #: Samples the file held before any were dropped.
+    duplicates: int = 0  #: Rows dropped because their stamp repeated the one before.
+    derived: tuple[str, ...] = ()  #: Signals that were made of others here and stand in no log.
+    #: Facts on what was dropped, turned or derived; cautions and warnings on what looks suspicious
+    #: but was left as it is.
     remarks: tuple[Remark, ...] = ()
+    #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     part: str = ""
-    cuts: tuple[Cut, ...] = ()
+    cuts: tuple[Cut, ...] = ()  #: Samples that were cut out because no arm can have made them.
+    #: The sample that each of the rows is, or repeats; −1 for one that was dropped otherwise. None
+    #: where each row is the sample of its number. (rows,)
     row_samples: Indices | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -114,5 +94,4 @@ class Source(Shown):
         return tuple(str(remark) for remark in self.remarks if remark.level != "fact")
 
 
-IN_MEMORY = Source()
-"""Of a recording that was made in memory."""
+IN_MEMORY = Source()  #: Of a recording that was made in memory.

@@ -14,31 +14,22 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, empty_series
 
+#: Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
+#: at multiples of it give the numbers of the whole log to the last bit.
 PIECE = 1 << 14
-"""Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
-at multiples of it give the numbers of the whole log to the last bit."""
-
+#: What is left of a state that counts as nothing: far below the last digit of anything.
 FORGOTTEN = 1e-20
-"""What is left of a state that counts as nothing: far below the last digit of anything."""
-
+#: Samples in a block, a power of two: the work grows with it, the number of blocks shrinks.
 BLOCK = 32
-"""Samples in a block, a power of two: the work grows with it, the number of blocks shrinks."""
 
 
 class BlockFilter(NamedTuple):
-    """What a filter of n joints makes of one block.
+    """What a filter of n joints makes of one block."""
 
-    Attributes:
-        toeplitz: Block's inputs → what is wanted at each of its samples. (n, BLOCK, BLOCK)
-        ends: Block's inputs → the state at its end. (n, BLOCK, m)
-        carry: State before the block → what is wanted at each of its samples. (n, m, BLOCK)
-        powers: Fᵏ for k = 0 … BLOCK. (n, BLOCK + 1, m, m)
-    """
-
-    toeplitz: Array
-    ends: Array
-    carry: Array
-    powers: Array
+    toeplitz: Array  #: Block's inputs → what is wanted at each of its samples. (n, BLOCK, BLOCK)
+    ends: Array  #: Block's inputs → the state at its end. (n, BLOCK, m)
+    carry: Array  #: State before the block → what is wanted at each of its samples. (n, m, BLOCK)
+    powers: Array  #: Fᵏ for k = 0 … BLOCK. (n, BLOCK + 1, m, m)
 
 
 def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> tuple[Array, Array]:

@@ -8,31 +8,22 @@ import numpy as np
 from vftcli.signals.arrays import EVEN, Array, median
 from vftcli.signals.series import Clock
 
+#: Different steps that are counted one by one; of more, those around the median.
 DISTINCT = 1 << 17
-"""Different steps that are counted one by one; of more, those around the median."""
-LARGE = 2.0
-"""A step this many times the median of the first block may be a gap: it is remembered."""
+LARGE = 2.0  #: A step this many times the median of the first block may be a gap: it is remembered.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Timing:
-    """The clock of a whole log.
+    """The clock of a whole log."""
 
-    Attributes:
-        samples: Number of samples T.
-        start: Time of the first. [s]
-        end: Time of the last. [s]
-        step: Median time between samples. [s]
-        uniform: Whether all steps are equal, as `vftcli.signals.arrays.is_uniform` says.
-        steps: The longest steps, all that may be gaps among them, and the times at which they
-            begin. (G, 2) [s]
-    """
-
-    samples: int
-    start: float
-    end: float
-    step: float
-    uniform: bool
+    samples: int  #: Number of samples T.
+    start: float  #: Time of the first. [s]
+    end: float  #: Time of the last. [s]
+    step: float  #: Median time between samples. [s]
+    uniform: bool  #: Whether all steps are equal, as `vftcli.signals.arrays.is_uniform` says.
+    #: The longest steps, all that may be gaps among them, and the times at which they begin. (G, 2)
+    #: [s]
     steps: Array
 
     @property
@@ -43,13 +34,7 @@ class Timing:
 
 
 class TimingCount:
-    """The stamps of a log, block by block; memory does not grow with an even or noisy clock.
-
-    Args:
-        least: Steps below or at this are only counted, where a pass before has told that the median
-            is above.
-        most: Those from this on, likewise.
-    """
+    """The stamps of a log, block by block; memory does not grow with an even or noisy clock."""
 
     def __init__(self, least: float = -np.inf, most: float = np.inf) -> None:
         self.least, self.most = least, most

@@ -15,9 +15,9 @@ from vftcli.signals.shown import Shown, frame_of
 if TYPE_CHECKING:
     import polars as pl
 
+#: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
-"""Names of the six components, force first, as in column names and tables."""
-
+#: Point that a moment refers to → its words; a log may name another, as a link of its own.
 POINTS = {
     "flange": "the flange point",
     "tool": "the tool's point",
@@ -25,37 +25,25 @@ POINTS = {
     "controller": "the flange point or the tool's, by which sensor the controller has",
     "sensor": "the sensor's origin",
 }
-"""Point that a moment refers to → its words; a log may name another, as a link of its own."""
-
+#: Axes → the point their moments refer to where nothing else is said, if not their own origin.
 OWN_POINT = {"base": "flange"}
-"""Axes → the point their moments refer to where nothing else is said, if not their own origin."""
-
+#: Whether a force is the environment's on the robot, or the robot's on the environment.
 Sign = Literal["on-robot", "by-robot"]
-"""Whether a force is the environment's on the robot, or the robot's on the environment."""
 
 
 @dataclass(frozen=True)
 class WrenchFrame:
-    """What a log states of its own wrench.
+    """What a log states of its own wrench."""
 
-    Attributes:
-        axes: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of which
-            nothing is known here.
-        point: What its moment refers to: a key of `POINTS`, or again the log's own name.
-        sign: Whose force it is.
-    """
-
+    #: Whose axes: base, flange, tool or sensor; or the log's own name of a frame, of which nothing
+    #: is known here.
     axes: str
-    point: str
-    sign: Sign = "on-robot"
+    point: str  #: What its moment refers to: a key of `POINTS`, or again the log's own name.
+    sign: Sign = "on-robot"  #: Whose force it is.
 
     @classmethod
     def parsed(cls, text: str) -> "WrenchFrame":
-        """The frame that ``AXES[@POINT][,by-robot]`` states, as ``--columns wrench[base]=…``.
-
-        Raises:
-            ParameterError: If it is anything else.
-        """
+        """The frame that ``AXES[@POINT][,by-robot]`` states, as ``--columns wrench[base]=…``."""
         place, _, sign = text.strip().partition(",")
         axes, at, point = place.strip().partition("@")
         sign = sign.strip() or "on-robot"
@@ -95,11 +83,10 @@ class WrenchFrame:
         return f"{self.axes} axes at {point}, as force {whose}"
 
 
+#: O_F_ext_hat_K of libfranka and what is built on it.
+#:
+#: On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
 FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
-"""O_F_ext_hat_K of libfranka and what is built on it.
-
-On a log of an FR3 it equals pinv(Jᵀ)·tau_ext_hat_filtered with J about the base's origin.
-"""
 
 
 def unit_of(axis: str | int) -> str:
@@ -116,32 +103,23 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Wrench(Shown):
-    """Force and moment that the environment exerts on the robot.
+    """Force and moment that the environment exerts on the robot."""
 
-    Attributes:
-        name: Short name of the observer or of the reference it comes from.
-        t: Time on the recording's clock. (T,) [s]
-        values: Force, then moment; also where the pose cannot tell them, so that a blow-up can be
-            seen: use `known` for numbers. (T, 6) [N, N·m]
-        frame: Axes and reference point: a key of `vftcli.virtual_sensor.frames.FRAMES`.
-        sd: One standard deviation of `values`. (T, 6) [N, N·m]
-        sigma_min: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian
-            was inverted. (T,) [m]
-        masked: Samples in which the pose cannot tell the wrench. (T,)
-        null_space: Norm of the part of the joint torque that no wrench at the flange explains,
-            None for arms of six joints. (T,) [N·m]
-        remarks: What a reader of the numbers should know.
-    """
-
-    name: str
-    t: Array
+    name: str  #: Short name of the observer or of the reference it comes from.
+    t: Array  #: Time on the recording's clock. (T,) [s]
+    #: Force, then moment; also where the pose cannot tell them, so that a blow-up can be seen: use
+    #: `known` for numbers. (T, 6) [N, N·m]
     values: Array
-    frame: str
-    sd: Array | None = None
+    frame: str  #: Axes and reference point: a key of `vftcli.virtual_sensor.frames.FRAMES`.
+    sd: Array | None = None  #: One standard deviation of `values`. (T, 6) [N, N·m]
+    #: Smallest singular value of J with angular rows × 0.3 m, None where no Jacobian was inverted.
+    #: (T,) [m]
     sigma_min: Array | None = None
-    masked: Mask | None = None
+    masked: Mask | None = None  #: Samples in which the pose cannot tell the wrench. (T,)
+    #: Norm of the part of the joint torque that no wrench at the flange explains, None for arms of
+    #: six joints. (T,) [N·m]
     null_space: Array | None = None
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
         seal(self, "t", "values", "sd", "sigma_min", "null_space")

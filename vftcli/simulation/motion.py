@@ -70,7 +70,7 @@ class Periodic:
 
 @dataclass(frozen=True, kw_only=True)
 class Stretches:
-    """Rest-to-rest stretches, each a path q(s) run through with minimum jerk, rests between them.
+    """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them.
 
     Attributes:
         times: Start and end of each stretch, in order. (K, 2) [s]

@@ -9,33 +9,24 @@ from vftcli.signals.parsing import check_known, interval
 from vftcli.virtual_sensor.frames import Mounting, check_frame, read_pose
 from vftcli.virtual_sensor.solvers import LEAST_SQUARES, SOLVERS
 
-FIT = "fit"
-"""The word for a sensor pose that is to be estimated from the log."""
-
-START = "start"
-"""The word for the unloaded start of the log."""
-
+FIT = "fit"  #: The word for a sensor pose that is to be estimated from the log.
+START = "start"  #: The word for the unloaded start of the log.
+#: The word for the solver that takes the whole log at once, and needs no observer before it.
 SMOOTHER = "smoother"
-"""The word for the solver that takes the whole log at once, and needs no observer before it."""
-
-SMOOTHED = ("best",)
-"""Observers whose wrench is the smoother's where no other solver is named."""
+SMOOTHED = ("best",)  #: Observers whose wrench is the smoother's where no other solver is named.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroChoice:
     """What is taken as the zero of a wrench; nothing where all is left at its default.
 
-    Attributes:
-        spans: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
-        start: Whether the unloaded start is to be found and taken.
-
     Raises:
         ParameterError: If both spans and the start are chosen.
     """
 
+    #: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
     spans: tuple[tuple[float, float], ...] = ()
-    start: bool = False
+    start: bool = False  #: Whether the unloaded start is to be found and taken.
 
     def __post_init__(self) -> None:
         if self.spans and self.start:
@@ -66,25 +57,20 @@ class ZeroChoice:
 class WrenchChoice:
     """What a user asks of the virtual sensor.
 
-    Attributes:
-        frame: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
-        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the
-            smoother where it is the observer's own, and least squares for the others.
-        tool: The tool's pose as text or a name in the robot file, None for the file's own.
-        sensor_pose: The sensor's pose likewise, or "fit".
-        zero: What is taken as the zero.
-        torque_sd: Torque error the covariance starts from: "own", a number or one a joint as text,
-            or None for the best that is known. [N·m]
-
     Raises:
         ParameterError: If there is no such frame or solver.
     """
 
-    frame: str = "flange"
+    frame: str = "flange"  #: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
+    #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the smoother where
+    #: it is the observer's own, and least squares for the others.
     solver: str | None = None
+    #: The tool's pose as text or a name in the robot file, None for the file's own.
     tool: str | None = None
-    sensor_pose: str | None = None
-    zero: ZeroChoice = field(default_factory=ZeroChoice)
+    sensor_pose: str | None = None  #: The sensor's pose likewise, or "fit".
+    zero: ZeroChoice = field(default_factory=ZeroChoice)  #: What is taken as the zero.
+    #: Torque error the covariance starts from: "own", a number or one a joint as text, or None for
+    #: the best that is known. [N·m]
     torque_sd: str | None = None
 
     def __post_init__(self) -> None:

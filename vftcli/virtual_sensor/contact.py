@@ -10,33 +10,21 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.intervals import intervals, runs_of
 
+#: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
 LEAVE = 0.6
-"""A contact ends where the score falls below this share of its threshold, 1: hysteresis."""
-
-HOLD = 0.02
-"""A contact must last at least this long, so that one noisy sample is none. [s]"""
-
-GAP = 0.25
-"""Two contacts closer than this are one. [s]"""
-
-BAND = 1.3
-"""The free band reaches this far beyond the largest departure seen in the free part."""
-
+HOLD = 0.02  #: A contact must last at least this long, so that one noisy sample is none. [s]
+GAP = 0.25  #: Two contacts closer than this are one. [s]
+BAND = 1.3  #: The free band reaches this far beyond the largest departure seen in the free part.
+#: An alarm that begins earlier than this before a true contact, or later than this after its end,
+#: is false, whatever it meets: a slow observer shows a contact for a while after it. [s]
 EARLY, LATE = 0.1, 1.0
-"""An alarm that begins earlier than this before a true contact, or later than this after its end,
-is false, whatever it meets: a slow observer shows a contact for a while after it. [s]"""
 
 
 class ContactInterval(NamedTuple):
-    """One interval of contact.
+    """One interval of contact."""
 
-    Attributes:
-        start: When the score rises above 1. [s]
-        stop: When it has fallen below `LEAVE`. [s]
-    """
-
-    start: float
-    stop: float
+    start: float  #: When the score rises above 1. [s]
+    stop: float  #: When it has fallen below `LEAVE`. [s]
 
 
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
@@ -48,9 +36,6 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
         values: A wrench or joint torques, NaN where unknown. (T, k)
         quiet: The same where nothing touches the arm. (S, k)
         least: Smallest half width, one or one a column.
-
-    Raises:
-        ParameterError: If no sample of the free part is known.
     """
     inside = quiet[np.all(np.isfinite(quiet), axis=1)]
     if len(inside) == 0:
@@ -97,26 +82,17 @@ class Interval(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Detection:
-    """How well found contacts tell the true ones, one to one.
+    """How well found contacts tell the true ones, one to one."""
 
-    Attributes:
-        contacts: True contacts.
-        listed: Found contacts, right or wrong.
-        missed: True contacts to which no found one is credited.
-        merged: Those of them that run into another: what overlaps them is credited elsewhere.
-        split: Found contacts that are neither credited nor false: pieces of a true one, its echo.
-        false_alarms: Found contacts that begin where nothing touches the arm.
-        false_alarms_per_h: Those per hour without contact. [1/h]
-        delay: Time from each true contact's start to the one found; NaN where missed. [s]
-    """
-
-    contacts: int
-    listed: int
-    missed: int
-    merged: int
+    contacts: int  #: True contacts.
+    listed: int  #: Found contacts, right or wrong.
+    missed: int  #: True contacts to which no found one is credited.
+    merged: int  #: Those of them that run into another: what overlaps them is credited elsewhere.
+    #: Found contacts that are neither credited nor false: pieces of a true one, its echo.
     split: int
-    false_alarms: int
-    false_alarms_per_h: float
+    false_alarms: int  #: Found contacts that begin where nothing touches the arm.
+    false_alarms_per_h: float  #: Those per hour without contact. [1/h]
+    #: Time from each true contact's start to the one found; NaN where missed. [s]
     delay: tuple[float, ...]
 
     @property

@@ -10,11 +10,10 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 
+#: As much of a log as counts for one independent sample: friction's errors last as long. [s]
 PIECE = 1.0
-"""As much of a log as counts for one independent sample: friction's errors last as long. [s]"""
-
+#: Evidence from which on the currents' word is believed, that of three standard errors. [nats]
 SURE = 4.5
-"""Evidence from which on the currents' word is believed, that of three standard errors. [nats]"""
 
 
 def controller_point(

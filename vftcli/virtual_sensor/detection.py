@@ -26,46 +26,31 @@ from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 from vftcli.virtual_sensor.zero import SETTLING
 
-TRUE_TORQUE = 0.5
-"""A true joint torque beyond this is a contact. [N·m]"""
-
+TRUE_TORQUE = 0.5  #: A true joint torque beyond this is a contact. [N·m]
+#: A true wrench beyond this is a contact, and half a free band at least so wide. (6,) [N, N·m]
 WRENCH_LIMITS = np.repeat([1.0, 0.2], 3)
-"""A true wrench beyond this is a contact, and half a free band at least so wide. (6,) [N, N·m]"""
-
-LEAST_TORQUE = 0.5
-"""Smallest half width of a free band of joint torques. [N·m]"""
-
+LEAST_TORQUE = 0.5  #: Smallest half width of a free band of joint torques. [N·m]
+#: Contacts of an exact reference closer than this are one; those of a measured one, which has a
+#: floor, as those of an observer. [s]
 TRUE_GAP = 0.12
-"""Contacts of an exact reference closer than this are one; those of a measured one, which has a
-floor, as those of an observer. [s]"""
 
 
 class ContactScore(NamedTuple):
-    """How one observer tells contacts.
+    """How one observer tells contacts."""
 
-    Attributes:
-        name: The observer.
-        signal: What it tells them from: "torque", "wrench", or "list" of contacts.
-        detection: Counts and delays, of the free band itself or of the list.
-    """
-
-    name: str
-    signal: str
-    detection: Detection
+    name: str  #: The observer.
+    signal: str  #: What it tells them from: "torque", "wrench", or "list" of contacts.
+    detection: Detection  #: Counts and delays, of the free band itself or of the list.
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToldContacts:
-    """What is known of a log's contacts before they are judged.
+    """What is known of a log's contacts before they are judged."""
 
-    Attributes:
-        untouched: Samples of the log that are known to be free; none where nothing is. (T,)
-        beside: What each observer reads in free runs of other logs, by name. (S, k) each
-        listed: Contacts that stand in a list, by the observer whose wrench they are told of.
-    """
-
-    untouched: Mask
+    untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
+    #: What each observer reads in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = field(default_factory=dict)
+    #: Contacts that stand in a list, by the observer whose wrench they are told of.
     listed: Mapping[str, Sequence[Interval]] = field(default_factory=dict)
 
 
@@ -76,12 +61,6 @@ def read_in_free_runs(
     sensor: VirtualSensor | None,
 ) -> dict[str, Array]:
     """What each observer reads in free runs once it has settled: wrenches, or joint torques.
-
-    Args:
-        pieces: The free samples of each run.
-        observers: The observers.
-        terms_of: Name of an observer, and a recording → p and μ that it runs on.
-        sensor: What makes their wrenches, None for joint torques.
 
     Returns:
         Name → (S, 6) or (S, n); nothing without pieces.
@@ -105,11 +84,7 @@ def true_intervals(
 
 
 def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
-    """Samples from `SETTLING` after the start to the first true contact. (T,)
-
-    Raises:
-        ParameterError: If a contact begins before the observers have settled.
-    """
+    """Samples from `SETTLING` after the start to the first true contact. (T,)"""
     first = true[0].start if true else float(t[-1])
     free: Mask = (t >= t[0] + SETTLING) & (t < first)
     if np.count_nonzero(free) < 10:
@@ -145,16 +120,6 @@ def judge_contacts(
     wrenches where they were asked for, else from their joint torques, by a free band: learned in
     the zero spans, else in the log's own free part, else in free runs, else before the first true
     contact.
-
-    Args:
-        estimates: The observers' torques.
-        measured: Their wrenches, or None.
-        reference: The true torque; beyond `TRUE_TORQUE`, or five times its floor in
-            motion, it is a contact.
-        told: What is known to be free, and what is listed; None for nothing.
-
-    Raises:
-        ParameterError: If there is no free part to learn the band from.
     """
     limits = np.maximum(TRUE_TORQUE, 5.0 * np.nan_to_num(floor_in_motion(reference)))
     gap = TRUE_GAP if reference.floor is None else GAP

@@ -20,40 +20,30 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
 from vftcli.signals.pose import IDENTITY, Pose, adjoint, inverse, rpy_matrix
 
+#: How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9.
 ROTATION_TOLERANCE = 1e-6
-"""How far RᵀR may lie from the identity: nine printed digits of a rotation leave 1e-9."""
-
+#: Name at the command line → axes and reference point.
 FRAMES: dict[str, str] = {
     "flange": "flange axes, moment about the flange point",
     "base": "base axes, moment about the flange point",
     "tool": "tool axes, moment about the tool point (--tool)",
     "sensor": "sensor axes, moment about the sensor's origin (--sensor-pose)",
 }
-"""Name at the command line → axes and reference point."""
 
 
 class Mounting(NamedTuple):
-    """What is fixed to the flange.
+    """What is fixed to the flange."""
 
-    Attributes:
-        tool: Pose of the tool in the flange frame, None if there is none.
-        sensor: Pose of the force/torque sensor in the flange frame, None if there is none.
-    """
-
-    tool: Pose | None = None
+    tool: Pose | None = None  #: Pose of the tool in the flange frame, None if there is none.
+    #: Pose of the force/torque sensor in the flange frame, None if there is none.
     sensor: Pose | None = None
 
 
-NOTHING = Mounting()
-"""A bare flange."""
+NOTHING = Mounting()  #: A bare flange.
 
 
 def check_frame(name: str) -> str:
-    """Return the frame's name.
-
-    Raises:
-        ParameterError: If there is no such frame; the message lists them.
-    """
+    """Return the frame's name."""
     if name not in FRAMES:
         raise ParameterError(
             f"no frame {name!r} for a wrench; there is "
@@ -63,11 +53,7 @@ def check_frame(name: str) -> str:
 
 
 def frame_pose(frame: str, mounting: Mounting) -> Pose:
-    """Pose in the flange frame of what a frame is fixed to.
-
-    Raises:
-        ParameterError: If the tool's or the sensor's pose is needed and not known.
-    """
+    """Pose in the flange frame of what a frame is fixed to."""
     if frame == "tool":
         if mounting.tool is None:
             raise ParameterError(
@@ -93,9 +79,6 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
         frame: A key of `FRAMES`.
         flange: Orientation of the flange in the base. (T, 3, 3)
         mounting: Where tool and sensor sit.
-
-    Raises:
-        ParameterError: If there is no such frame, or its pose is not known.
     """
     if check_frame(frame) == "base":
         # A wrench in base axes needs no pose at all, not even the tool's.
@@ -110,11 +93,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
 
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
-    """A pose whose rotation is one.
-
-    Raises:
-        ParameterError: If the matrix is no rotation, or a number is not finite.
-    """
+    """A pose whose rotation is one."""
     R, p = np.asarray(rotation, dtype=np.float64), np.asarray(translation, dtype=np.float64)
     if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
         raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
@@ -128,11 +107,7 @@ def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
 
 
 def pose_of_numbers(values: Sequence[float], what: str) -> Pose:
-    """A pose from x, y, z [m]; with roll, pitch, yaw [rad]; or with nine entries of R, row by row.
-
-    Raises:
-        ParameterError: If there are not 3, 6 or 12 numbers, or the nine are no rotation.
-    """
+    """A pose from x, y, z [m] with roll, pitch, yaw [rad] or nine entries of R by rows."""
     p = np.array(values[:3], dtype=np.float64)
     if len(values) == 3:
         return checked_pose(np.eye(3), p, what)
@@ -154,9 +129,6 @@ def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
         robot: Its file's sections are looked up.
         section: "tool" or "sensor".
         option: How the option is called, for messages.
-
-    Raises:
-        ParameterError: If it is neither; the message lists the names there are.
     """
     if (values := numbers(text)) is not None:
         return pose_of_numbers(values, option)

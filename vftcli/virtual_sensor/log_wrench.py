@@ -20,36 +20,23 @@ from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.controller_point import controller_point
 from vftcli.virtual_sensor.frames import FRAMES, Mounting
 
+#: What is assumed of a log that states nothing: a sensor's own reading, force on the robot.
 UNSTATED = WrenchFrame("sensor", "sensor")
-"""What is assumed of a log that states nothing: a sensor's own reading, force on the robot."""
 
 
 class Placement(NamedTuple):
-    """Where a log's wrench is measured.
+    """Where a log's wrench is measured."""
 
-    Attributes:
-        frame: Its axes, point and sign.
-        axes: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
-        point: The point of its moment in the flange frame, None for the base's origin. (3,) [m]
-        remarks: What had to be assumed.
-    """
-
-    frame: WrenchFrame
+    frame: WrenchFrame  #: Its axes, point and sign.
+    #: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
     axes: Array | None
+    #: The point of its moment in the flange frame, None for the base's origin. (3,) [m]
     point: Array | None
-    remarks: tuple[Remark, ...]
+    remarks: tuple[Remark, ...]  #: What had to be assumed.
 
 
 def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
-    """Where a log's wrench is measured; the flange stands for a tool or sensor of unknown pose.
-
-    Args:
-        frame: What the log states, or None.
-        mounting: Where tool and sensor sit.
-
-    Raises:
-        ParameterError: If its axes or its point are none of those that are known here.
-    """
+    """Where a log's wrench is measured; the flange stands for a tool or sensor of unknown pose."""
     remarks = [caution("wrench-frame-unstated")] if frame is None else []
     frame = frame or UNSTATED
     tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
@@ -71,12 +58,7 @@ def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
 
 
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
-    """The log's own wrench as force on the robot, in base axes about the flange point.
-
-    Raises:
-        MissingSignalError: If the log has none, or one that is zero throughout.
-        ParameterError: If its frame is not one that is known here.
-    """
+    """The log's own wrench as force on the robot, in base axes about the flange point."""
     if not np.any(recording.require("wrench")):
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
@@ -85,12 +67,7 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
 
 
 def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
-    """A recording's wrench as force on the robot, in base axes about the flange point.
-
-    Raises:
-        MissingSignalError: If it has none.
-        ParameterError: If its frame is not one that is known here.
-    """
+    """A recording's wrench as force on the robot, in base axes about the flange point."""
     values = recording.require("wrench")
     frame, why = recording.wrench_frame, tuple[Remark, ...]()
     if frame is not None and frame.point == "controller":

@@ -13,8 +13,7 @@ from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import resample_columns
 
-HALF = 0.05
-"""Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]"""
+HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 
 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:

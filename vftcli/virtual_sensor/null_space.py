@@ -8,25 +8,17 @@ from vftcli.signals.arrays import Mask
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.wrench import Wrench
 
-MARGIN = 1.25
-"""The threshold stands so far above the largest value of the free part."""
-
+MARGIN = 1.25  #: The threshold stands so far above the largest value of the free part.
+#: Share of samples above the threshold up to which nothing is said: chance reaches it.
 LEAST_SHARE = 0.001
-"""Share of samples above the threshold up to which nothing is said: chance reaches it."""
 
 
 class NullSpaceVerdict(NamedTuple):
-    """Where the torque of an arm of more than six joints is no tip wrench's.
+    """Where the torque of an arm of more than six joints is no tip wrench's."""
 
-    Attributes:
-        name: The observer.
-        threshold: `MARGIN` times the largest norm in the free part. [N·m]
-        share: Share of the samples above it: contact elsewhere on the arm, or a wrong model.
-    """
-
-    name: str
-    threshold: float
-    share: float
+    name: str  #: The observer.
+    threshold: float  #: `MARGIN` times the largest norm in the free part. [N·m]
+    share: float  #: Share of the samples above it: contact elsewhere on the arm, or a wrong model.
 
     @property
     def remarks(self) -> tuple[Remark, ...]:

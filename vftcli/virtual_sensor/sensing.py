@@ -44,8 +44,7 @@ from vftcli.virtual_sensor.zero import (
     zero_warning,
 )
 
-PAYLOAD_SLACK = 0.05
-"""Difference of payloads that is not worth a remark. [kg]"""
+PAYLOAD_SLACK = 0.05  #: Difference of payloads that is not worth a remark. [kg]
 
 
 def sense(

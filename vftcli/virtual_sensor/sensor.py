@@ -16,25 +16,18 @@ from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import UNSTATED
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
+#: Second to first singular value of the forces below which they lie on one line.
 LEAST_DIRECTIONS = 0.02
-"""Second to first singular value of the forces below which they lie on one line."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PoseFit:
-    """A sensor's pose on the flange, estimated from what it and the virtual sensor read.
+    """A sensor's pose on the flange, estimated from what it and the virtual sensor read."""
 
-    Attributes:
-        pose: Orientation and origin of the sensor in the flange frame.
-        force_rms: Force that the pose leaves unexplained, rms over axes and samples. [N]
-        moment_rms: The same of the moment. [N·m]
-        position_sd: Standard deviation of the origin. (3,) [m]
-    """
-
-    pose: Pose
-    force_rms: float
-    moment_rms: float
-    position_sd: Array
+    pose: Pose  #: Orientation and origin of the sensor in the flange frame.
+    force_rms: float  #: Force that the pose leaves unexplained, rms over axes and samples. [N]
+    moment_rms: float  #: The same of the moment. [N·m]
+    position_sd: Array  #: Standard deviation of the origin. (3,) [m]
 
     def __post_init__(self) -> None:
         seal(self, "position_sd")
@@ -61,9 +54,6 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     Args:
         flange: Virtual wrench in flange axes about the flange point. (T, 6) [N, N·m]
         sensor: The sensor's reading as force on the robot, in its own axes. (T, 6) [N, N·m]
-
-    Raises:
-        ParameterError: If the forces do not span at least two directions.
     """
     known = np.all(np.isfinite(flange) & np.isfinite(sensor), axis=1)
     ours, theirs = flange[known], sensor[known]
@@ -95,18 +85,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
 def find_mounting(
     recording: Recording, robot: Robot, disturbance: ExternalTorque, choice: WrenchChoice
 ) -> tuple[Mounting, tuple[Remark, ...]]:
-    """Tool and sensor poses as asked, and what was found: ``fit`` estimates the sensor's pose.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        disturbance: The torque whose wrench the sensor's reading is laid on.
-        choice: What is asked.
-
-    Raises:
-        ParameterError: If a pose is malformed, or cannot be found in the log.
-        MissingSignalError: If it is to be found and the log has no wrench.
-    """
+    """Tool and sensor poses as asked, and what was found: ``fit`` estimates the sensor's pose."""
     mounting = choice.mounting(robot)
     if choice.sensor_pose != FIT:
         return mounting, ()

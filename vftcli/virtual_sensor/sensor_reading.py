@@ -21,31 +21,23 @@ from vftcli.virtual_sensor.zero import Drift, without_drift, zero_drift
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class SensorReading(Shown):
-    """Everything the virtual sensor says of one log.
+    """Everything the virtual sensor says of one log."""
 
-    Attributes:
-        sensor: Solver, frame and mounting used.
-        wrenches: One an observer, drift removed where a zero was given.
-        masked: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
-        drifts: Zero drift, one an unloaded span and observer.
-        free: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
-        vendor: What convention the log's own wrench is in, None if it has none.
-        smoothed: What the smoother found, by the observer whose wrench it is.
-        elsewhere: The null-space channel's verdicts, for arms of more than six joints.
-        reference: The wrench the others are judged by, in the same frame, or None.
-        remarks: What the reader of the numbers should know.
-    """
-
-    sensor: VirtualSensor
-    wrenches: tuple[Wrench, ...]
-    masked: Mask
-    drifts: tuple[Drift, ...] = ()
+    sensor: VirtualSensor  #: Solver, frame and mounting used.
+    wrenches: tuple[Wrench, ...]  #: One an observer, drift removed where a zero was given.
+    masked: Mask  #: Samples in which the pose cannot tell a wrench, whoever observes it. (T,)
+    drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
+    #: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
     free: Mask
+    #: What convention the log's own wrench is in, None if it has none.
     vendor: VendorCheck | None = None
+    #: What the smoother found, by the observer whose wrench it is.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
+    #: The null-space channel's verdicts, for arms of more than six joints.
     elsewhere: tuple[NullSpaceVerdict, ...] = ()
+    #: The wrench the others are judged by, in the same frame, or None.
     reference: Wrench | None = None
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know.
 
     @property
     def masked_share(self) -> float:
@@ -76,14 +68,7 @@ class SensorReading(Shown):
 def with_reference(
     reading: SensorReading, reference: Wrench, *, of_sensor: bool = False
 ) -> SensorReading:
-    """The reading with a reference beside it.
-
-    Args:
-        reading: The reading.
-        reference: The wrench to judge by, in the reading's frame.
-        of_sensor: Whether a real sensor measured it: then its own zero is removed over the span of
-            the reading's, and each observer's lag behind it is told.
-    """
+    """The reading with a reference beside it."""
     if not of_sensor:
         return replace(reading, reference=reference)
     told: list[Remark] = []

@@ -12,35 +12,23 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import RobotError
 
-LENGTH = 0.3
-"""Length by which moments are made comparable with forces. [m]"""
-
-SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])
-"""Diagonal of S."""
-
+LENGTH = 0.3  #: Length by which moments are made comparable with forces. [m]
+SCALE = np.array([1.0, 1.0, 1.0, LENGTH, LENGTH, LENGTH])  #: Diagonal of S.
+#: Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]
 LEAST_SIGMA = 0.05
-"""Below this σ_min of S J the pose cannot tell the wrench: 1 N·m of torque error is 20 N. [m]"""
-
+#: Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]
 PRIOR = np.repeat([50.0, 10.0 / LENGTH], 3)
-"""Standard deviations of the MAP solver's prior about zero: 50 N and 10 N·m, of w_s. (6,) [N]"""
-
+#: Joint torque error against which the MAP solver weighs its prior where none is known: a weight,
+#: no band. [N·m]
 TORQUE_SD = 0.3
-"""Joint torque error against which the MAP solver weighs its prior where none is known: a weight,
-no band. [N·m]"""
 
 
 class Decomposition(NamedTuple):
-    """J_s J_sᵀ = U diag(λ) Uᵀ of every sample.
+    """J_s J_sᵀ = U diag(λ) Uᵀ of every sample."""
 
-    Attributes:
-        scaled: J_s. (T, 6, n) [m]
-        U: Eigenvectors, as columns. (T, 6, 6)
-        squares: λ, ascending: squares of the singular values of J_s. (T, 6) [m²]
-    """
-
-    scaled: Array
-    U: Array
-    squares: Array
+    scaled: Array  #: J_s. (T, 6, n) [m]
+    U: Array  #: Eigenvectors, as columns. (T, 6, 6)
+    squares: Array  #: λ, ascending: squares of the singular values of J_s. (T, 6) [m²]
 
     @property
     def sigma_min(self) -> Array:
@@ -50,11 +38,7 @@ class Decomposition(NamedTuple):
 
 
 def decompose(jacobian: Array) -> Decomposition:
-    """Decompose the flange Jacobian in base axes. (T, 6, n)
-
-    Raises:
-        RobotError: If the arm has fewer than six joints, which no pose can tell a wrench from.
-    """
+    """Decompose the flange Jacobian in base axes. (T, 6, n)"""
     n = jacobian.shape[2]
     if n < 6:
         raise RobotError(
@@ -68,15 +52,10 @@ def decompose(jacobian: Array) -> Decomposition:
 
 
 class Solution(NamedTuple):
-    """A linear estimate w = A τ and the square root B of its covariance, cov = B Bᵀ.
+    """A linear estimate w = A τ and the square root B of its covariance, cov = B Bᵀ."""
 
-    Attributes:
-        gain: A, from joint torque to wrench. (T, 6, n)
-        root: B. (T, 6, k)
-    """
-
-    gain: Array
-    root: Array
+    gain: Array  #: A, from joint torque to wrench. (T, 6, n)
+    root: Array  #: B. (T, 6, k)
 
 
 def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
@@ -116,15 +95,12 @@ def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
     return Solution(gain, SCALE[:, None] * np.swapaxes(root, 1, 2))
 
 
+#: Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B.
 SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
     "pinv": pinv,
     "map": maximum_a_posteriori,
 }
-"""Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B."""
-
-
-LEAST_SQUARES = "pinv"
-"""The solver where none is asked for."""
+LEAST_SQUARES = "pinv"  #: The solver where none is asked for.
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:
@@ -147,15 +123,11 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
 
 
 class FlangeWrench(NamedTuple):
-    """A wrench at the flange.
+    """A wrench at the flange."""
 
-    Attributes:
-        values: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
-        known: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
-    """
-
+    #: Force, then moment, about the flange point in the Jacobian's axes. (T, 6) [N, N·m]
     values: Array
-    known: Mask
+    known: Mask  #: Whether the pose can tell it: σ_min is at least `LEAST_SIGMA`. (T,)
 
 
 def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
@@ -167,9 +139,6 @@ def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrenc
         tau: Joint torque on the robot. (T, n) [N·m]
         jacobian: Jacobian; its axes are the wrench's. (T, 6, n)
         left_out: Singular values of S J up to this tell nothing of their direction. [m]
-
-    Raises:
-        RobotError: If the arm has fewer than six joints.
     """
     parts = decompose(jacobian)
     gain = least_squares_gain(parts, left_out)

@@ -25,8 +25,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
-OWN = "own"
-"""The word for the observers' own covariance as the torque error."""
+OWN = "own"  #: The word for the observers' own covariance as the torque error.
 
 
 def missed_torque(
@@ -52,23 +51,15 @@ def missed_torque(
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueError:
-    """Joint torque error per observer.
+    """Joint torque error per observer."""
 
-    Attributes:
-        sd: Observer → standard deviation, (n,) or (T, n); those without one have no band. [N·m]
-        remarks: Where it comes from, or why there is none.
-    """
-
+    #: Observer → standard deviation, (n,) or (T, n); those without one have no band. [N·m]
     sd: Mapping[str, Array]
-    remarks: tuple[Remark, ...]
+    remarks: tuple[Remark, ...]  #: Where it comes from, or why there is none.
 
 
 def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
-    """The torque error that ``--torque-sd`` states.
-
-    Raises:
-        ParameterError: If it is neither "own", one positive number, nor one a joint.
-    """
+    """The torque error that ``--torque-sd`` states."""
     if text == OWN:
         own = {torque.name: torque.sd for torque in torques if torque.sd is not None}
         without = tuple(torque.name for torque in torques if torque.sd is None)

@@ -14,26 +14,18 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import bridge_unknown, resample_columns
 from vftcli.signals.wrench import Wrench, WrenchFrame
 
+#: A correlation that no independent measurement reaches: the field is made from the torques.
 DERIVED = 0.9995
-"""A correlation that no independent measurement reaches: the field is made from the torques."""
-
-RESEMBLES = 0.5
-"""Below this correlation no convention explains the field."""
+RESEMBLES = 0.5  #: Below this correlation no convention explains the field.
 
 
 @dataclass(frozen=True, kw_only=True)
 class AxesFit:
-    """How one force reads in terms of another: theirs ≈ gain · matrix · ours.
+    """How one force reads in terms of another: theirs ≈ gain · matrix · ours."""
 
-    Attributes:
-        matrix: The signed permutation of axes that fits best. (3, 3)
-        gain: Factor on top of it.
-        correlation: Correlation of theirs with it, all axes together.
-    """
-
-    matrix: Array
-    gain: float
-    correlation: float
+    matrix: Array  #: The signed permutation of axes that fits best. (3, 3)
+    gain: float  #: Factor on top of it.
+    correlation: float  #: Correlation of theirs with it, all axes together.
 
     def __post_init__(self) -> None:
         seal(self, "matrix")
@@ -84,23 +76,14 @@ def permutation(Q: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class VendorCheck:
-    """What a vendor's wrench field turns out to be.
+    """What a vendor's wrench field turns out to be."""
 
-    Attributes:
-        stated_frame: What the log states of it, or None.
-        frame: "base" or "flange": the axes that fit best.
-        axes: Order, sign and gain of its axes in that frame.
-        offset: Its lag behind ours, negative where it is earlier.
-        zeros: Share of the samples in which it is exactly zero on all axes.
-        at_zeros: What our force reads there, rms of its norm. [N]
-    """
-
-    stated_frame: WrenchFrame | None
-    frame: str
-    axes: AxesFit | None
-    offset: Offset
-    zeros: float
-    at_zeros: float
+    stated_frame: WrenchFrame | None  #: What the log states of it, or None.
+    frame: str  #: "base" or "flange": the axes that fit best.
+    axes: AxesFit | None  #: Order, sign and gain of its axes in that frame.
+    offset: Offset  #: Its lag behind ours, negative where it is earlier.
+    zeros: float  #: Share of the samples in which it is exactly zero on all axes.
+    at_zeros: float  #: What our force reads there, rms of its norm. [N]
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -131,13 +114,7 @@ class VendorCheck:
 
 
 def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorCheck | None:
-    """Compare the log's wrench with ours in base and in flange axes; None if the log has none.
-
-    Args:
-        recording: The log; its wrench is taken as written, whatever its reader says of it.
-        ours: A virtual wrench in base axes about the flange point, of no delay.
-        chain: The arm.
-    """
+    """Compare the log's wrench with ours in base and in flange axes; None if the log has none."""
     theirs = recording.wrench
     if theirs is None:
         return None

@@ -25,27 +25,18 @@ from vftcli.virtual_sensor.solvers import (
     null_space,
 )
 
-CHUNK = 4096
-"""Samples that are solved at once: about 10 MB of 6×6 matrices."""
+CHUNK = 4096  #: Samples that are solved at once: about 10 MB of 6×6 matrices.
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class VirtualSensor(Shown):
-    """How joint torques become a wrench.
+    """How joint torques become a wrench."""
 
-    Attributes:
-        solver: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
-        frame: A key of `vftcli.virtual_sensor.frames.FRAMES`.
-        mounting: Where tool and sensor sit on the flange.
-        least_sigma: σ_min of J with angular rows × 0.3 m below which a sample is masked. [m]
-
-    Raises:
-        ParameterError: If there is no such solver or frame, or the frame's pose is not known.
-    """
-
-    solver: str = LEAST_SQUARES
-    frame: str = "flange"
+    solver: str = LEAST_SQUARES  #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`.
+    frame: str = "flange"  #: A key of `vftcli.virtual_sensor.frames.FRAMES`.
+    #: Where tool and sensor sit on the flange.
     mounting: Mounting = field(default_factory=Mounting)
+    #: σ_min of J with angular rows × 0.3 m below which a sample is masked. [m]
     least_sigma: float = LEAST_SIGMA
 
     def __post_init__(self) -> None:
@@ -73,9 +64,6 @@ class VirtualSensor(Shown):
             chain: The arm.
             sd: Name of an estimate → standard deviation of its torques, (n,) or (T, n) [N·m]; one
                 without has a wrench without band.
-
-        Raises:
-            RobotError: If the arm has fewer than six joints.
         """
         samples, n = q.shape
         for torque in torques:
@@ -144,12 +132,7 @@ class VirtualSensor(Shown):
 
 
 class ForceArrow(NamedTuple):
-    """A force as an arrow in the base frame.
+    """A force as an arrow in the base frame."""
 
-    Attributes:
-        origin: The point that the wrench's moment refers to. (S, 3) [m]
-        force: Force on the robot in base axes, NaN where it is not known. (S, 3) [N]
-    """
-
-    origin: Array
-    force: Array
+    origin: Array  #: The point that the wrench's moment refers to. (S, 3) [m]
+    force: Array  #: Force on the robot in base axes, NaN where it is not known. (S, 3) [N]

@@ -14,46 +14,27 @@ from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import ZeroChoice
 
-Span = tuple[float, float]
-"""First and last time. [s]"""
-
+Span = tuple[float, float]  #: First and last time. [s]
+#: Start of a log that is left out of an unloaded start: observers rise from zero. [s]
 SETTLING = 1.0
-"""Start of a log that is left out of an unloaded start: observers rise from zero. [s]"""
-
-LEAST_SPAN = 0.5
-"""Shortest unloaded start. [s]"""
-
+LEAST_SPAN = 0.5  #: Shortest unloaded start. [s]
+#: A departure from the start's own level that counts as load whatever the noise. [N, N·m]
 STEPS = np.repeat([3.0, 0.6], 3)
-"""A departure from the start's own level that counts as load whatever the noise. [N, N·m]"""
-
-BACK = 0.3
-"""An unloaded start ends this long before the load shows: it began to rise earlier. [s]"""
-
-SPREADS = 6.0
-"""A departure of so many robust standard deviations counts as load."""
+BACK = 0.3  #: An unloaded start ends this long before the load shows: it began to rise earlier. [s]
+SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drift:
-    """What one virtual sensor reads over one unloaded span.
+    """What one virtual sensor reads over one unloaded span."""
 
-    Attributes:
-        name: The observer.
-        span: First and last time. [s]
-        mean: Mean wrench, the zero drift. (6,) [N, N·m]
-        sd: Standard deviation about it. (6,) [N, N·m]
-        samples: Known samples in the span.
-        frame: Frame of the numbers.
-        removed: Whether it was subtracted.
-    """
-
-    name: str
-    span: Span
-    mean: Array
-    sd: Array
-    samples: int
-    frame: str
-    removed: bool = False
+    name: str  #: The observer.
+    span: Span  #: First and last time. [s]
+    mean: Array  #: Mean wrench, the zero drift. (6,) [N, N·m]
+    sd: Array  #: Standard deviation about it. (6,) [N, N·m]
+    samples: int  #: Known samples in the span.
+    frame: str  #: Frame of the numbers.
+    removed: bool = False  #: Whether it was subtracted.
 
     def __post_init__(self) -> None:
         seal(self, "mean", "sd")
@@ -71,11 +52,7 @@ class Drift:
 
 
 def zero_drift(wrench: Wrench, span: Span) -> Drift:
-    """Mean and spread of the known samples in a span.
-
-    Raises:
-        ParameterError: If the span lies outside the log, or the pose cannot tell the wrench in it.
-    """
+    """Mean and spread of the known samples in a span."""
     start, stop = max(span[0], float(wrench.t[0])), min(span[1], float(wrench.t[-1]))
     where = f"zero interval {interval_text(*span)}"
     if not start < stop:
@@ -107,11 +84,7 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
 
 
 def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
-    """A wrench less its mean over the first span of a choice, or over its own unloaded start.
-
-    Raises:
-        ParameterError: If the span holds no known samples, or there is no unloaded start.
-    """
+    """A wrench less its mean over the first span of a choice, or over its own unloaded start."""
     chosen = zero_spans(choice, wrench)
     return without_drift(wrench, zero_drift(wrench, chosen.zero)) if chosen.zero else wrench
 
@@ -129,15 +102,11 @@ def zero_moved(first: Drift, last: Drift) -> Remark:
 
 
 class ZeroSpans(NamedTuple):
-    """The unloaded parts of a log.
+    """The unloaded parts of a log."""
 
-    Attributes:
-        spans: Those that were chosen: the first is the zero, further ones show its drift. [s]
-        start: The unloaded start that was found where none was chosen. [s]
-    """
-
+    #: Those that were chosen: the first is the zero, further ones show its drift. [s]
     spans: tuple[Span, ...]
-    start: Span | None
+    start: Span | None  #: The unloaded start that was found where none was chosen. [s]
 
     @property
     def zero(self) -> Span | None:
@@ -155,11 +124,7 @@ class ZeroSpans(NamedTuple):
 
 
 def zero_spans(choice: ZeroChoice, wrench: Wrench) -> ZeroSpans:
-    """The spans of a choice, and the unloaded start of a wrench where it names none.
-
-    Raises:
-        ParameterError: If the unloaded start is asked for and there is none.
-    """
+    """The spans of a choice, and the unloaded start of a wrench where it names none."""
     if choice.spans:
         return ZeroSpans(choice.spans, None)
     start = unloaded_start(wrench)

@@ -14,14 +14,10 @@ from vftcli.outputs.files import unwritable
 from vftcli.outputs.partial import check_writable, held
 from vftcli.signals.errors import LogError, OutputError
 
-RECORD = Path("meta", "vftcli.json")
-"""What a copy tells of how it was made."""
-
-WORK = ".vftcli"
-"""Folder, in an unfinished copy, of what is done so far."""
-
+RECORD = Path("meta", "vftcli.json")  #: What a copy tells of how it was made.
+WORK = ".vftcli"  #: Folder, in an unfinished copy, of what is done so far.
+#: Endings of files that are large, and that nobody edits in place: they are linked.
 FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".jpg", ".jpeg"})
-"""Endings of files that are large, and that nobody edits in place: they are linked."""
 
 
 def partial_of(copy: Path) -> Path:
@@ -30,12 +26,7 @@ def partial_of(copy: Path) -> Path:
 
 
 def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
-    """See before anything is computed that a copy may be made at a path.
-
-    Raises:
-        OutputError: If it is the dataset, inside it or around it, or exists without `force`, or is
-            none that this command made.
-    """
+    """See before anything is computed that a copy may be made at a path."""
     source, target = dataset.resolve(), copy.resolve()
     if source == target or source in target.parents or target in source.parents:
         told = "are the same folder" if source == target else "are one inside the other"
@@ -64,13 +55,6 @@ def unfinished(copy: Path, key: str) -> Iterator[Path]:
 
     It stays if the block fails after something was done, to go on from; if the block ends well it
     takes the copy's place, whatever was there before.
-
-    Args:
-        copy: Where the copy shall be.
-        key: What the work depends on beside the dataset.
-
-    Raises:
-        OutputError: If another run is at it, or it cannot be written.
     """
     partial = partial_of(copy)
     work = partial / WORK
@@ -145,17 +129,7 @@ def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bool) -> None:
-    """Bring everything else of a dataset into a copy; films are linked where that can be.
-
-    Args:
-        folder: The dataset's.
-        partial: The copy's.
-        done: Files that are there already, or will be, by their paths in the folder.
-        link: Whether a film may be a second name of the dataset's file.
-
-    Raises:
-        LogError: If a link leaves the dataset.
-    """
+    """Bring everything else of a dataset into a copy; films are linked where that can be."""
     for inside, source in files_within(folder):
         if inside in done:
             continue
@@ -170,11 +144,7 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bo
 
 
 def files_within(folder: Path) -> Iterator[tuple[Path, Path]]:
-    """Every file of a dataset by its path in the folder, and where it really is.
-
-    Raises:
-        LogError: If a link leaves the dataset: a copy, which may be published, would hold its file.
-    """
+    """Every file of a dataset by its path in the folder, and where it really is."""
     top = folder.resolve()
     # A hub's cache keeps the files of all snapshots once, beside these.
     tops = (top, top.parents[1] / "blobs") if top.parent.name == "snapshots" else (top,)

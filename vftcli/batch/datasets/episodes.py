@@ -7,21 +7,15 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Single = NDArray[np.float32]
-"""Values of a column, as they are written. (frames, width)"""
+Single = NDArray[np.float32]  #: Values of a column, as they are written. (frames, width)
 
 
 class ForceColumn(NamedTuple):
-    """A column that is added.
+    """A column that is added."""
 
-    Attributes:
-        name: What it is, as external_torque; where it stands is the dataset's affair.
-        elements: What each of its numbers is, empty for a single one.
-        told: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
-    """
-
-    name: str
-    elements: tuple[str, ...]
+    name: str  #: What it is, as external_torque; where it stands is the dataset's affair.
+    elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
+    #: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
     told: Mapping[str, Any]
 
     @property
@@ -31,27 +25,17 @@ class ForceColumn(NamedTuple):
 
 
 class DataFile(NamedTuple):
-    """One file of a dataset with the episodes in it.
+    """One file of a dataset with the episodes in it."""
 
-    Attributes:
-        place: Its path in the dataset's folder.
-        log: What is read to get an episode: the file, or the folder of the whole dataset.
-        episodes: Their numbers, as ``--episode`` takes them.
-    """
-
-    place: Path
-    log: Path
-    episodes: tuple[int, ...]
+    place: Path  #: Its path in the dataset's folder.
+    log: Path  #: What is read to get an episode: the file, or the folder of the whole dataset.
+    episodes: tuple[int, ...]  #: Their numbers, as ``--episode`` takes them.
 
 
+#: Episode → name of a column → its values, a row a frame of the episode.
 Forces = Mapping[int, Mapping[str, Single]]
-"""Episode → name of a column → its values, a row a frame of the episode."""
-
-Statistics = Mapping[str, NDArray[Any]]
-"""Key of a statistic, as mean → its values. (width,)"""
-
-OfEpisodes = Mapping[int, Mapping[str, Statistics]]
-"""Episode → name of a column → its statistics."""
+Statistics = Mapping[str, NDArray[Any]]  #: Key of a statistic, as mean → its values. (width,)
+OfEpisodes = Mapping[int, Mapping[str, Statistics]]  #: Episode → name of a column → its statistics.
 
 
 class Dataset(Protocol):

@@ -10,8 +10,7 @@ from vftcli.readers.hdf5_layouts import episode_places, episodes_in
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
-ENDINGS = (".h5", ".hdf5")
-"""Names that files of episodes end with."""
+ENDINGS = (".h5", ".hdf5")  #: Names that files of episodes end with.
 
 
 def files_below(folder: Path) -> list[Path]:

@@ -14,14 +14,10 @@ from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 
-PREFIX = "observation."
-"""What the names of observations begin with."""
-
-DATASET = "a dataset of LeRobot"
-"""What needs pyarrow."""
-
+PREFIX = "observation."  #: What the names of observations begin with.
+DATASET = "a dataset of LeRobot"  #: What needs pyarrow.
+#: Key of a Parquet schema's metadata under which the `datasets` library tells its features.
 METADATA = b"huggingface"
-"""Key of a Parquet schema's metadata under which the `datasets` library tells its features."""
 
 
 class LeRobotDataset:
@@ -225,11 +221,7 @@ def whole_columns(
     columns: Sequence[ForceColumn],
     forces: Forces,
 ) -> list[Any]:
-    """Every column over all rows of a file, whichever episode each row is of. (rows, k) each
-
-    Raises:
-        LogError: If an episode of the file has no forces, or another number of frames.
-    """
+    """Every column over all rows of a file, whichever episode each row is of. (rows, k) each"""
     whole = [np.zeros((rows, column.width), np.float32) for column in columns]
     done = 0
     for number, own in forces.items():
@@ -248,11 +240,7 @@ def whole_columns(
 
 
 def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
-    """The features of a description by their names, to be added to.
-
-    Raises:
-        LogError: If they have no names.
-    """
+    """The features of a description by their names, to be added to."""
     features = info.setdefault("features", {})
     if not isinstance(features, dict):
         path = folder / "meta" / "info.json"

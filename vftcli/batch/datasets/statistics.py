@@ -6,11 +6,9 @@ import numpy as np
 
 from vftcli.batch.datasets.episodes import Single, Statistics
 
+#: Keys of the quantiles.
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
-"""Keys of the quantiles."""
-
-KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)
-"""All keys."""
+KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)  #: All keys.
 
 
 def statistics_of(values: Single) -> Statistics:

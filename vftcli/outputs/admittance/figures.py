@@ -15,8 +15,7 @@ from vftcli.outputs.figures.paper import Drawing
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-REPLAY_FIGURES = ("release",)
-"""Its name."""
+REPLAY_FIGURES = ("release",)  #: Its name.
 
 
 def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, Drawing]:

@@ -143,11 +143,7 @@ def write_admittance(
     examinations: Sequence[Examination] = (),
     form: str | None = None,
 ) -> None:
-    """Write the folder of a replay, all or nothing; figures in a form, or none.
-
-    Raises:
-        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
-    """
+    """Write the folder of a replay, all or nothing; figures in a form, or none."""
     record = admittance_record(replay, recording, run, command, examinations)
     title = recording.name if recording is not None else "release"
     if run is not None and run.simulation is not None:

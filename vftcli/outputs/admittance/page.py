@@ -37,8 +37,8 @@ from vftcli.outputs.palette import SPARE
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark, sentence
 
+#: Chart → unit of a translational and of a rotational axis.
 UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "energy": ("J", "J")}
-"""Chart → unit of a translational and of a rotational axis."""
 
 
 def deviations_from_paper() -> dict[str, str]:

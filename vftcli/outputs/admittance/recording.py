@@ -15,19 +15,12 @@ from vftcli.outputs.rerun_file import ArmView, rerun_file
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import unit_of
 
-GHOST = 150
-"""Opacity of a ghost arm, of 255."""
-
-SHAFT = 0.008
-"""Radius of a force arrow. [m]"""
+GHOST = 150  #: Opacity of a ghost arm, of 255.
+SHAFT = 0.008  #: Radius of a force arrow. [m]
 
 
 def write_ghosts(path: Path, replay: Replay, title: str) -> None:
-    """Write the recording with its blueprint, so that it opens arranged.
-
-    Raises:
-        OutputError: If it cannot be written whole.
-    """
+    """Write the recording with its blueprint, so that it opens arranged."""
     paint, chain, t = colours(replay, REFERENCE), replay.robot.chain, replay.motion.t
     poses = [motion(chain, t, replay.path.q[:, n]) for n in range(len(replay.controllers))]
     tabs = [Tab(name, t, group) for name, group in line_groups(replay, paint).items()]

@@ -20,6 +20,7 @@ def number_form(form: str) -> Callable[[float], str]:
     return lambda value: format(value, form).replace("-", "−")
 
 
+#: Key of a row → its column.
 COLUMNS = {
     "controller": Column("controller", words=True),
     "alpha": Column("α", form=number_form("g")),
@@ -37,13 +38,10 @@ COLUMNS = {
     "idle_s": Column("idle", "s", number_form(".3f")),
     "work_J": Column("work", "J", number_form(".3f")),
 }
-"""Key of a row → its column."""
-
-
+#: What the headings of the LaTeX table mean.
 RETURNS = (
     "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there"
 )
-"""What the headings of the LaTeX table mean."""
 
 
 def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:

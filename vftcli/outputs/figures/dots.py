@@ -14,43 +14,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SPREAD = 0.66
-"""Share of a joint's room that its dots take."""
-
-RANGE = 10.0
-"""Numbers that differ by more than this factor stand on a logarithmic axis."""
+SPREAD = 0.66  #: Share of a joint's room that its dots take.
+RANGE = 10.0  #: Numbers that differ by more than this factor stand on a logarithmic axis.
 
 
 class DotRow(NamedTuple):
-    """One number a joint, of one observer.
+    """One number a joint, of one observer."""
 
-    Attributes:
-        name: Whose they are.
-        values: NaN where not known. (n,)
-        low: Lower ends of their intervals, or None. (n,)
-        high: Upper ends. (n,)
-    """
-
-    name: str
-    values: Array
-    low: Array | None = None
-    high: Array | None = None
+    name: str  #: Whose they are.
+    values: Array  #: NaN where not known. (n,)
+    low: Array | None = None  #: Lower ends of their intervals, or None. (n,)
+    high: Array | None = None  #: Upper ends. (n,)
 
 
 class DotPlot(NamedTuple):
-    """One plot.
+    """One plot."""
 
-    Attributes:
-        title: Which log.
-        joints: What stands below. (n,)
-        rows: Dots, observer by observer.
-        floor: The reference's own error, NaN where it is not known. (n,)
-    """
-
-    title: str
-    joints: Sequence[str]
-    rows: Sequence[DotRow]
-    floor: Array
+    title: str  #: Which log.
+    joints: Sequence[str]  #: What stands below. (n,)
+    rows: Sequence[DotRow]  #: Dots, observer by observer.
+    floor: Array  #: The reference's own error, NaN where it is not known. (n,)
 
 
 def dot_figure(

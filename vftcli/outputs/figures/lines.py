@@ -14,38 +14,26 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+#: Stretches of a line in one plot, two samples each: finer than a printer tells in two inches.
 STRETCHES = 500
-"""Stretches of a line in one plot, two samples each: finer than a printer tells in two inches."""
-
+#: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
+#: wide. [in]
 NARROW, HIGH = 5.0, {False: 0.95, True: 1.15}
-"""Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
-wide. [in]"""
-
+#: Marks in turn: what they stand for is told by their shape where colours are not printed.
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
-"""Marks in turn: what they stand for is told by their shape where colours are not printed."""
-
+#: Width of a digit of a contact's number, and room between two numbers: where there is less, the
+#: second is left out. [in]
 DIGIT, BETWEEN = 0.046, 0.02
-"""Width of a digit of a contact's number, and room between two numbers: where there is less, the
-second is left out. [in]"""
-
-PLOTTED = 0.75
-"""About which share of a plot's room its axes take."""
-
-AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}
-"""Unit of a horizontal axis → what it is called."""
+PLOTTED = 0.75  #: About which share of a plot's room its axes take.
+AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
 
 
 class Plot(NamedTuple):
-    """One plot of a figure.
+    """One plot of a figure."""
 
-    Attributes:
-        chart: What it is a panel of.
-        panel: Which, from 0.
-        over: A chart whose same panel is drawn over it with an axis of its own, or None.
-    """
-
-    chart: Chart
-    panel: int
+    chart: Chart  #: What it is a panel of.
+    panel: int  #: Which, from 0.
+    #: A chart whose same panel is drawn over it with an axis of its own, or None.
     over: Chart | None = None
 
 
@@ -197,8 +185,8 @@ def band_look() -> dict[str, Any]:
     return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
 
 
+#: Colours of the page that follow its theme → theirs on white paper.
 PAINTS = {INK: "black", REFERENCE: "0.65"}
-"""Colours of the page that follow its theme → theirs on white paper."""
 
 
 def paint(series: ChartLine) -> str:
@@ -206,8 +194,8 @@ def paint(series: ChartLine) -> str:
     return PAINTS.get(series.colour, series.colour)
 
 
+#: Dashes of the page → those on paper, where they are too much like others.
 PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
-"""Dashes of the page → those on paper, where they are too much like others."""
 
 
 def look(series: ChartLine) -> dict[str, Any]:

@@ -19,15 +19,14 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
-FORMS = ("pdf", "svg", "png")
-"""What a figure may be written as."""
+FORMS = ("pdf", "svg", "png")  #: What a figure may be written as.
+WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
+RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. [dots/in]
 
-WIDTHS = {"single": 3.5, "double": 7.16}
-"""One and two columns of the IEEE's journals. [in]"""
-
-RESOLUTION = 600
-"""Of PNG: what the IEEE asks of drawings in black and white. [dots/in]"""
-
+#: Times-like type that matplotlib brings along, so that the bytes are the same on every machine.
+#:
+#: PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
+#: log's name is a dollar sign.
 STYLE = {
     "font.family": ["STIXGeneral", "DejaVu Sans"],
     "font.size": 8.0,
@@ -57,38 +56,22 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "vftcli",
 }
-"""Times-like type that matplotlib brings along, so that the bytes are the same on every machine.
 
-PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
-log's name is a dollar sign.
-"""
-
+#: Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]
 LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
-"""Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]"""
-
-LONGEST = 44
-"""Letters of a name in a figure; the end of a longer one is cut off."""
+LONGEST = 44  #: Letters of a name in a figure; the end of a longer one is cut off.
 
 
 class Drawing(NamedTuple):
-    """A figure that can be drawn in both widths.
+    """A figure that can be drawn in both widths."""
 
-    Attributes:
-        title: What it shows, with sign and frame, as its file says.
-        draw: Its width [in] → the figure; called where the style of a paper holds.
-    """
-
-    title: str
+    title: str  #: What it shows, with sign and frame, as its file says.
+    #: Its width [in] → the figure; called where the style of a paper holds.
     draw: "Callable[[float], Figure]"
 
 
 def checked_form(form: str | None) -> str | None:
-    """What figures shall be written as; None where none are asked for.
-
-    Raises:
-        ParameterError: If it is none of `FORMS`.
-        PackageError: If matplotlib is not installed.
-    """
+    """What figures shall be written as; None where none are asked for."""
     if form is None:
         return None
     if form not in FORMS:
@@ -110,14 +93,7 @@ def write_figures(
     form: str,
     before: str = "figures/",
 ) -> None:
-    """Write figures in both widths.
-
-    Args:
-        folder: Where.
-        drawings: Name → the figure.
-        form: One of `FORMS`.
-        before: What stands before the name of each file.
-    """
+    """Write figures in both widths."""
     for name, drawing in drawings.items():
         for width, inches in WIDTHS.items():
             with paper_style():

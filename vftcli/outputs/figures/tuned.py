@@ -10,8 +10,7 @@ from vftcli.outputs.log.figures import spectra_drawing, tuning_drawing
 from vftcli.refinement.tuning import Tuned, tuning_curves
 from vftcli.robots.writing import lines_of
 
-TUNED_FIGURES = ("spectra", "tuning")
-"""Their names."""
+TUNED_FIGURES = ("spectra", "tuning")  #: Their names.
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:
@@ -33,19 +32,7 @@ def write_tuned(
     force: bool = False,
     form: str | None = None,
 ) -> None:
-    """Write gains, and their figures beside them, all or nothing.
-
-    Args:
-        path: The gains file.
-        heading: What stands above the gains as comments.
-        spectra: What the gains were chosen on.
-        tuned: What was chosen.
-        force: Whether files that are there may be replaced.
-        form: What figures are written as, None for no figures.
-
-    Raises:
-        OutputError: If a file cannot be written, or exists and `force` is not set.
-    """
+    """Write gains, and their figures beside them, all or nothing."""
     comments = "".join(f"# {line}\n" for line in heading)
     gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
     text = comments + "".join(lines_of(gains))

@@ -12,8 +12,7 @@ from vftcli.outputs.identification.page import shown_trace, torque_charts
 from vftcli.outputs.identification.tables import residual_grid
 from vftcli.outputs.palette import SPARE
 
-IDENTIFICATION_FIGURES = ("torque", "residuals")
-"""Their names."""
+IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Their names.
 
 
 def identification_figures(found: Identification) -> dict[str, Drawing]:

@@ -28,11 +28,7 @@ from vftcli.signals.packages import installed
 
 
 def beside(path: Path) -> dict[str, Path]:
-    """The files that go with a robot file, by kind.
-
-    Raises:
-        OutputError: If the path does not end in .toml.
-    """
+    """The files that go with a robot file, by kind."""
     if path.suffix.lower() != ".toml":
         raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
     return {
@@ -64,9 +60,6 @@ def write_identification(
 
     Returns:
         The text of `run.json`.
-
-    Raises:
-        OutputError: If one exists and `force` is not set, or cannot be written.
     """
     # One folder for all four, so that they appear together or not at all.
     names = {kind: file.name for kind, file in beside(path).items()}

@@ -32,8 +32,7 @@ from vftcli.outputs.page.shell import (
 from vftcli.outputs.page.torque_part import joint_panels
 from vftcli.outputs.palette import SPARE
 
-DOTS = 600
-"""Samples drawn in a residual-over-velocity plot."""
+DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
 
 
 def render_identification(

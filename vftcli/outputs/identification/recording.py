@@ -20,11 +20,7 @@ from vftcli.signals.remarks import explanation
 
 
 def write_identification_rrd(path: Path, found: Identification) -> None:
-    """Write the recording with its blueprint, so that it opens arranged.
-
-    Raises:
-        OutputError: If it cannot be written whole.
-    """
+    """Write the recording with its blueprint, so that it opens arranged."""
     # An entity's path may hold no blank; names of files may. A log may be there in two roles.
     names = [re.sub(r"[^A-Za-z0-9_.-]", "_", t.motion.recording.name) for t in found.traces]
     entities = zip(found.traces, numbered(names), strict=True)

@@ -5,32 +5,24 @@ from dataclasses import dataclass
 
 from vftcli.signals.errors import ParameterError
 
+#: How much of a log its recording holds: every sample, of a long one its levels, or no recording.
+#:
+#: Levels are the lowest and highest samples of many stretches, and every sample where contacts
+#: begin.
 FULL, LEVELS, NONE = "full", "levels", "none"
-"""How much of a log its recording holds: every sample, of a long one its levels, or no recording.
-
-Levels are the lowest and highest samples of many stretches, and every sample where contacts begin.
-"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class OutputChoice:
-    """What is written of a log besides what always is.
+    """What is written of a log besides what always is."""
 
-    Attributes:
-        extras: Names of `estimates.EXTRAS`.
-        rrd_detail: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
-    """
-
-    extras: tuple[str, ...] = ()
+    extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
+    #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
     rrd_detail: str = LEVELS
 
     @classmethod
     def parsed(cls, *, extras: Sequence[str] = (), rrd_detail: str = LEVELS) -> "OutputChoice":
-        """The choice that a user's words state.
-
-        Raises:
-            ParameterError: If they are none of ours, or ask for a recording and for none.
-        """
+        """The choice that a user's words state."""
         if rrd_detail not in (FULL, LEVELS, NONE):
             raise ParameterError(
                 f"--rrd-detail {rrd_detail} is none of {FULL}, {LEVELS} and {NONE}"
@@ -45,5 +37,4 @@ class OutputChoice:
         return self.rrd_detail != NONE
 
 
-PLAIN = OutputChoice()
-"""What is written where nothing is asked for."""
+PLAIN = OutputChoice()  #: What is written where nothing is asked for.

@@ -23,17 +23,11 @@ from vftcli.signals.external_torque import COVERS
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 
-SHAFT = 0.012
-"""Radius of a force arrow. [m]"""
-
-BELOW = 0.06
-"""The spans of the contacts lie below zero by this share of the largest force."""
-
+SHAFT = 0.012  #: Radius of a force arrow. [m]
+BELOW = 0.06  #: The spans of the contacts lie below zero by this share of the largest force.
+#: The band of |F|: the colour of `best`, paler.
 BAND = "#e98aa2"
-"""The band of |F|: the colour of `best`, paler."""
-
-SPAN_WIDTH = 6.0
-"""Width of the line that is the span of a contact. [px]"""
+SPAN_WIDTH = 6.0  #: Width of the line that is the span of a contact. [px]
 
 
 def best_wrench(analysis: Analysis) -> Wrench | None:

@@ -21,22 +21,14 @@ from vftcli.signals.recording import Recording
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
-    """Write a log in the format that the file's name ends in.
-
-    Raises:
-        OutputError: If the ending is unknown, the file exists, or it cannot be written.
-    """
+    """Write a log in the format that the file's name ends in."""
     check_conversion(path, force)
     with atomic(path, force=force) as temporary:
         WRITERS[path.suffix.lower()](recording, temporary)
 
 
 def check_conversion(path: Path, force: bool) -> None:
-    """See before the log is read whether it could be written to `path`.
-
-    Raises:
-        OutputError: As `convert` does.
-    """
+    """See before the log is read whether it could be written to `path`."""
     if path.suffix.lower() not in WRITERS:
         raise OutputError(
             f"{path}: no format ends in {path.suffix or 'nothing'!r}; there is {', '.join(WRITERS)}"
@@ -114,9 +106,9 @@ def topics(recording: Recording) -> Iterator[OutputTopic]:
         yield OutputTopic("/vftcli/wrench", "geometry_msgs/WrenchStamped", values)
 
 
+#: Ending of the file's name → how it is written.
 WRITERS: dict[str, Callable[[Recording, Path], None]] = {
     ".parquet": write_parquet,
     ".mcap": write_mcap,
     ".csv": write_csv,
 }
-"""Ending of the file's name → how it is written."""

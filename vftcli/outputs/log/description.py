@@ -14,13 +14,7 @@ from vftcli.signals.pose import Pose, rotation_onto, rpy_angles
 def urdf_text(
     robot: Robot, names: tuple[str, ...], mounted: Mapping[str, Pose] | None = None
 ) -> str:
-    """URDF of the arm as it was used, the payload in its last link.
-
-    Args:
-        robot: The arm.
-        names: Its joints, base to tip.
-        mounted: Name → pose in the flange frame of what is fixed to it, as its tool.
-    """
+    """URDF of the arm as it was used, the payload in its last link."""
     chain = robot.loaded_chain
     shapes = capsules(chain)
     parts = [f"<robot name={quoteattr(robot.name)}>", link("base", shapes[0], "")]

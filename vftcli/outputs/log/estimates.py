@@ -27,11 +27,9 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-ALL = slice(None)
-"""All rows of a table."""
-
+ALL = slice(None)  #: All rows of a table.
+#: Rows from which on a table is written as several groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
-"""Rows from which on a table is written as several groups, and rows of such a group."""
 
 
 def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
@@ -90,11 +88,7 @@ def wrench_columns(analysis: Analysis) -> Iterator[tuple[str, Array]]:
 
 
 def write_estimates(path: Path, analysis: Analysis) -> None:
-    """Write the table as Parquet (zstd), that of a long log in groups of rows.
-
-    Raises:
-        OutputError: If the disk is full.
-    """
+    """Write the table as Parquet (zstd), that of a long log in groups of rows."""
     if len(analysis.t) > LONG and installed("pyarrow"):
         starts = range(0, len(analysis.t), GROUP_ROWS)
         groups = ((analysis, slice(start, start + GROUP_ROWS)) for start in steps(starts))
@@ -115,16 +109,7 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
 def write_groups(
     path: Path, groups: Iterable[tuple[Analysis, slice]], csv: Path | None = None
 ) -> None:
-    """Write the table of a long log as groups of rows: all of it has no room beside the log.
-
-    Args:
-        path: The Parquet file.
-        groups: The analysis that holds each group, and its rows of that.
-        csv: Where to write the table as CSV as well, None for nowhere.
-
-    Raises:
-        OutputError: If the disk is full.
-    """
+    """Write the table of a long log as groups of rows: all of it has no room beside the log."""
     pq = needed("pyarrow.parquet", "the estimates of a long log")
 
     # Measured numbers hardly repeat: a dictionary of them costs time and room.
@@ -168,13 +153,13 @@ def write_csv(path: Path, analysis: Analysis) -> None:
         table.write_csv(file, float_precision=9)
 
 
+#: Flag → names of its files.
 EXTRAS = {
     "csv": ("estimates.csv",),
     "mcap": ("estimates.mcap",),
     "layouts": ("estimates.foxglove.json", "estimates.plotjuggler.xml"),
     "rrd": ("recording.rrd",),
 }
-"""Flag → names of its files."""
 
 
 def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
@@ -222,9 +207,6 @@ def write_estimate_folder(
 
     Returns:
         The text of `run.json`.
-
-    Raises:
-        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     record = run_record(analysis, command)
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
@@ -244,19 +226,8 @@ def write_long_estimates(
 ) -> str:
     """Write the folder of a long log as `write_estimate_folder` does, block by block.
 
-    Args:
-        path: The folder.
-        blocks: The analyses of the log's blocks, in order.
-        whole: Gives what is known of the log when the last has gone by.
-        command: The command line.
-        choice: What is written besides: "csv" or nothing.
-        force: Whether files that are there may be replaced.
-
     Returns:
         The text of `run.json`.
-
-    Raises:
-        OutputError: As `write_estimate_folder` does.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         csv = folder / "estimates.csv" if "csv" in choice.extras else None

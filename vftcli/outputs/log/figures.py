@@ -33,17 +33,12 @@ if TYPE_CHECKING:
     from vftcli.observers.auto_tuning import Curve
     from vftcli.signals.arrays import Array
 
+#: Every figure that a log may have.
 LOG_FIGURES = ("torque", "errors", "wrench", "spectra", "tuning", "responses")
-"""Every figure that a log may have."""
-
-ERROR_FIGURES = ("errors",)
-"""The figure of a table of errors."""
-
-MOST = 8
-"""Logs that one figure of errors shows; of more, only what stands for all of them."""
-
+ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
+MOST = 8  #: Logs that one figure of errors shows; of more, only what stands for all of them.
+#: Dashes of responses, which are black: the spectra beside them have colours.
 BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
-"""Dashes of responses, which are black: the spectra beside them have colours."""
 
 
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
@@ -68,12 +63,7 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
 
 
 def torque_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing:
-    """External torque with the reference.
-
-    Args:
-        analysis: What is shown.
-        names: The observers that are drawn; ``best`` with its band, or all where it did not run.
-    """
+    """External torque with the reference."""
     chart = drawn_lines(analysis, torque_chart(analysis), names)
     return Drawing(
         f"{analysis.recording.name}: external torque on the robot about each joint's axis",

@@ -38,9 +38,6 @@ def write_jacobian_folder(
 
     Returns:
         The text of `run.json`.
-
-    Raises:
-        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     import polars as pl
 

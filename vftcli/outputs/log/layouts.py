@@ -14,8 +14,8 @@ from vftcli.observers.table import BEST
 from vftcli.outputs.log.mcap_output import ros_name
 from vftcli.outputs.palette import COLOURS, REFERENCE, SPARE, colours_of
 
+#: A line of a plot: its path in the program's own words, its name, its colour.
 LinePath = tuple[str, str, str]
-"""A line of a plot: its path in the program's own words, its name, its colour."""
 
 
 def lead_wrench(analysis: Analysis) -> str | None:

@@ -41,26 +41,18 @@ from vftcli.virtual_sensor.frames import frame_pose
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
 
-INFO, WARNING = 2, 3
-"""Levels of a log message."""
-
-BLOCK = 8192
-"""Samples whose messages are held in memory at once."""
+INFO, WARNING = 2, 3  #: Levels of a log message.
+BLOCK = 8192  #: Samples whose messages are held in memory at once.
 
 Nanoseconds = NDArray[np.int64]
 
 
 class OutputTopic(NamedTuple):
-    """Messages of one topic, one a sample.
+    """Messages of one topic, one a sample."""
 
-    Attributes:
-        name: The topic's name.
-        kind: The type, as package/Name.
-        values: Dotted path of a field → its value; of an array each message gets a row.
-    """
-
-    name: str
-    kind: str
+    name: str  #: The topic's name.
+    kind: str  #: The type, as package/Name.
+    #: Dotted path of a field → its value; of an array each message gets a row.
     values: Mapping[str, Value]
 
     def messages(self, stamps: Nanoseconds, span: slice) -> NDArray[np.uint8]:
@@ -71,20 +63,13 @@ class OutputTopic(NamedTuple):
 
 
 class Event(NamedTuple):
-    """One message of a topic that has few.
+    """One message of a topic that has few."""
 
-    Attributes:
-        stamp: When. [ns]
-        topic: The topic's name.
-        kind: The type, as package/Name.
-        values: Dotted path of a field → its value.
-        latched: Whether who subscribes later gets it too, as ROS 2 keeps a robot's description.
-    """
-
-    stamp: int
-    topic: str
-    kind: str
-    values: Mapping[str, Value]
+    stamp: int  #: When. [ns]
+    topic: str  #: The topic's name.
+    kind: str  #: The type, as package/Name.
+    values: Mapping[str, Value]  #: Dotted path of a field → its value.
+    #: Whether who subscribes later gets it too, as ROS 2 keeps a robot's description.
     latched: bool = False
 
 
@@ -183,8 +168,7 @@ def source_stamps(recording: Recording) -> Nanoseconds:
     return stamps
 
 
-LAST_STAMP = 2**31 - 1
-"""ROS 2 counts seconds in 32 bits with a sign."""
+LAST_STAMP = 2**31 - 1  #: ROS 2 counts seconds in 32 bits with a sign.
 
 
 def stamps_of(recording: Recording) -> Nanoseconds:
@@ -235,6 +219,7 @@ def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  
     writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
 
 
+#: What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played.
 LATCHED = """\
 - history: keep_last
   depth: 1
@@ -246,7 +231,6 @@ LATCHED = """\
   liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
   avoid_ros_namespace_conventions: false
 """
-"""What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played."""
 
 
 def channel(writer: Any, topic: str, kind: str, latched: bool = False) -> int:  # noqa: ANN401

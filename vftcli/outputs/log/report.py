@@ -27,22 +27,18 @@ from vftcli.signals.progress import steps
 if TYPE_CHECKING:
     import polars as pl
 
+#: File name → how its text is made from the errors table.
 ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
     "errors.csv": tables.to_csv,
     "errors.json": tables.to_json,
     "errors.md": tables.to_markdown,
     "errors.tex": tables.to_latex,
 }
-"""File name → how its text is made from the errors table."""
-
-CONTACTS = ("contacts.json", "contacts.csv")
-"""The list of contacts, where it is made."""
-
+CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
+#: What a report of one log may hold; the error tables only where there is a reference.
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
-"""What a report of one log may hold; the error tables only where there is a reference."""
-
+#: What stands above the sub-folders of several logs.
 SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
-"""What stands above the sub-folders of several logs."""
 
 
 def places_of(labels: Sequence[str]) -> list[str]:
@@ -84,9 +80,6 @@ def write_report(
 
     Returns:
         The text of `run.json`.
-
-    Raises:
-        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     names = report_files([analysis.recording.name], choice.extras, form)
     with OutputFolder(path, force, names) as folder:
@@ -105,20 +98,8 @@ def write_reports(
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
 
-    Args:
-        path: The folder.
-        analyses: The logs that could be analysed.
-        command: The command line as the user typed it.
-        force: Whether files that are there may be replaced.
-        choice: What else is written of each log.
-        form: What figures are written as, None for no figures.
-        failed: Why each of the other logs could not be, by its label.
-
     Returns:
         The texts of the logs' own `run.json`, as one JSON array.
-
-    Raises:
-        OutputError: If the folder cannot be written, or a file exists and `force` is not set.
     """
     import polars as pl
 

@@ -41,33 +41,17 @@ from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
+#: The last joints, whose torques are smaller than the others': they share a vertical axis.
 WRIST = 3
-"""The last joints, whose torques are smaller than the others': they share a vertical axis."""
-
+#: Stretches of a long log of which a plot keeps the lowest and highest samples of its lines.
 STRETCHES = 5000
-"""Stretches of a long log of which a plot keeps the lowest and highest samples of its lines."""
-
-AROUND = 1.0
-"""Time before and after the start of a contact in which every sample is kept. [s]"""
-
-WHOLE_TIME = 20.0
-"""Time of which every sample is kept, all contacts together. [s]"""
-
-LEADING = 2.0
-"""Width of the line of `best`; the others are thinner. [px]"""
+AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
+WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
+LEADING = 2.0  #: Width of the line of `best`; the others are thinner. [px]
 
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
-    """Write the recording with its blueprint, so that it opens arranged.
-
-    Args:
-        path: Where to; an existing file is replaced.
-        analysis: The log.
-        detail: How much of a long log it holds: `FULL` or `LEVELS`.
-
-    Raises:
-        OutputError: If it cannot be written whole.
-    """
+    """Write the recording with its blueprint, so that it opens arranged."""
     arm, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
     tabs = tabs_of(analysis, detail)
     if found is not None:
@@ -134,8 +118,8 @@ def line_groups(analysis: Analysis) -> dict[str, Iterable[Lines]]:
     return {**groups, "Motion": motion_lines(analysis)}
 
 
+#: Group of entities → what its plots show.
 TITLES = {"tau_ext": "external torque [N·m]", "residual": "estimate − reference [N·m]"}
-"""Group of entities → what its plots show."""
 
 
 def joint_lines(

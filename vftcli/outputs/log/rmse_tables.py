@@ -11,41 +11,30 @@ from vftcli.evaluation.joint_means import JointMeans, joint_means
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
 from vftcli.signals.arrays import Array, Mask
 
+#: An RMSE within this factor of the reference's floor cannot be told from the reference's own.
 AT_FLOOR = 1.2
-"""An RMSE within this factor of the reference's floor cannot be told from the reference's own."""
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
+#: What the page writes behind a number where the terminal has a star.
 ON_PAGE = '<span class="mark">at the floor</span>'
-"""What the page writes behind a number where the terminal has a star."""
 
 
 class Block(NamedTuple):
-    """RMSE of one recording, observers down, joints across.
+    """RMSE of one recording, observers down, joints across."""
 
-    Attributes:
-        recording: The log's label, unique in the command.
-        reference: What the estimates are judged by.
-        joints: Joint numbers, from 1.
-        observers: Names, in the order in which they ran.
-        rmse: NaN where it is not known. (observers, joints) [N·m]
-        floor: The reference's own error, NaN where it is not known. (joints,) [N·m]
-        samples: Fewest and most samples an entry is made of.
-        means: What the joints are in one number.
-        missing: Observer → largest share of a joint's samples without its answer, where there is.
-        untrusted: Joints whose reference is not to be trusted, because they rest.
-    """
-
-    recording: str
-    reference: str
-    joints: tuple[int, ...]
-    observers: tuple[str, ...]
-    rmse: Array
-    floor: Array
-    samples: tuple[int, int]
-    means: JointMeans
+    recording: str  #: The log's label, unique in the command.
+    reference: str  #: What the estimates are judged by.
+    joints: tuple[int, ...]  #: Joint numbers, from 1.
+    observers: tuple[str, ...]  #: Names, in the order in which they ran.
+    rmse: Array  #: NaN where it is not known. (observers, joints) [N·m]
+    floor: Array  #: The reference's own error, NaN where it is not known. (joints,) [N·m]
+    samples: tuple[int, int]  #: Fewest and most samples an entry is made of.
+    means: JointMeans  #: What the joints are in one number.
+    #: Observer → largest share of a joint's samples without its answer, where there is.
     missing: dict[str, float]
+    #: Joints whose reference is not to be trusted, because they rest.
     untrusted: tuple[int, ...] = ()
 
     @property

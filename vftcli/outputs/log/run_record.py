@@ -25,6 +25,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 from vftcli.signals.version import VERSION
 
+#: What every number in an output means.
 CONVENTIONS = {
     "sign": "tau_ext is the torque the environment exerts ON the robot: "
     "M ddq + C dq + g + friction = tau + tau_ext",
@@ -32,14 +33,10 @@ CONVENTIONS = {
     "units": "s, rad, rad/s, A, N, N·m, kg",
     "time": "seconds from the log's first sample",
 }
-"""What every number in an output means."""
-
+#: A list without words, which is better read on one line.
 NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
-"""A list without words, which is better read on one line."""
-
-END = "\n}\n"
-"""How an object's text ends."""
-
+END = "\n}\n"  #: How an object's text ends.
+#: Package → its module, whose version is recorded if it is loaded; none is imported for it.
 PACKAGES = {
     "numpy": "numpy",
     "scipy": "scipy",
@@ -49,7 +46,6 @@ PACKAGES = {
     "rosbags": "rosbags",
     "mcap": "mcap",
 }
-"""Package → its module, whose version is recorded if it is loaded; none is imported for it."""
 
 
 def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
@@ -90,12 +86,6 @@ def seal(
     files: Mapping[str, str] | None = None,
 ) -> str:
     """Write a run's record with the digest of every file beside it, the last of them to be written.
-
-    Args:
-        folder: Where the files are.
-        name: The seal, as ``run.json``; in a sub-folder it stands for the files there.
-        record: What was run on what.
-        files: Name → sha256, where they are not all that are there.
 
     Returns:
         The text of the record alone: digests of recordings differ from run to run, since Rerun

@@ -40,11 +40,8 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation.print_table import Comparison
 
-OVERRIDDEN = "overridden"
-"""Column of the codes with which results were wanted anyway."""
-
-SURE = 0.05
-"""Below this p a difference between two observers is called sure."""
+OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted anyway.
+SURE = 0.05  #: Below this p a difference between two observers is called sure.
 
 
 def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
@@ -80,13 +77,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
 def to_terminal(
     errors: pl.DataFrame, bounds: PaperBounds | None = None, *, every: bool = True
 ) -> str:
-    """The tables of the tidy error table as text, with the meaning of their marks.
-
-    Args:
-        errors: It.
-        bounds: What the paper allows an error of the wrench.
-        every: Whether intervals, lags and significance are shown too.
-    """
+    """The tables of the tidy error table as text, with the meaning of their marks."""
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
@@ -149,8 +140,8 @@ def to_csv(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
     return csv_rows(errors.to_dicts(), errors.columns)
 
 
+#: Name of a form → the text of the errors table in it.
 FORMS = {"json": to_json, "csv": to_csv, "markdown": to_markdown, "latex": to_latex}
-"""Name of a form → the text of the errors table in it."""
 
 
 def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.virtual_sensor.zero import Drift
 
+#: Label of a log → bounds [N, N·m] that the paper gives for the RMSE of this log's arm.
 PaperBounds = Mapping[str, tuple[float, float]]
-"""Label of a log → bounds [N, N·m] that the paper gives for the RMSE of this log's arm."""
 
 
 def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
@@ -75,6 +75,7 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
             )
 
 
+#: Columns of the contact table, and how they are headed.
 CONTACTS = {
     "recording": "recording",
     "observer": "observer",
@@ -90,7 +91,6 @@ CONTACTS = {
     "detection_delay_s": "mean delay [s]",
     "longest_delay_s": "longest [s]",
 }
-"""Columns of the contact table, and how they are headed."""
 
 
 def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
@@ -107,12 +107,7 @@ def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
 
 
 def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
-    """Zero drift per observer and axis, with five decimals as the paper prints it.
-
-    Args:
-        drifts: What to show, one row each.
-        spans: Whether to show the span of each, and units: the page does, where they fit.
-    """
+    """Zero drift per observer and axis, with five decimals as the paper prints it."""
     span = (Column("span [s]"),) if spans else ()
     axes = (
         Column(axis, unit_of(axis) if spans else "", ".5f", width=0 if spans else 9)

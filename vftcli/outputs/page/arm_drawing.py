@@ -8,11 +8,8 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import resample_columns
 
-WIDTH, HEIGHT, EDGE = 84.0, 64.0, 9.0
-"""Size of the drawing and its margin."""
-
-ARROW, HEAD = 20.0, 5.0
-"""Length of an arrow that lies in the drawing's plane, and of its head."""
+WIDTH, HEIGHT, EDGE = 84.0, 64.0, 9.0  #: Size of the drawing and its margin.
+ARROW, HEAD = 20.0, 5.0  #: Length of an arrow that lies in the drawing's plane, and of its head.
 
 
 def arm_drawing(analysis: Analysis, contact: Contact) -> str:

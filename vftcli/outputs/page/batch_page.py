@@ -14,12 +14,7 @@ if TYPE_CHECKING:
 
 
 def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
-    """The page over a batch.
-
-    Args:
-        lines: One a log, as `batch_lines` makes them.
-        failures: Logs that could not be done, with stage, error and line.
-    """
+    """The page over a batch."""
     robots = sorted({line.robot for line in lines})
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
     told = sum(line.contacts != DASH for line in lines)
@@ -46,12 +41,7 @@ def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
 
 
 def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[IndexLine]:
-    """The line of every log.
-
-    Args:
-        table: All rows of some logs, as ``batch.parquet`` holds them.
-        pages: Label of a log → its own page, relative to the batch's.
-    """
+    """The line of every log."""
     from vftcli.evaluation.joint_means import joint_means
 
     if table.is_empty():

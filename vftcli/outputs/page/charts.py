@@ -18,55 +18,36 @@ from vftcli.outputs.palette import colours_of_names
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
 
+#: Bytes that the large charts of a page may take; a long log's may take more, up to this factor.
 ROOM, LONG = 350_000, 4.0
-"""Bytes that the large charts of a page may take; a long log's may take more, up to this factor."""
-
+#: Stretches a long log is cut into, two samples each, however many lines there are.
 FEWEST, MOST = 250, 2000
-"""Stretches a long log is cut into, two samples each, however many lines there are."""
-
+#: Bytes of a stretch of a line: two samples of a float32 and an int16 as base64.
 POINT = 2 * (4 + 2) * 4 / 3
-"""Bytes of a stretch of a line: two samples of a float32 and an int16 as base64."""
-
+#: Steps between a line's lowest and highest value, finer than any screen; what stands for NaN.
 STEPS, UNKNOWN = 65534, -32768
-"""Steps between a line's lowest and highest value, finer than any screen; what stands for NaN."""
-
+#: How lines are broken, in turn: none is told by its colour alone.
 DASHES = ("7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
-"""How lines are broken, in turn: none is told by its colour alone."""
-
-QUIET = "95 % band, no contact listed"
-"""What a grey ribbon is called."""
-
+QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
+#: Colours that follow the page: its text's, and the reference's.
 INK, REFERENCE = "ink", "reference"
-"""Colours that follow the page: its text's, and the reference's."""
-
-LineStyle = tuple[str, str]
-"""Colour and dash of a line."""
+LineStyle = tuple[str, str]  #: Colour and dash of a line.
 
 
 class ChartLine(NamedTuple):
-    """One line of a chart, for every panel.
+    """One line of a chart, for every panel."""
 
-    Attributes:
-        name: What the legend calls it.
-        values: One column a panel. (T, n)
-        colour: ``#rrggbb``, `INK` or `REFERENCE`.
-        dash: How it is broken, as SVG says it; "" for a line without gaps.
-        half: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
-        leads: Whether it is the line to look at: drawn thicker.
-        shown: Whether it is drawn at once, rather than when asked for.
-        x: Its own horizontal places, None for the chart's. (T,)
-        quiet: Where the ribbon is grey: no contact is listed there, so that it says what would
-            show. None for nowhere. (T,)
-    """
-
-    name: str
-    values: Array
-    colour: str = INK
-    dash: str = ""
+    name: str  #: What the legend calls it.
+    values: Array  #: One column a panel. (T, n)
+    colour: str = INK  #: ``#rrggbb``, `INK` or `REFERENCE`.
+    dash: str = ""  #: How it is broken, as SVG says it; "" for a line without gaps.
+    #: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
     half: Array | None = None
-    leads: bool = False
-    shown: bool = True
-    x: Array | None = None
+    leads: bool = False  #: Whether it is the line to look at: drawn thicker.
+    shown: bool = True  #: Whether it is drawn at once, rather than when asked for.
+    x: Array | None = None  #: Its own horizontal places, None for the chart's. (T,)
+    #: Where the ribbon is grey: no contact is listed there, so that it says what would show. None
+    #: for nowhere. (T,)
     quiet: Mask | None = None
 
     def ribbons(self, panel: int) -> tuple[Array, Array] | None:
@@ -79,37 +60,21 @@ class ChartLine(NamedTuple):
 
 
 class Chart(NamedTuple):
-    """A picture for every joint or axis.
+    """A picture for every joint or axis."""
 
-    Attributes:
-        key: Its name on the page.
-        title: What it shows, in words.
-        units: Unit of each panel's vertical axis. (n,)
-        panels: Their names. (n,)
-        x: Horizontal places. (T,)
-        series: Its lines, the last on top.
-        families: Which panels share a scale: those of one number. (n,)
-        band: Half the width of a band about zero, one a panel, or None. (n,)
-        band_label: What the band is.
-        spans: Stretches that are marked, as contacts. [s]
-        unit: Unit of the horizontal axis.
-        log: Whether the horizontal axis is logarithmic.
-        lowest: Least end of the vertical axis, None for what the lines need.
-    """
-
-    key: str
-    title: str
-    units: tuple[str, ...]
-    panels: tuple[str, ...]
-    x: Array
-    series: tuple[ChartLine, ...]
-    families: tuple[int, ...] = ()
-    band: Array | None = None
-    band_label: str = ""
-    spans: Sequence[tuple[float, float]] = ()
-    unit: str = "s"
-    log: bool = False
-    lowest: float | None = None
+    key: str  #: Its name on the page.
+    title: str  #: What it shows, in words.
+    units: tuple[str, ...]  #: Unit of each panel's vertical axis. (n,)
+    panels: tuple[str, ...]  #: Their names. (n,)
+    x: Array  #: Horizontal places. (T,)
+    series: tuple[ChartLine, ...]  #: Its lines, the last on top.
+    families: tuple[int, ...] = ()  #: Which panels share a scale: those of one number. (n,)
+    band: Array | None = None  #: Half the width of a band about zero, one a panel, or None. (n,)
+    band_label: str = ""  #: What the band is.
+    spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
+    unit: str = "s"  #: Unit of the horizontal axis.
+    log: bool = False  #: Whether the horizontal axis is logarithmic.
+    lowest: float | None = None  #: Least end of the vertical axis, None for what the lines need.
 
 
 def observer_lines(estimates: Sequence[ExternalTorque]) -> dict[str, LineStyle]:

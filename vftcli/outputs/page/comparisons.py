@@ -8,6 +8,7 @@ from vftcli.evaluation.selection import Facts, advice, facts
 from vftcli.outputs.grid import DASH, Column, Grid, html
 from vftcli.outputs.page.shell import bullets, section, soft
 
+#: Headings of the table of what was computed on the log.
 HEADS = (
     "90 % of a step [ms]",
     "delay [ms]",
@@ -16,7 +17,6 @@ HEADS = (
     "mean RMSE [N·m]",
     "to tune",
 )
-"""Headings of the table of what was computed on the log."""
 
 
 def selection_guide(analysis: Analysis) -> str:

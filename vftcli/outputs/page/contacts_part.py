@@ -13,17 +13,13 @@ from vftcli.outputs.page.arm_drawing import arm_drawing
 from vftcli.outputs.page.hero import told
 from vftcli.signals.remarks import sentence
 
+#: How often, in words.
 TIMES = ("once", "twice", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-"""How often, in words."""
-
+#: How far a contact's begin may be off: nine in ten of simulated contacts are nearer. [s]
 ONSET = 0.1
-"""How far a contact's begin may be off: nine in ten of simulated contacts are nearer. [s]"""
-
-FEW = 6
-"""Of more contacts the lead tells how many were where, not which."""
-
+FEW = 6  #: Of more contacts the lead tells how many were where, not which.
+#: Heads of the table.
 HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust")
-"""Heads of the table."""
 
 
 def headline(found: ContactList) -> str:
@@ -208,8 +204,8 @@ def place(contact: Contact) -> str:
     return f"unknown<small>{escape(words)} fit</small>" if contact.places else "unknown"
 
 
+#: A sign for each word of trust, so that it does not rest on colour.
 SIGNS = {"good": "✓", "fair": "○", "weak": "△"}
-"""A sign for each word of trust, so that it does not rest on colour."""
 
 
 def trust(contact: Contact) -> str:

@@ -11,34 +11,20 @@ from vftcli.outputs.decimation import decimated
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
 
-STEPS = 1.0, 2.0, 5.0, 10.0
-"""What a tick's distance may begin with."""
-
-ROOM = 1.4
-"""How much smaller than wanted a tick's distance may be."""
-
-STRETCHES = 250
-"""Stretches of a line in a small chart: two samples a stretch, about one a pixel."""
+STEPS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
+ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
+STRETCHES = 250  #: Stretches of a line in a small chart: two samples a stretch, about one a pixel.
 
 
 class Box(NamedTuple):
-    """A chart's size and the room around its plot, in the units of the drawing.
+    """A chart's size and the room around its plot, in the units of the drawing."""
 
-    Attributes:
-        width: Whole width.
-        height: Whole height.
-        left: Room for the numbers beside the vertical axis.
-        bottom: Room for the numbers below.
-        top: Room above.
-        right: Room to the right.
-    """
-
-    width: float = 300.0
-    height: float = 130.0
-    left: float = 38.0
-    bottom: float = 18.0
-    top: float = 8.0
-    right: float = 8.0
+    width: float = 300.0  #: Whole width.
+    height: float = 130.0  #: Whole height.
+    left: float = 38.0  #: Room for the numbers beside the vertical axis.
+    bottom: float = 18.0  #: Room for the numbers below.
+    top: float = 8.0  #: Room above.
+    right: float = 8.0  #: Room to the right.
 
 
 class Span(NamedTuple):
@@ -49,19 +35,12 @@ class Span(NamedTuple):
 
 
 class Scales(NamedTuple):
-    """From values to places in the drawing.
+    """From values to places in the drawing."""
 
-    Attributes:
-        box: The chart.
-        x: Ends of the horizontal axis.
-        y: Ends of the vertical axis.
-        log: Whether the horizontal axis is logarithmic.
-    """
-
-    box: Box
-    x: Span
-    y: Span
-    log: bool = False
+    box: Box  #: The chart.
+    x: Span  #: Ends of the horizontal axis.
+    y: Span  #: Ends of the vertical axis.
+    log: bool = False  #: Whether the horizontal axis is logarithmic.
 
     def across(self, x: Array | float) -> Array:
         """Horizontal places."""
@@ -200,13 +179,7 @@ def stripes(scales: Scales, spans: Sequence[tuple[float, float]], look: str) -> 
 
 
 def axes(scales: Scales, unit: str, count: tuple[int, int] = (6, 3)) -> str:
-    """Grid lines and numbers of both axes; the last number below bears the unit.
-
-    Args:
-        scales: The chart's scales.
-        unit: Unit of the horizontal axis.
-        count: About how many numbers below, and beside.
-    """
+    """Grid lines and numbers of both axes; the last number below bears the unit."""
     parts = []
     for value in ticks(scales.y, count[1]):
         y = float(scales.up(value))

@@ -14,17 +14,11 @@ from vftcli.signals.errors import VftError
 from vftcli.signals.intervals import runs_of
 
 WIDE = Box(width=1024, height=300, left=44, bottom=24, top=28, right=10)
+#: The same chart for a screen and for a telephone, whose letters would be too small else.
 NARROW = Box(width=400, height=260, left=38, bottom=24, top=28, right=8)
-"""The same chart for a screen and for a telephone, whose letters would be too small else."""
-
-STRETCHES = {WIDE: 600, NARROW: 200}
-"""Stretches of the line in each of them."""
-
-FEWEST = 6
-"""Fewest stretches of one contact's line."""
-
-LETTER = 7.5
-"""Width of a letter, for labels that shall not run into one another."""
+STRETCHES = {WIDE: 600, NARROW: 200}  #: Stretches of the line in each of them.
+FEWEST = 6  #: Fewest stretches of one contact's line.
+LETTER = 7.5  #: Width of a letter, for labels that shall not run into one another.
 
 
 def hero(analysis: Analysis, found: ContactList) -> str:

@@ -13,51 +13,32 @@ from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
 from vftcli.outputs.log.rmse_tables import blocks, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
 
+#: Heads of the overview.
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
-"""Heads of the overview."""
 
 WORST_FIRST = "The worst first: by the health of the log, then by the hardest contact."
 
 
 class IndexLine(NamedTuple):
-    """One log in the overview.
+    """One log in the overview."""
 
-    Attributes:
-        name: What it is called.
-        page: Its own page, relative to the index; "" without one.
-        robot: Its arm.
-        duration: How long it is. [s]
-        contacts: How many, or that they are a load, or `DASH`.
-        hardest: The hardest contact in words, or `DASH`.
-        force: Its force, 0 without one. [N]
-        least: The force below which nothing is told, None where that is not known. [N]
-        error: The least mean RMSE and its observer, or `DASH`.
-        standing: How healthy the log is.
-        words: Why.
-    """
-
-    name: str
-    page: str
-    robot: str
-    duration: float
-    contacts: str
-    hardest: str
-    force: float
-    least: float | None
-    error: str
-    standing: Standing
-    words: str
+    name: str  #: What it is called.
+    page: str  #: Its own page, relative to the index; "" without one.
+    robot: str  #: Its arm.
+    duration: float  #: How long it is. [s]
+    contacts: str  #: How many, or that they are a load, or `DASH`.
+    hardest: str  #: The hardest contact in words, or `DASH`.
+    force: float  #: Its force, 0 without one. [N]
+    least: float | None  #: The force below which nothing is told, None where that is not known. [N]
+    error: str  #: The least mean RMSE and its observer, or `DASH`.
+    standing: Standing  #: How healthy the log is.
+    words: str  #: Why.
 
 
 def render_index(
     analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = MappingProxyType({})
 ) -> str:
-    """The page over several reports.
-
-    Args:
-        analyses: Each told by its sub-folder, relative to the index.
-        failed: Why each of the other logs could not be analysed, by its label.
-    """
+    """The page over several reports."""
     lines = [(folder, analysis, health(grounds(analysis))) for folder, analysis in analyses]
     lines.sort(key=lambda line: rank(index_line(*line)))
     tables = "".join(

@@ -15,8 +15,8 @@ from vftcli.outputs.page.torque_part import joint_panels
 from vftcli.refinement.limits import Budget
 from vftcli.signals.arrays import Array
 
+#: Colours of the two spectra.
 FREE, LOADED = "#3b7ea1", "#c2410c"
-"""Colours of the two spectra."""
 
 
 def refinement_section(analysis: Analysis) -> str:

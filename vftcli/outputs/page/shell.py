@@ -17,8 +17,8 @@ from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
 
+#: The browser loads nothing from anywhere.
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
-"""The browser loads nothing from anywhere."""
 
 
 def document(
@@ -28,15 +28,7 @@ def document(
     styles: Mapping[str, LineStyle] | None = None,
     scripts: Sequence[str] = (),
 ) -> str:
-    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere.
-
-    Args:
-        title: What the browser's tab is called.
-        body: HTML of all sections.
-        charts: What the script draws large, none for a page without `large` charts.
-        styles: Colour and dash of the names that head the rows of tables.
-        scripts: Further scripts, as ``sort.js``.
-    """
+    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere."""
     script = "".join(f"<script>{asset(name)}</script>" for name in scripts)
     style = asset("page.css") + swatch_rules(styles or {})
     # JSON in an element of its own cannot run, so that a name in a log cannot either.
@@ -82,13 +74,7 @@ def script_json(data: object) -> str:
 
 
 def top(eyebrow: Sequence[str], headline: str, lead: str = "") -> str:
-    """The top of a page: what it is about, the answer in words, and what follows from it.
-
-    Args:
-        eyebrow: Facts of the log, in a line.
-        headline: The answer.
-        lead: Its paragraphs, as HTML.
-    """
+    """The top of a page: what it is about, the answer in words, and what follows from it."""
     facts = " · ".join(escape(part) for part in eyebrow if part)
     return f'<header><p class="eyebrow">{facts}</p><h1>{escape(headline)}</h1>{lead}</header>'
 
@@ -160,15 +146,7 @@ def soft(text: str) -> str:
 
 
 def section(title: str, html: str, state: str = "", *, name: str = "", opened: bool = False) -> str:
-    """A part of the details that the reader opens with a click, "" where there is nothing.
-
-    Args:
-        title: What it is about.
-        html: What it holds.
-        state: What it says, in a few words.
-        name: Its name, for links.
-        opened: Whether it is open at once.
-    """
+    """A part of the details that the reader opens with a click, "" where there is nothing."""
     if not html:
         return ""
     words = f" <span>· {escape(state)}</span>" if state else ""

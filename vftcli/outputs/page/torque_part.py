@@ -21,12 +21,10 @@ from vftcli.outputs.page.shell import section, soft
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS
 
-FREQUENCIES = 120
-"""Points of a frequency response."""
-
+FREQUENCIES = 120  #: Points of a frequency response.
+#: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
+#: that is shown. [–], [dB]
 QUIETEST, LOWEST = 1e-12, -80.0
-"""Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
-that is shown. [–], [dB]"""
 
 
 def torque_chart(analysis: Analysis) -> Chart:

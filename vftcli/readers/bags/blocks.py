@@ -18,14 +18,11 @@ from vftcli.readers.bags.topics import OWN, aligned, host_times, leading
 from vftcli.readers.reader import InOnePieceError, RawLog, ReadChoice
 from vftcli.signals.errors import LogError
 
-WHOLE_BYTES = 1 << 24
-"""A bag of no more bytes is read in one piece."""
-
+WHOLE_BYTES = 1 << 24  #: A bag of no more bytes is read in one piece.
+#: Messages of a topic from which a block is made, and those that wait for others at most.
 BLOCK_MESSAGES, MOST_MESSAGES = 1 << 13, 1 << 17
-"""Messages of a topic from which a block is made, and those that wait for others at most."""
-
+#: What is said of topics that cannot be laid side by side, message by message.
 APART = frozenset({"signal-interpolated", "topic-too-short", "messages-left-out"})
-"""What is said of topics that cannot be laid side by side, message by message."""
 
 
 def bag_blocks(
@@ -34,17 +31,7 @@ def bag_blocks(
     request: ReadChoice,
     count: Callable[[int], None],
 ) -> Iterator[RawLog]:
-    """The log of a bag, block by block.
-
-    Args:
-        batches: Its messages.
-        ingest: What reading it may cost.
-        request: What is wanted.
-        count: Is told of how many messages there were.
-
-    Raises:
-        InOnePieceError: If it has to be read in one piece.
-    """
+    """The log of a bag, block by block."""
     try:
         yield from _blocks(batches, ingest, request, count)
     except LogError:
@@ -82,8 +69,7 @@ def _blocks(
     yield block(list(waiting.streams.values()))
 
 
-Key = tuple[object, ...]
-"""What tells streams apart."""
+Key = tuple[object, ...]  #: What tells streams apart.
 
 
 class Waiting:
@@ -100,12 +86,7 @@ class Waiting:
         self.streams: dict[Key, Stream] = {}
 
     def add(self, found: Iterable[Stream], others: dict[str, str]) -> list[Stream] | None:
-        """Take up messages; all that have come as far as each other, if they are a block.
-
-        Args:
-            found: Streams of the next messages.
-            others: Topics that hold nothing we read, for messages.
-        """
+        """Take up messages; all that have come as far as each other, if they are a block."""
         for part in found:
             key = (part.channel, part.names, part.frame, tuple(part.signals))
             stream = replace(part, header=None) if key in self._headless else part

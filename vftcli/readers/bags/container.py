@@ -26,67 +26,40 @@ SQLITE = b"SQLite format 3\0"
 
 @dataclass(frozen=True, kw_only=True)
 class Channel:
-    """One topic of one container.
+    """One topic of one container."""
 
-    Attributes:
-        topic: Its name.
-        type: Message type as package/Name, without the middle part that ROS 2 writes.
-        encoding: How its messages are serialised.
-        definition: Text of the message definition, or nothing if the container has none.
-        idl: Whether the definition is in IDL.
-    """
-
-    topic: str
-    type: str
-    encoding: Encoding
-    definition: str = ""
-    idl: bool = False
+    topic: str  #: Its name.
+    type: str  #: Message type as package/Name, without the middle part that ROS 2 writes.
+    encoding: Encoding  #: How its messages are serialised.
+    definition: str = ""  #: Text of the message definition, or nothing if the container has none.
+    idl: bool = False  #: Whether the definition is in IDL.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
-    """Messages of one channel, one behind the other.
+    """Messages of one channel, one behind the other."""
 
-    Attributes:
-        channel: Whose messages they are.
-        buffer: Their bytes.
-        offsets: Where each begins. (k,)
-        lengths: How long each is. (k,)
-        times: When each was recorded. (k,) [ns]
-    """
-
-    channel: Channel
-    buffer: Bytes
-    offsets: Integers
-    lengths: Integers
-    times: Integers
+    channel: Channel  #: Whose messages they are.
+    buffer: Bytes  #: Their bytes.
+    offsets: Integers  #: Where each begins. (k,)
+    lengths: Integers  #: How long each is. (k,)
+    times: Integers  #: When each was recorded. (k,) [ns]
 
 
 class Run(NamedTuple):
-    """Messages of one channel as a library hands them out.
+    """Messages of one channel as a library hands them out."""
 
-    Attributes:
-        channel: Whose they are, None where the file does not say.
-        times: When each was recorded. (k,) [ns]
-        contents: The bytes of each.
-    """
-
-    channel: Channel | None
-    times: list[int]
-    contents: list[bytes]
+    channel: Channel | None  #: Whose they are, None where the file does not say.
+    times: list[int]  #: When each was recorded. (k,) [ns]
+    contents: list[bytes]  #: The bytes of each.
 
 
 BATCH_BYTES = 16 * 1024 * 1024
-MESSAGE_COST = 128
-"""Memory that a message takes beside its bytes. [B]"""
+MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
 def batched(runs: Iterable[Run], ingest: "Ingest") -> Iterator[Batch]:
-    """Messages by channel, some megabytes at a time, channels in the order of their first ones.
-
-    Raises:
-        LogError: If messages belong to no channel: they would be lost without a word.
-    """
+    """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
     for channel, times, contents in runs:
@@ -118,37 +91,18 @@ def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
 
 @dataclass
 class Census:
-    """What a container says of its messages, and what was found.
+    """What a container says of its messages, and what was found."""
 
-    Attributes:
-        kept: Messages found.
-        chunks: Chunks found.
-        counted: Messages that it counts, None where it does not say.
-        counted_chunks: Chunks that it counts, None where it does not say.
-        data_end: Where its messages end, 0 where that is not known. [B]
-        missing: Bytes of messages that should stand before that place. [B]
-        closed: Whether its recorder closed it.
-    """
-
-    kept: int = 0
-    chunks: int = 0
-    counted: int | None = None
-    counted_chunks: int | None = None
-    data_end: int = 0
-    missing: int = 0
-    closed: bool = False
+    kept: int = 0  #: Messages found.
+    chunks: int = 0  #: Chunks found.
+    counted: int | None = None  #: Messages that it counts, None where it does not say.
+    counted_chunks: int | None = None  #: Chunks that it counts, None where it does not say.
+    data_end: int = 0  #: Where its messages end, 0 where that is not known. [B]
+    missing: int = 0  #: Bytes of messages that should stand before that place. [B]
+    closed: bool = False  #: Whether its recorder closed it.
 
     def tell(self, ingest: "Ingest", left: int, counter: str) -> None:
-        """Say so if the container is cut, and how much of it was kept.
-
-        Args:
-            ingest: Where it is said.
-            left: Bytes behind the last whole record.
-            counter: What counts its messages.
-
-        Raises:
-            LogError: If it holds more messages than it counts.
-        """
+        """Say so if the container is cut, and how much of it was kept."""
         kept, chunks, missing = self.kept, self.chunks, self.missing
         if self.counted is not None and kept > self.counted:
             raise LogError(
@@ -173,43 +127,29 @@ class Census:
         ingest.note(told)
 
 
-USUAL_RATIO = 15
-"""Recorded numbers shrink by 3 to 15."""
+USUAL_RATIO = 15  #: Recorded numbers shrink by 3 to 15.
 
+#: Pieces that libraries may read of chunks that shrank more: some seconds of their work.
+#:
+#: They read some seven a message, and no recorded message takes less than some bytes.
 SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
-"""Pieces that libraries may read of chunks that shrank more: some seconds of their work.
-
-They read some seven a message, and no recorded message takes less than some bytes.
-"""
 
 
 @dataclass
 class Ingest:
-    """What reading a container may cost, and what had to be left behind.
+    """What reading a container may cost, and what had to be left behind."""
 
-    Attributes:
-        path: The file, for messages.
-        size: Its size. [B]
-        remarks: What was left behind.
-        unpacked: Bytes that were unpacked.
-        pieces: What libraries may still read of chunks that shrank more than usual.
-    """
-
-    path: Path
-    size: int
-    remarks: list[Remark] = field(default_factory=list)
-    unpacked: int = 0
-    pieces: int = 0
+    path: Path  #: The file, for messages.
+    size: int  #: Its size. [B]
+    remarks: list[Remark] = field(default_factory=list)  #: What was left behind.
+    unpacked: int = 0  #: Bytes that were unpacked.
+    pieces: int = 0  #: What libraries may still read of chunks that shrank more than usual.
 
     def __post_init__(self) -> None:
         self.pieces = SPARE_PIECES + PIECES_PER_BYTE * self.size
 
     def spend(self, pieces: int) -> None:
-        """Count pieces that a library is about to read.
-
-        Raises:
-            LogError: If there are more than a log of its size can hold.
-        """
+        """Count pieces that a library is about to read."""
         self.pieces -= pieces
         if self.pieces < 0:
             raise LogError(
@@ -218,11 +158,7 @@ class Ingest:
             )
 
     def claim(self, size: int) -> None:
-        """Count bytes that are about to be unpacked.
-
-        Raises:
-            LogError: If the file claims more than a log of its size can hold.
-        """
+        """Count bytes that are about to be unpacked."""
         self.unpacked += size
         limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self.size)
         if size < 0 or self.unpacked > limit:
@@ -237,8 +173,8 @@ class Ingest:
             self.remarks.append(remark)
 
 
+#: Endings of the files of a bag folder that hold messages.
 STORAGE = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd", ".mcap.zst", ".db3.zst")
-"""Endings of the files of a bag folder that hold messages."""
 
 
 def storage_files(file: LogFile) -> list[str]:
@@ -270,11 +206,7 @@ def type_name(name: str) -> str:
 
 
 def unpack_chunk(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
-    """Unpack one chunk of a bag or MCAP, bounded by the size that it claims.
-
-    Raises:
-        LogError: If the compression is unknown or the chunk is damaged.
-    """
+    """Unpack one chunk of a bag or MCAP, bounded by the size that it claims."""
     import bz2
 
     import lz4.frame
@@ -308,11 +240,7 @@ def file_of(content: memoryview) -> BinaryIO:
 
 
 def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesIO:
-    """One chunk of a bag or MCAP, unpacked, as a file that libraries read.
-
-    Raises:
-        LogError: If the compression is unknown or the chunk is damaged.
-    """
+    """One chunk of a bag or MCAP, unpacked, as a file that libraries read."""
     content = unpack_chunk(ingest, name, packed, size)
     usual = len(content) <= USUAL_RATIO * len(packed)
     return io.BytesIO(content) if usual else _Counted(content, ingest)

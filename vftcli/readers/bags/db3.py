@@ -16,30 +16,24 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import warning
 
 ZSTD = b"\x28\xb5\x2f\xfd"
+#: No message of a topic that is read comes near this; an image of 4000 × 4000 is smaller.
 MESSAGE_LIMIT = 64 * 1024 * 1024
-"""No message of a topic that is read comes near this; an image of 4000 × 4000 is smaller."""
-
+#: The tables of a bag → the columns that are read.
 TABLES = {
     "topics": {"id", "name", "type", "serialization_format"},
     "messages": {"id", "topic_id", "timestamp", "data"},
     "message_definitions": {"topic_type", "encoding", "encoded_message_definition"},
 }
-"""The tables of a bag → the columns that are read."""
 
 STEPS = 10_000
+#: What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes or more.
+#:
+#: A tree of pages that hold one another has rows without end.
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
-"""What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes or more.
-
-A tree of pages that hold one another has rows without end.
-"""
 
 
 def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
-    """Messages of a db3 file, in the order of recording.
-
-    Raises:
-        LogError: If the database holds no bag, or one whose columns are computed.
-    """
+    """Messages of a db3 file, in the order of recording."""
     with closing(_opened(file)) as db:
         yield from batched(_runs(db, len(file.content), ingest), ingest)
     journal = file.path.with_name(f"{file.path.name}-wal")
@@ -73,11 +67,7 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
 
 
 def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Run]:
-    """The messages of a database of a size, one by one.
-
-    Raises:
-        LogError: If its tables are not those of a bag, or what they hold is damaged.
-    """
+    """The messages of a database of a size, one by one."""
     tables = _checked_tables(db, ingest)
     db.set_authorizer(_permission)
     # Topics and definitions are read beside the messages.
@@ -118,11 +108,7 @@ def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Run]:
 
 
 def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
-    """The tables of a bag that a database has.
-
-    Raises:
-        LogError: If one is missing, is no plain table, or lacks a stored column.
-    """
+    """The tables of a bag that a database has."""
     # A view and a virtual table have no root page.
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}

@@ -13,11 +13,10 @@ from vftcli.readers.joints import in_order, kinematic_order
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 
+#: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary.
 LAYOUTS = 512
-"""Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary."""
-
+#: Random messages of some batches that are walked one by one to confirm their layout.
 CHECKED_ROWS = 4
-"""Random messages of some batches that are walked one by one to confirm their layout."""
 
 
 @dataclass
@@ -25,29 +24,19 @@ class Stream:
     """Messages of one topic about the same joints, as arrays.
 
     Attributes:
-        channel: The topic.
-        kind: What its type means.
-        names: The joints' names, base to tip, or empty.
-        mixed: Whether the messages had them in another order, or other joints among them.
-        frame: Frame of its stamps' headers, or nothing.
-        receive: When each was recorded. (T,) [ns]
-        header: Stamp in each header. (T,) [ns]
-        robot: The robot's own clock, or None. (T,) [s]
-        signals: Signal → (T, k).
-        constants: Last value of each constant.
         messages: How many messages.
     """
 
-    channel: Channel
-    kind: Kind
-    names: tuple[str, ...]
-    mixed: bool
-    frame: str
-    receive: Integers
-    header: Integers | None
-    robot: Array | None
-    signals: dict[str, Array]
-    constants: dict[str, tuple[float, ...]]
+    channel: Channel  #: The topic.
+    kind: Kind  #: What its type means.
+    names: tuple[str, ...]  #: The joints' names, base to tip, or empty.
+    mixed: bool  #: Whether the messages had them in another order, or other joints among them.
+    frame: str  #: Frame of its stamps' headers, or nothing.
+    receive: Integers  #: When each was recorded. (T,) [ns]
+    header: Integers | None  #: Stamp in each header. (T,) [ns]
+    robot: Array | None  #: The robot's own clock, or None. (T,) [s]
+    signals: dict[str, Array]  #: Signal → (T, k).
+    constants: dict[str, tuple[float, ...]]  #: Last value of each constant.
 
     @property
     def messages(self) -> int:
@@ -90,11 +79,7 @@ class Decoder:
         self._chance = np.random.default_rng(0)
 
     def take(self, batch: Batch) -> None:
-        """Decode one batch, or remember that its type carries nothing we hold.
-
-        Raises:
-            LogError: If the type's definition is missing or its messages do not fit it.
-        """
+        """Decode one batch, or remember that its type carries nothing we hold."""
         channel = batch.channel
         if channel.type not in KINDS or channel.encoding not in {"ros1", "cdr"}:
             self.others[channel.topic] = channel.type or channel.encoding

@@ -38,11 +38,7 @@ class Documents:
         self.times: dict[Channel, list[int]] = {}
 
     def take(self, batch: Batch) -> bool:
-        """Take up a batch of JSON or JointStates; False if it is neither.
-
-        Raises:
-            LogError: If a message is damaged.
-        """
+        """Take up a batch of JSON or JointStates; False if it is neither."""
         channel = batch.channel
         json_like = channel.encoding == "json"
         if not json_like and not (channel.encoding == "protobuf" and channel.type == FOXGLOVE):
@@ -76,11 +72,7 @@ class Documents:
 
 
 def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
-    """A message in JSON, or of JointStates.
-
-    Raises:
-        DocumentError: If it is damaged, or longer than any that tells of joints.
-    """
+    """A message in JSON, or of JointStates."""
     if len(message) > MAX_BYTES:
         raise DocumentError("longer than any message of joints")
     if not json_like:
@@ -116,11 +108,7 @@ def _joint(message: bytes) -> dict[str, Any]:
 
 
 def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
-    """Field numbers and values of a protobuf message, one level deep.
-
-    Raises:
-        DocumentError: If the message is cut or holds an unknown kind of field.
-    """
+    """Field numbers and values of a protobuf message, one level deep."""
     position = 0
     while position < len(message):
         key, position = _varint(message, position)
@@ -153,11 +141,7 @@ def _varint(message: bytes, position: int) -> tuple[int, int]:
 
 
 def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
-    """A document as dotted paths; joints given one object each become lists by field.
-
-    Raises:
-        DocumentError: If it is no object, or nested or long beyond any message of joints.
-    """
+    """A document as dotted paths; joints given one object each become lists by field."""
     if not isinstance(document, dict):
         raise DocumentError("not an object")
     flat: dict[str, Any] = {}
@@ -184,11 +168,7 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
 
 
 def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> RawLog:
-    """Read the channel whose documents hold joint positions.
-
-    Raises:
-        LogError: If none does; the message says what each holds.
-    """
+    """Read the channel whose documents hold joint positions."""
     failures = []
     for channel, rows in documents.rows.items():
         try:

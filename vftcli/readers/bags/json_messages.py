@@ -14,8 +14,7 @@ from vftcli.signals.arrays import Array
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 
-Document = Mapping[str, Any]
-"""A message, flattened: dotted path → value."""
+Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
 
 
 def message_streams(

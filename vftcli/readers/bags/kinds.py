@@ -10,30 +10,22 @@ VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """One message type.
+    """One message type."""
 
-    Attributes:
-        signals: Signal → dotted paths to try in turn; a path that ends in `.wrench` means its six
-            numbers. `effort` is decided later, by the joints' names.
-        names: Path of the joints' names.
-        robot_time: Path of the robot's own clock. [s]
-        frame: Path of the frame's name.
-        constants: Name → path of a number of which the last value counts.
-        rank: Which type is preferred as the clock when two run at one rate; the larger.
-        turned: Signals whose sign has to be turned.
-        wrench_frame: What is known of its wrench.
-    """
-
+    #: Signal → dotted paths to try in turn; a path that ends in `.wrench` means its six numbers.
+    #: `effort` is decided later, by the joints' names.
     signals: Mapping[str, tuple[str, ...]]
-    names: tuple[str, ...] = ()
-    robot_time: str = "time"
-    frame: str = ""
+    names: tuple[str, ...] = ()  #: Path of the joints' names.
+    robot_time: str = "time"  #: Path of the robot's own clock. [s]
+    frame: str = ""  #: Path of the frame's name.
+    #: Name → path of a number of which the last value counts.
     constants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    rank: int = 0
-    turned: frozenset[str] = frozenset()
-    wrench_frame: WrenchFrame | None = None
+    rank: int = 0  #: Which type is preferred as the clock when two run at one rate; the larger.
+    turned: frozenset[str] = frozenset()  #: Signals whose sign has to be turned.
+    wrench_frame: WrenchFrame | None = None  #: What is known of its wrench.
 
 
+#: Message type → what is taken from it.
 KINDS: dict[str, Kind] = {
     "sensor_msgs/JointState": Kind(
         signals={"q": ("position",), "dq": ("velocity",), "effort": ("effort",)},
@@ -76,7 +68,6 @@ KINDS: dict[str, Kind] = {
     ),
     "geometry_msgs/WrenchStamped": Kind(signals={"wrench": ("wrench",)}, frame="header.frame_id"),
 }
-"""Message type → what is taken from it."""
 
 
 def paths_in(kind: Kind, signal: str, leaves: Mapping[str, object]) -> tuple[str, ...]:

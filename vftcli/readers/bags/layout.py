@@ -18,32 +18,24 @@ from vftcli.signals.arrays import Mask
 
 MAX_DEPTH = 24
 MAX_LEAVES = 20_000
+#: Fields that a walk may visit beyond one a byte: messages without fields take none.
 SPARE_VISITS = 1000
-"""Fields that a walk may visit beyond one a byte: messages without fields take none."""
-
+#: The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB.
 MAX_DEFINITION = 64 * 1024
-"""The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB."""
-
+#: Primitive type → NumPy's code for it.
 SIZES = {
     "bool": "u1", "byte": "u1", "octet": "u1", "char": "u1", "uint8": "u1", "int8": "i1",
     "uint16": "u2", "int16": "i2", "uint32": "u4", "int32": "i4", "uint64": "u8", "int64": "i8",
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
-"""Primitive type → NumPy's code for it."""
 
 
 class Field(NamedTuple):
-    """One field of a message type.
+    """One field of a message type."""
 
-    Attributes:
-        name: Its name.
-        type: A primitive, `string`, or another message type as package/Name.
-        many: How many: None for one, a number for a fixed array, −1 for a sequence.
-    """
-
-    name: str
-    type: str
-    many: int | None
+    name: str  #: Its name.
+    type: str  #: A primitive, `string`, or another message type as package/Name.
+    many: int | None  #: How many: None for one, a number for a fixed array, −1 for a sequence.
 
 
 Types = Mapping[str, Sequence[Field]]
@@ -63,22 +55,16 @@ class Leaf(NamedTuple):
 
 @dataclass
 class MessageLayout:
-    """Where everything lies in messages of one shape.
+    """Where everything lies in messages of one shape."""
 
-    Attributes:
-        leaves: Dotted path → numbers.
-        texts: Dotted path → strings, one or several.
-        fixed: Ranges of bytes that have to be equal for a message to have this layout.
-        length: Length of the message. [B]
-        uses: Number of batches it was used for.
-        expected: The bytes of those ranges, one after another.
-    """
-
-    leaves: dict[str, Leaf] = field(default_factory=dict)
+    leaves: dict[str, Leaf] = field(default_factory=dict)  #: Dotted path → numbers.
+    #: Dotted path → strings, one or several.
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    #: Ranges of bytes that have to be equal for a message to have this layout.
     fixed: list[tuple[int, int]] = field(default_factory=list)
-    length: int = 0
-    uses: int = 0
+    length: int = 0  #: Length of the message. [B]
+    uses: int = 0  #: Number of batches it was used for.
+    #: The bytes of those ranges, one after another.
     expected: list[Bytes] = field(default_factory=list)
 
     def settle(self, message: Bytes) -> None:
@@ -130,11 +116,7 @@ class Walker:
             self._encapsulation()
 
     def walk(self, root: str) -> MessageLayout:
-        """Walk the whole message.
-
-        Raises:
-            LayoutError: If the message is shorter or longer than its definition says.
-        """
+        """Walk the whole message."""
         self._message("", root, 0)
         # Some writers pad a message at its end.
         if len(self.message) - self.position > (8 if self.cdr else 0):
@@ -221,11 +203,7 @@ class Walker:
 
 @lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
 def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field, ...]]:
-    """Parse a message definition with rosbags' parsers. Type → fields.
-
-    Raises:
-        LayoutError: If the text is no message definition.
-    """
+    """Parse a message definition with rosbags' parsers. Type → fields."""
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
     if len(definition) > MAX_DEFINITION:

@@ -33,8 +33,7 @@ DATA = (
     records.Schema, records.Channel, records.Message, records.Chunk, records.MessageIndex,
     records.Attachment, records.Metadata,
 )  # fmt: skip
-DATA_END_BYTES = 13
-"""Length of the record that ends the data, its head included."""
+DATA_END_BYTES = 13  #: Length of the record that ends the data, its head included.
 
 ENCODINGS: dict[str, Encoding] = {
     "cdr": "cdr", "ros1": "ros1", "json": "json", "protobuf": "protobuf",
@@ -42,11 +41,7 @@ ENCODINGS: dict[str, Encoding] = {
 
 
 def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
-    """Messages of an MCAP file, up to the last whole chunk.
-
-    Raises:
-        LogError: If a chunk or a record is damaged, or bytes follow the file's end.
-    """
+    """Messages of an MCAP file, up to the last whole chunk."""
     return batched(_Mcap(ingest).runs(content), ingest)
 
 
@@ -108,11 +103,7 @@ class _Mcap:
             self.census.closed, self.census.data_end = True, end - DATA_END_BYTES
 
     def _close(self, footer: records.Footer, left: int) -> None:
-        """Take up the footer, which says where the messages should end.
-
-        Raises:
-            LogError: If something else than the file's last bytes follows.
-        """
+        """Take up the footer, which says where the messages should end."""
         if left != MAGIC_SIZE:
             raise LogError(
                 f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} should; it "
@@ -136,11 +127,7 @@ class _Mcap:
         )
 
     def _chunk(self, chunk: records.Chunk) -> Iterator[Run]:
-        """The messages of a chunk, unpacked and checked.
-
-        Raises:
-            LogError: If it is damaged.
-        """
+        """The messages of a chunk, unpacked and checked."""
         file = chunk_file(self.ingest, chunk.compression, chunk.data, chunk.uncompressed_size)
         # A checksum of zero means that the writer made none.
         if chunk.uncompressed_crc and zlib.crc32(file.getbuffer()) != chunk.uncompressed_crc:

@@ -27,11 +27,7 @@ METADATA_BYTES = 1024 * 1024
 
 
 def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read any container of messages.
-
-    Raises:
-        LogError: If it is damaged before its first whole chunk, or holds no joint positions.
-    """
+    """Read any container of messages."""
     ingest = Ingest(path=file.path, size=_size(file))
     if request.blocks and ingest.size > WHOLE_BYTES:
         count = partial(_check_count, file, ingest)
@@ -80,11 +76,7 @@ def _batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
 
 
 def _file_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
-    """The messages of one file; whatever a library raises on it is told in one line.
-
-    Raises:
-        LogError: If it is no container, or damaged.
-    """
+    """The messages of one file; whatever a library raises on it is told in one line."""
     try:
         for batch in _container(file, ingest):
             yield batch

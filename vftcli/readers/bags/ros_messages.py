@@ -17,12 +17,11 @@ from vftcli.readers.bags.container import Bytes, Channel
 from vftcli.readers.bags.layout import SIZES, Field, LayoutError, Types, fields_of, short, types_of
 from vftcli.signals.errors import LogError, OutputError
 
+#: The definitions of ROS 2's own types that are written, and of Franka's state.
 MESSAGES = Path(__file__).parent / "messages.toml"
-"""The definitions of ROS 2's own types that are written, and of Franka's state."""
 
 ROS, FRANKA = tomllib.loads(MESSAGES.read_text(encoding="utf-8")).values()
-DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}
-"""Message type as package/Name → its definition."""
+DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}  #: Message type as package/Name → its definition.
 
 
 def long_name(kind: str) -> str:
@@ -69,12 +68,7 @@ def known_types() -> dict[str, tuple[Field, ...]]:
 
 
 def types_for(channel: Channel) -> dict[str, tuple[Field, ...]]:
-    """All types that a channel's messages are made of: the container's own first.
-
-    Raises:
-        LogError: If neither the container nor this package knows the type.
-        LayoutError: If the container's definition cannot be parsed.
-    """
+    """All types that a channel's messages are made of: the container's own first."""
     known = dict(known_types())
     if channel.definition:
         known |= types_of(channel.definition, long_name(channel.type), idl=channel.idl)
@@ -90,8 +84,8 @@ def types_for(channel: Channel) -> dict[str, tuple[Field, ...]]:
     return known
 
 
+#: Text, names, a number, or numbers: one row a message, or one row for all.
 Value = str | Sequence[str] | float | NDArray[Any]
-"""Text, names, a number, or numbers: one row a message, or one row for all."""
 
 
 def serialised(
@@ -101,15 +95,6 @@ def serialised(
 
     The definition is walked once; every message has the same bytes but for the numbers, which are
     put in column by column.
-
-    Args:
-        kind: The type, as package/Name.
-        values: Dotted path of a field → its value; a field without one is zero or empty.
-        rows: Number of messages T.
-        types: The definitions; None for those of this file.
-
-    Raises:
-        OutputError: If a path is none of the type's fields.
     """
     message = Serialiser(types if types is not None else own_types(), values)
     message.walk("", kind)

@@ -29,18 +29,13 @@ from vftcli.readers.bags.container import (
 from vftcli.signals.errors import LogError
 
 MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
-ROWS = 65_536
-"""Heads that are gathered at once."""
+ROWS = 65_536  #: Heads that are gathered at once.
+#: What a field of a header takes at least, but for those that no recorder writes.
 BYTES_PER_FIELD = 8
-"""What a field of a header takes at least, but for those that no recorder writes."""
 
 
 def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
-    """Messages of a bag, chunk by chunk, up to the last whole chunk.
-
-    Raises:
-        LogError: If a chunk is damaged or the bag is encrypted.
-    """
+    """Messages of a bag, chunk by chunk, up to the last whole chunk."""
     bag, file = _Bag(ingest), file_of(content)
     end = file.seek(len(ROSBAG1))
     while True:
@@ -55,11 +50,7 @@ def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
 
 
 def _record(file: BinaryIO, ingest: Ingest) -> tuple[Header, bytes]:
-    """The header and the data of the next record.
-
-    Raises:
-        ReaderError: If the file ends before or inside it.
-    """
+    """The header and the data of the next record."""
     fields = read_bytes(file, read_uint32(file))
     ingest.spend(1 + len(fields) // BYTES_PER_FIELD)
     return _header(fields), read_bytes(file, read_uint32(file))
@@ -91,11 +82,7 @@ class _Bag:
         self.listed = self.counted = 0
 
     def take(self, header: Header, data: bytes) -> Iterator[Batch]:
-        """Take up a record; the messages of the chunk before it, if it is another.
-
-        Raises:
-            LogError: If it is damaged.
-        """
+        """Take up a record; the messages of the chunk before it, if it is another."""
         op, census = header.get_uint8("op"), self.census
         if op == RecordType.IDXDATA:
             self.starts.append(np.frombuffer(data, dtype="<u4")[2::3].astype(np.int64))
@@ -129,11 +116,7 @@ class _Bag:
         )
 
     def last_chunk(self) -> Iterator[Batch]:
-        """The messages of the last chunk, if they were not yielded yet.
-
-        Raises:
-            LogError: If messages are not where the index says, or of an unknown topic.
-        """
+        """The messages of the last chunk, if they were not yielded yet."""
         chunk, starts = self.chunk, self.starts
         if chunk is None:
             return
@@ -171,11 +154,7 @@ class _Bag:
             )
 
     def _between(self, chunk: io.BytesIO, starts: Integers, ends: Integers) -> None:
-        """Take up what lies between messages: nothing but connections.
-
-        Raises:
-            LogError: If there is anything else.
-        """
+        """Take up what lies between messages: nothing but connections."""
         for start, end in np.stack([starts, ends], axis=1)[starts != ends].tolist():
             chunk.seek(start)
             while chunk.tell() < end:
@@ -201,11 +180,7 @@ def _begins(chunk: io.BytesIO, end: int, ingest: Ingest) -> Integers:
 
 
 def _heads(buffer: Bytes, begins: Integers) -> Bytes:
-    """The heads of messages, as long as the first one's, with their data's lengths. (k, size)
-
-    Raises:
-        ReaderError: If they do not lie in the chunk side by side.
-    """
+    """The heads of messages, as long as the first one's, with their data's lengths. (k, size)"""
     size = 8 + int(buffer[begins[0] : begins[0] + 4].view("<u4")[0])
     if max(int(begins[-1]) + size, size * len(begins)) > len(buffer):
         raise ReaderError("the index of a chunk points outside it")

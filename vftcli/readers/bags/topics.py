@@ -22,29 +22,17 @@ from vftcli.signals.wrench import WrenchFrame
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
+#: Topics and types that may hold a wrench: left out, they are named.
 FORCES = re.compile(r"wrench|force|\bft\b|F_ext", re.IGNORECASE)
-"""Topics and types that may hold a wrench: left out, they are named."""
+#: A wrench further than this many of its own sample times from a pose is not taken for it.
 NEAR = 3.0
-"""A wrench further than this many of its own sample times from a pose is not taken for it."""
-
-OWN = "/vftcli/"
-"""Topics that vftcli itself writes."""
+OWN = "/vftcli/"  #: Topics that vftcli itself writes.
 
 
 def aligned(
     streams: Sequence[Stream], path: Path, request: ReadChoice, others: dict[str, str]
 ) -> RawLog:
-    """Put the topics of a bag on the clock of the one with the joints' positions.
-
-    Args:
-        streams: What was decoded.
-        path: The bag, for messages.
-        request: What is wanted.
-        others: Topics that hold nothing we read → their type, for messages.
-
-    Raises:
-        LogError: If no topic has joint positions, or --columns names what is not there.
-    """
+    """Put the topics of a bag on the clock of the one with the joints' positions."""
     gathering = Gathering(leading(streams, path, others, request), request)
     gathering.take_lead(path)
     for stream in streams:
@@ -74,19 +62,12 @@ def aligned(
 
 
 class StreamClock(NamedTuple):
-    """A stream's best clock: the robot's own, else its header's, else the recorder's.
+    """A stream's best clock: the robot's own, else its header's, else the recorder's."""
 
-    Attributes:
-        stamps: The stamps. (T,)
-        tick: Length of their tick. [s]
-        words: Which clock they are.
-        host: Header or receive stamps, on which other topics are aligned. (T,) [ns]
-    """
-
-    stamps: Any
-    tick: float
-    words: str
-    host: Integers
+    stamps: Any  #: The stamps. (T,)
+    tick: float  #: Length of their tick. [s]
+    words: str  #: Which clock they are.
+    host: Integers  #: Header or receive stamps, on which other topics are aligned. (T,) [ns]
 
 
 class Gathering:
@@ -95,8 +76,8 @@ class Gathering:
     Attributes:
         lead: The topic with the joints' positions.
         clock: Its clock.
-        chosen: Signal → message field, "" for its own, and factor, as --columns says:
-            -tau=effort, current[mA]=effort, -tau.
+        chosen: Signal → message field, "" for its own, and factor, as --columns says: -tau=effort,
+            current[mA]=effort, -tau.
         said_of_wrench: What --columns says of the wrench, None for nothing.
         signals: Field of Recording → values at the leading topic's times. (T, k)
         taken: Topics beside the leading one of which a signal was taken.
@@ -119,11 +100,7 @@ class Gathering:
         self.remarks: list[Remark] = []
 
     def take_lead(self, path: Path) -> None:
-        """Take the leading topic's signals, the vendor's signs turned into ours.
-
-        Raises:
-            LogError: If the positions are NaN throughout.
-        """
+        """Take the leading topic's signals, the vendor's signs turned into ours."""
         lead, width = self.lead, self.lead.signals["q"].shape[1]
         if lead.mixed:
             self.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
@@ -200,11 +177,7 @@ class Gathering:
         self.signals[field_name] = value
 
     def take_wrench(self, streams: Sequence[Stream], path: Path) -> WrenchFrame | None:
-        """Take the wrench of a sensor or of the vendor; return what --columns or the bag states.
-
-        Raises:
-            LogError: If --columns says something of a wrench and the bag has none.
-        """
+        """Take the wrench of a sensor or of the vendor; return what --columns or the bag states."""
         frame, said = self._usual_wrench(streams), self.said_of_wrench
         if said is None:
             return frame
@@ -291,8 +264,7 @@ class Gathering:
             self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
 
 
-FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}
-"""Field of a JointState → signal."""
+FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}  #: Field of a JointState → signal.
 
 
 def said(request: ReadChoice) -> tuple[Item, ...]:
@@ -316,9 +288,6 @@ def leading(
     """The topic whose positions lead: measured ones, of most messages; a robot state breaks ties.
 
     One that --columns names, as in q=TOPIC.position, goes before all others.
-
-    Raises:
-        LogError: If there is none, or if two arms were recorded in one bag.
     """
     found = [
         s for s in streams

@@ -25,72 +25,43 @@ from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import grown, runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
-STILL = 0.01
-"""A joint slower than this over a block rests: what holds it is stiction. [rad/s]"""
-
+STILL = 0.01  #: A joint slower than this over a block rests: what holds it is stiction. [rad/s]
+#: What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s.
 TIE = 1e-6
-"""What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s."""
-
-REST_TIME = 2.0
-"""Stiction keeps its state at least this long. [s]"""
-
+REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
+#: A joint that rests under a contact: the push re-settles its stiction within so long. [s]
 PUSHED_TIME = 0.3
-"""A joint that rests under a contact: the push re-settles its stiction within so long. [s]"""
-
+#: A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
+#: its motion, as a share of F_c, and its least correlation time. [s]
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
-"""A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
-its motion, as a share of F_c, and its least correlation time. [s]"""
-
+#: Prior of the correlation time T: its median [s] and the spread of ln T.
 USUAL_TIME, TIME_SPREAD = 0.5, 1.5
-"""Prior of the correlation time T: its median [s] and the spread of ln T."""
-
-LEAST_NOISE = 1e-6
-"""Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]"""
-
-LEAST_BLOCKS = 20
-"""Shortest unbroken stretch of the free part that has a spectrum, in blocks."""
-
+LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
+LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
+#: Where no free part tells, stiction counts this long before and after a rest too. [s]
 NEAR_REST = 0.3
-"""Where no free part tells, stiction counts this long before and after a rest too. [s]"""
-
-ASSUMED_SHARE = 0.2
-"""Where no free part tells: the model error of motion, as a share of F_c."""
+ASSUMED_SHARE = 0.2  #: Where no free part tells: the model error of motion, as a share of F_c.
 
 
 class FreeTerms(NamedTuple):
-    """A stretch of log that nobody touched.
+    """A stretch of log that nobody touched."""
 
-    Attributes:
-        terms: p and μ of the log.
-        q: Its joint positions. (T, n) [rad]
-        inside: The free samples. (T,)
-    """
-
-    terms: DynamicsTerms
-    q: Array
-    inside: Mask
+    terms: DynamicsTerms  #: p and μ of the log.
+    q: Array  #: Its joint positions. (T, n) [rad]
+    inside: Mask  #: The free samples. (T,)
 
 
 @dataclass(frozen=True, kw_only=True)
 class TorqueNoise:
-    """White noise and model error of every joint, by blocks of one length.
+    """White noise and model error of every joint, by blocks of one length."""
 
-    Attributes:
-        white: R, variance of the white noise. (n,) [(N·m)²]
-        moving: Variance of the model error in motion. (n,) [(N·m)²]
-        moving_time: Its correlation time. (n,) [s]
-        resting: Variance of the model error at rest. (n,) [(N·m)²]
-        resting_time: Its correlation time. (n,) [s]
-        near: How long before and after a rest that of rest holds. [s]
-        free_seconds: How much free motion it was learned from; 0 where it is assumed. [s]
-    """
-
-    white: Array
-    moving: Array
-    moving_time: Array
-    resting: Array
-    resting_time: Array
-    near: float = 0.0
+    white: Array  #: R, variance of the white noise. (n,) [(N·m)²]
+    moving: Array  #: Variance of the model error in motion. (n,) [(N·m)²]
+    moving_time: Array  #: Its correlation time. (n,) [s]
+    resting: Array  #: Variance of the model error at rest. (n,) [(N·m)²]
+    resting_time: Array  #: Its correlation time. (n,) [s]
+    near: float = 0.0  #: How long before and after a rest that of rest holds. [s]
+    #: How much free motion it was learned from; 0 where it is assumed. [s]
     free_seconds: float = 0.0
 
     def variance(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
@@ -206,17 +177,11 @@ def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
 
 
 class FittedNoise(NamedTuple):
-    """What one joint's spectrum gives.
+    """What one joint's spectrum gives."""
 
-    Attributes:
-        white: R. [(N·m)²]
-        variance: s². [(N·m)²]
-        time: T. [s]
-    """
-
-    white: float
-    variance: float
-    time: float
+    white: float  #: R. [(N·m)²]
+    variance: float  #: s². [(N·m)²]
+    time: float  #: T. [s]
 
 
 def fit_joints(stretches: Sequence[Blocks]) -> list[FittedNoise]:

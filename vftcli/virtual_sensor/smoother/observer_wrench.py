@@ -24,40 +24,31 @@ from vftcli.virtual_sensor.virtual_sensor import CHUNK, VirtualSensor
 
 
 class Gate(NamedTuple):
-    """The contacts of a log, outside of which nothing touches the arm.
+    """The contacts of a log, outside of which nothing touches the arm."""
 
-    Attributes:
-        spans: From and to of every contact. [s]
-        prior: How their wrench moves, as the contacts themselves show it; None to choose it.
-    """
-
-    spans: Sequence[tuple[float, float]]
+    spans: Sequence[tuple[float, float]]  #: From and to of every contact. [s]
+    #: How their wrench moves, as the contacts themselves show it; None to choose it.
     prior: WrenchPrior | None = None
 
 
 class SmootherInput(NamedTuple):
-    """What one observer's wrench is smoothed from.
+    """What one observer's wrench is smoothed from."""
 
-    Attributes:
-        terms: p and μ along the log, corrected as the observer's are.
-        free: Motion that nobody touched, corrected alike, less a load that it carries; none
-            where nothing is known of it.
-        load: A load that the free motion carries, and with it the whole log; None without one.
-        uncorrected: The same as the robot's model alone gives it, None where nothing is corrected.
-    """
-
-    terms: DynamicsTerms
+    terms: DynamicsTerms  #: p and μ along the log, corrected as the observer's are.
+    #: Motion that nobody touched, corrected alike, less a load that it carries; none where nothing
+    #: is known of it.
     free: tuple[FreeTerms, ...]
+    #: A load that the free motion carries, and with it the whole log; None without one.
     load: FreeLoad | None = None
+    #: The same as the robot's model alone gives it, None where nothing is corrected.
     uncorrected: "SmootherInput | None" = None
 
 
+#: From an observer's name to what its wrench is smoothed from.
+#:
+#: A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
+#: log calls for one steady load it is left out, since a load and an error of the model look alike.
 InputOf = Callable[[str], SmootherInput]
-"""From an observer's name to what its wrench is smoothed from.
-
-A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
-log calls for one steady load it is left out, since a load and an error of the model look alike.
-"""
 
 
 def plain_input(motion: FreeMotion) -> SmootherInput:
@@ -76,15 +67,7 @@ def corrected_input(
     terms_of: Callable[[str, ModelledRun], DynamicsTerms],
     name: str,
 ) -> SmootherInput:
-    """The log and its free pieces as one observer has them, and as the robot's model does.
-
-    Args:
-        motion: The log.
-        pieces: What of it, and of free runs, is believed to be free.
-        load: A load that the pieces carry; None for none.
-        terms_of: An observer's p and μ of a recording; the run's own where nothing is corrected.
-        name: The observer.
-    """
+    """The log and its free pieces as one observer has them, and as the robot's model does."""
     plain = input_under(motion, pieces, lambda run: run.terms, load)
     own = input_under(motion, pieces, partial(terms_of, name), load)
     return plain if own.terms is plain.terms else own._replace(uncorrected=plain)
@@ -135,14 +118,7 @@ def carrying(found: SmoothedWrench, load: FreeLoad, run: ModelledRun) -> Smoothe
 def smoothed_wrench(
     found: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, motion: FreeMotion
 ) -> Wrench:
-    """A wrench with the smoother's values and band in place of its own, nothing of it masked.
-
-    Args:
-        found: What the smoother found.
-        wrench: An observer's wrench, whose name, pose and null space stay.
-        sensor: Its frame and mounting are the answer's.
-        motion: The log and its arm.
-    """
+    """A wrench with the smoother's values and band in place of its own, nothing of it masked."""
     chain, q, t = motion.log.robot.chain, motion.log.recording.q, wrench.t
     values, sd = np.empty((len(t), 6)), np.empty((len(t), 6))
     for start in range(0, len(t), CHUNK):
@@ -176,9 +152,6 @@ def smooth_all(
         input_of: What each one's wrench is smoothed from; None for `plain_input`.
         unloaded: Samples of the log that its zero says are unloaded. (T,)
         gate: The contacts, outside of which there is no wrench; None where the log is one.
-
-    Raises:
-        RobotError: If the arm has fewer than six joints.
     """
     made: list[tuple[DynamicsTerms, SmoothedWrench]] = []
     found: dict[str, SmoothedWrench] = {}

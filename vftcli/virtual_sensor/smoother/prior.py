@@ -10,27 +10,17 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
-LEVER = 0.1
-"""Standard deviation of a moment over that of the force. [m]"""
-
-TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
-"""Correlation times of a wrench that are tried. [s]"""
-
-FORCES = (10.0, 30.0, 60.0)
-"""Standard deviations of a force that are tried. [N]"""
+LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
+TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  #: Correlation times of a wrench that are tried. [s]
+FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
 
 
 class WrenchPrior(NamedTuple):
-    """An Ornstein–Uhlenbeck prior of the wrench in base axes.
+    """An Ornstein–Uhlenbeck prior of the wrench in base axes."""
 
-    Attributes:
-        time: Correlation time τ_w. [s]
-        force: Standard deviation σ_f of each component of the force. [N]
-        moment: That of the moment; `LEVER` times the force where none is known. [N·m]
-    """
-
-    time: float
-    force: float
+    time: float  #: Correlation time τ_w. [s]
+    force: float  #: Standard deviation σ_f of each component of the force. [N]
+    #: That of the moment; `LEVER` times the force where none is known. [N·m]
     moment: float | None = None
 
     @property
@@ -47,14 +37,10 @@ class WrenchPrior(NamedTuple):
         return np.repeat([self.force**2, moment**2], 3)
 
 
-STEADY = 30.0
-"""A wrench that keeps for at least this long is a load, … [s]"""
-
-LOAD_CHANGE = 5.0
-"""… if it changes by no more than this (one standard deviation) in a second. [N]"""
-
+STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
+LOAD_CHANGE = 5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
+#: The priors that are tried.
 GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
-"""The priors that are tried."""
 
 
 def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:

@@ -24,60 +24,41 @@ from vftcli.signals.series import median_step, resample_columns
 from vftcli.virtual_sensor.smoother.noise import TIE, FreeTerms, TorqueNoise, torque_noise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, gated, wrench_model
 
-COARSE = 0.1
-"""Length of a block for steady loads, and for the choice of the prior. [s]"""
-
+COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
+#: Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples.
 FINE, JITTERED = 0.024, 5
-"""Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples."""
-
+#: Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms.
 MOST_BLOCKS = 30_000
-"""Blocks are longer in a log that would make more: each takes some 6 kB and .1 ms."""
-
+#: What the model's own standard deviations of force and moment are multiplied by. The error of the
+#: friction is not Gaussian; chosen once on six simulated seeds, for all logs.
 WIDENED = np.repeat([1.5, 2.0], 3)
-"""What the model's own standard deviations of force and moment are multiplied by. The error of the
-friction is not Gaussian; chosen once on six simulated seeds, for all logs."""
-
-
-DRIVES = 0.03
-"""Share of a reading that the drives' constants may be off by."""
-
+DRIVES = 0.03  #: Share of a reading that the drives' constants may be off by.
+#: Share of the bend, of a block less the mean of its neighbours, that the blocks may hide: what
+#: their mean loses of a peak and what lies between two of them.
 BENT = 0.25
-"""Share of the bend, of a block less the mean of its neighbours, that the blocks may hide: what
-their mean loses of a peak and what lies between two of them."""
-
+#: Outside of the listed contacts the band is that of a contact which lasts so long, as long as
+#: those that the list makes up in free motion to find the smallest force it can see. [s]
 UNLISTED = 0.6
-"""Outside of the listed contacts the band is that of a contact which lasts so long, as long as
-those that the list makes up in free motion to find the smallest force it can see. [s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SmoothedWrench:
-    """The wrench in base axes about the flange point, block by block, and what it rests on.
+    """The wrench in base axes about the flange point, block by block, and what it rests on."""
 
-    Attributes:
-        t: Middle of each block. (K,) [s]
-        values: Force and moment on the robot. (K, 6) [N, N·m]
-        covariance: Their covariance, widened by `WIDENED`, and in contacts by what the drives and
-            the blocks may hide; outside of the listed ones that of `unlisted`. (K, 6, 6)
-        inside: Blocks in which there may be a wrench; zero, as far as the pose can show, in the
-            others. (K,)
-        seconds: Length of a block. [s]
-        prior: How the wrench may move.
-        noise: What counts as noise.
-        gate: Whether contacts were listed; else the whole log is one.
-        uncorrected: Whether a correction of the model's error was left out; see `InputOf`.
-        load: A load that the free motion carries, in the wrench with its weight; None without one.
-    """
-
-    t: Array
-    values: Array
+    t: Array  #: Middle of each block. (K,) [s]
+    values: Array  #: Force and moment on the robot. (K, 6) [N, N·m]
+    #: Their covariance, widened by `WIDENED`, and in contacts by what the drives and the blocks may
+    #: hide; outside of the listed ones that of `unlisted`. (K, 6, 6)
     covariance: Array
+    #: Blocks in which there may be a wrench; zero, as far as the pose can show, in the others. (K,)
     inside: Mask
-    seconds: float
-    prior: WrenchPrior
-    noise: TorqueNoise
-    gate: bool
+    seconds: float  #: Length of a block. [s]
+    prior: WrenchPrior  #: How the wrench may move.
+    noise: TorqueNoise  #: What counts as noise.
+    gate: bool  #: Whether contacts were listed; else the whole log is one.
+    #: Whether a correction of the model's error was left out; see `InputOf`.
     uncorrected: bool = False
+    #: A load that the free motion carries, in the wrench with its weight; None without one.
     load: FreeLoad | None = None
 
     def __post_init__(self) -> None:
@@ -120,11 +101,7 @@ class SmoothedWrench:
         }
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
-        """What a reader of the wrench should know.
-
-        Args:
-            name: The estimate that the wrench belongs to.
-        """
+        """What a reader of the wrench should know."""
         where, noise = Where(name), self.noise
         model = {
             "block_s": self.seconds,
@@ -147,15 +124,10 @@ class SmoothedWrench:
 
 
 class MovedWrench(NamedTuple):
-    """A wrench at some times, or in another frame.
+    """A wrench at some times, or in another frame."""
 
-    Attributes:
-        values: (T, 6) [N, N·m]
-        covariance: (T, 6, 6)
-    """
-
-    values: Array
-    covariance: Array
+    values: Array  #: (T, 6) [N, N·m]
+    covariance: Array  #: (T, 6, 6)
 
     def seen_in(self, X: Array) -> "MovedWrench":
         """The wrench in the frame that matrices X (T, 6, 6) lead to."""
@@ -194,9 +166,6 @@ def smooth_wrench(
         gate: From and to of every contact [s], outside of which the wrench is zero, as far as the
             pose can show; None where the whole log is one.
         prior: How the wrench may move; None to choose it by the log's likelihood.
-
-    Raises:
-        RobotError: If the arm has fewer than six joints, which no pose can tell a wrench from.
     """
     if terms.joints < 6:
         raise RobotError(
@@ -325,19 +294,12 @@ def block_length(t: Array, *, fine: bool) -> float:
 
 
 class BlockModel(NamedTuple):
-    """A log in blocks of one length, with its noise and its gate.
+    """A log in blocks of one length, with its noise and its gate."""
 
-    Attributes:
-        blocks: The blocks.
-        jacobian: J of the flange. (K, 6, n)
-        noise: Noise and model error.
-        inside: Blocks in which there may be a wrench. (K,)
-    """
-
-    blocks: Blocks
-    jacobian: Array
-    noise: TorqueNoise
-    inside: Mask
+    blocks: Blocks  #: The blocks.
+    jacobian: Array  #: J of the flange. (K, 6, n)
+    noise: TorqueNoise  #: Noise and model error.
+    inside: Mask  #: Blocks in which there may be a wrench. (K,)
 
 
 def blocks_of(
