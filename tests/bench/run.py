@@ -176,7 +176,7 @@ def core_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
 
 
 def rnea_loop(model: Any, q: Array, dq: Array) -> None:
-    """The yardstick: one bare `pin.rnea` call a sample, one term, nothing else."""
+    """One bare `pin.rnea` call a sample, one term, nothing else."""
     data, zero = model.createData(), np.zeros(model.nv)
     for k in range(len(q)):
         pin.rnea(model, data, q[k], dq[k], zero)

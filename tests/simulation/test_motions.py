@@ -18,7 +18,7 @@ SPECS = [
     OffsetsSpec(moves=((0.5, 1.5, 0.1, 0.0, 0.05), (2.0, 3.0, 0.0, 0.0, 0.0)), length=3.5),
     JointMovesSpec(moves=((0.2, 1.5, 0.1, 0, 0.3, 0, 0, 0.2),), length=2.0),
     PosesSpec(count=3),
-    JointwiseSpec(joints=(2, 5), speeds=(0.4,)),
+    JointwiseSpec(speeds=(0.4,)),
     load_scenario("free-excitation").trajectory,
 ]
 

@@ -17,24 +17,20 @@ TABLE = 0.15
 
 @dataclass(frozen=True, kw_only=True)
 class PosesSpec:
-    """Joint poses approached one after the other and held.
+    """Drawn joint poses, approached one after the other and held.
 
     Attributes:
-        poses: Joint positions; empty draws `count` of them. (K, n) [rad]
         move: Time of each move. [s]
         dwell: Rest at each pose. [s]
         count: How many poses are drawn.
         spread: How far they lie from the usual pose, evenly to both sides. [rad]
-        draw: Seed of the drawing.
     """
 
     KIND: ClassVar[str] = "poses"
-    poses: tuple[tuple[float, ...], ...] = ()
     move: float = 2.5
     dwell: float = 2.0
     count: int = 12
     spread: float = 0.7
-    draw: int = 1
 
     def motion(self, robot: Robot) -> Command:
         """Straight joint-space moves between the poses."""
@@ -42,17 +38,17 @@ class PosesSpec:
             raise ParameterError(
                 "trajectory.move must be positive, dwell not negative, and count at least 2"
             )
-        points = [check_start(robot, pose) for pose in self.poses] or self.draw_poses(robot)
-        starts = self.dwell + np.arange(max(len(points) - 1, 1)) * (self.move + self.dwell)
+        points = self.draw_poses(robot)
+        starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
         return Stretches(
             times=np.column_stack([starts, starts + self.move]),
-            paths=straight_paths(points if len(points) > 1 else 2 * points),
+            paths=straight_paths(points),
             duration=float(starts[-1] + self.move + self.dwell),
         )
 
     def draw_poses(self, robot: Robot) -> list[Array]:
         """Poses about the usual one, inside the limits and with the flange above the table."""
-        rng, home = np.random.default_rng(self.draw), check_start(robot, ())
+        rng, home = np.random.default_rng(1), check_start(robot, ())
         low = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min + 0.05, -np.pi)
         high = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max - 0.05, np.pi)
         points: list[Array] = []
@@ -64,7 +60,7 @@ class PosesSpec:
                 return points
         raise ParameterError(
             f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} poses "
-            "above the table; make it smaller, or list the poses"
+            "above the table; make it smaller"
         )
 
 
@@ -73,31 +69,23 @@ class JointwiseSpec:
     """One joint at a time swept back and forth at several speeds, the others at rest.
 
     Attributes:
-        start: Joint positions at the middle of the sweeps. (n,) [rad]
         amplitude: Sweep to each side. [rad]
         speeds: Mean speeds of the sweeps. [rad/s]
-        joints: Joints swept, from 1; empty for all.
         rest: Rest between sweeps. [s]
     """
 
     KIND: ClassVar[str] = "jointwise"
-    start: tuple[float, ...] = ()
     amplitude: float = 0.4
     speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)
-    joints: tuple[int, ...] = ()
     rest: float = 0.3
 
     def motion(self, robot: Robot) -> Command:
-        """Each sweep as a pair of minimum-jerk moves out and back."""
-        start = check_start(robot, self.start)
-        joints = self.joints or tuple(range(1, robot.joints + 1))
-        if min(self.speeds, default=0.0) <= 0 or not all(1 <= j <= robot.joints for j in joints):
-            raise ParameterError(
-                f"trajectory.speeds must be positive and joints lie in 1 to {robot.joints}"
-            )
+        """Each sweep as minimum-jerk moves from the usual pose out, across and back."""
+        start = check_start(robot, ())
+        if min(self.speeds, default=0.0) <= 0:
+            raise ParameterError("trajectory.speeds must be positive")
         t, times, paths = self.rest, [], []
-        for joint in joints:
-            axis = np.eye(robot.joints)[joint - 1] * self.amplitude
+        for axis in self.amplitude * np.eye(robot.joints):
             for speed in self.speeds:
                 legs = [(0 * axis, axis), (axis, -axis), (-axis, 0 * axis)]
                 for a, b in legs:

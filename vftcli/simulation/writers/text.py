@@ -85,7 +85,7 @@ SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment"
 """The short recipe of a UR log: joint motion, currents and the target moment alone."""
 
 
-class TextTable(NamedTuple):
+class VendorTable(NamedTuple):
     """A format: its columns, the mark of an element's number, and how rows and numbers look."""
 
     columns: Columns
@@ -136,6 +136,6 @@ class TextTable(NamedTuple):
         return {**kept, **extra}
 
 
-RTDE = TextTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
-UR_RTDE = TextTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
-LIBFRANKA = TextTable(FRANKA, "[{}]", ",", "\n", "%.6g")
+RTDE = VendorTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
+UR_RTDE = VendorTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
+LIBFRANKA = VendorTable(FRANKA, "[{}]", ",", "\n", "%.6g")
