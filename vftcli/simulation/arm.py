@@ -17,31 +17,21 @@ from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.servo import Servo
 from vftcli.simulation.touch import Touching
 
-WARMING_STEPS = 250
-"""Inner steps between two updates of the friction's temperature."""
-CHECK_STEPS = 10
-"""Inner steps between two looks at whether the arm still moves like an arm."""
-RUNAWAY = 200.0
-"""Joint velocity no arm reaches. [rad/s]"""
+WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
+CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.
+RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointSignals:
-    """What the joints truly did, one row an instant.
+    """What the joints truly did, one row an instant."""
 
-    Attributes:
-        q, v, a: Positions, velocities, accelerations. (N, n) [rad, rad/s, rad/s²]
-        tau: Drive torque. (N, n) [N·m]
-        friction: Friction torque. (N, n) [N·m]
-        target_q, target_dq, target_ddq: The reference. (N, n)
-    """
-
-    q: Array
+    q: Array  #: Positions, velocities, accelerations. (N, n) [rad, rad/s, rad/s²]
     v: Array
     a: Array
-    tau: Array
-    friction: Array
-    target_q: Array
+    tau: Array  #: Drive torque. (N, n) [N·m]
+    friction: Array  #: Friction torque. (N, n) [N·m]
+    target_q: Array  #: The reference. (N, n)
     target_dq: Array
     target_ddq: Array
 
@@ -51,16 +41,11 @@ class History(JointSignals):
     """What happened, one row an inner step; row k covers the time from k·step to (k+1)·step.
 
     State and reference are those at the start of a step, all else holds over it.
-
-    Attributes:
-        step: Inner step. [s]
-        wrenches: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
-        walk: Joint torque of the random walks. (N, n) [N·m]
     """
 
-    step: float
-    wrenches: Array
-    walk: Array
+    step: float  #: Inner step. [s]
+    wrenches: Array  #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
+    walk: Array  #: Joint torque of the random walks. (N, n) [N·m]
 
     @classmethod
     def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":

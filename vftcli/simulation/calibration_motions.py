@@ -11,26 +11,18 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.kinematics import check_start, flange_pose
 from vftcli.simulation.motion import Command, Periodic, Stretches, straight_paths
 
-TABLE = 0.15
-"""Least height of the flange in poses that are drawn. [m]"""
+TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
 
 
 @dataclass(frozen=True, kw_only=True)
 class PosesSpec:
-    """Drawn joint poses, approached one after the other and held.
-
-    Attributes:
-        move: Time of each move. [s]
-        dwell: Rest at each pose. [s]
-        count: How many poses are drawn.
-        spread: How far they lie from the usual pose, evenly to both sides. [rad]
-    """
+    """Drawn joint poses, approached one after the other and held."""
 
     KIND: ClassVar[str] = "poses"
-    move: float = 2.5
-    dwell: float = 2.0
-    count: int = 12
-    spread: float = 0.7
+    move: float = 2.5  #: Time of each move. [s]
+    dwell: float = 2.0  #: Rest at each pose. [s]
+    count: int = 12  #: How many poses are drawn.
+    spread: float = 0.7  #: How far they lie from the usual pose, evenly to both sides. [rad]
 
     def motion(self, robot: Robot) -> Command:
         """Straight joint-space moves between the poses."""
@@ -66,18 +58,12 @@ class PosesSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class JointwiseSpec:
-    """One joint at a time swept back and forth at several speeds, the others at rest.
-
-    Attributes:
-        amplitude: Sweep to each side. [rad]
-        speeds: Mean speeds of the sweeps. [rad/s]
-        rest: Rest between sweeps. [s]
-    """
+    """One joint at a time swept back and forth at several speeds, the others at rest."""
 
     KIND: ClassVar[str] = "jointwise"
-    amplitude: float = 0.4
-    speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)
-    rest: float = 0.3
+    amplitude: float = 0.4  #: Sweep to each side. [rad]
+    speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]
+    rest: float = 0.3  #: Rest between sweeps. [s]
 
     def motion(self, robot: Robot) -> Command:
         """Each sweep as minimum-jerk moves from the usual pose out, across and back."""
@@ -99,22 +85,14 @@ class JointwiseSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class ExcitationSpec:
-    """A Fourier series of the joints.
-
-    Attributes:
-        period: Time of one round. [s]
-        cycles: Rounds.
-        mean: Mean positions. (n,) [rad]
-        cosine: Cosine coefficients, one row a harmonic. (H, n) [rad]
-        sine: Sine coefficients. (H, n) [rad]
-    """
+    """A Fourier series of the joints."""
 
     KIND: ClassVar[str] = "excitation"
-    period: float = 10.0
-    cycles: float = 2.0
-    mean: tuple[float, ...]
-    cosine: tuple[tuple[float, ...], ...]
-    sine: tuple[tuple[float, ...], ...]
+    period: float = 10.0  #: Time of one round. [s]
+    cycles: float = 2.0  #: Rounds.
+    mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
+    cosine: tuple[tuple[float, ...], ...]  #: Cosine coefficients, one row a harmonic. (H, n) [rad]
+    sine: tuple[tuple[float, ...], ...]  #: Sine coefficients. (H, n) [rad]
 
     def motion(self, robot: Robot) -> Command:
         """The series, if its lengths are those of the arm's joints."""

@@ -21,43 +21,27 @@ from vftcli.simulation.trajectories import plan
 from vftcli.simulation.truth import Truth, truth_of
 from vftcli.simulation.vendor import Vendor, vendor_view
 
-MOST_STEPS = 2_000_000
-"""Most inner steps of a run: half an hour at 1 ms, a gigabyte of history."""
-REPORT_STEPS = 500
-"""Inner steps between two reports of progress."""
-
+MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
+REPORT_STEPS = 500  #: Inner steps between two reports of progress.
+#: Offset between the seeds of the two runs' sensors, so that their noise differs.
 PAIR_SEED = 1_000_003
-"""Offset between the seeds of the two runs' sensors, so that their noise differs."""
-
-Progress = Callable[[int, int], None]
-"""Called with the steps done and the steps in all."""
+Progress = Callable[[int, int], None]  #: Called with the steps done and the steps in all.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Simulation:
-    """A finished run.
+    """A finished run."""
 
-    Attributes:
-        scenario: The experiment.
-        seed: The seed used.
-        robot: The profile.
-        nominal: The controller's robot: the profile with the payload it knows.
-        samples: True signals at the sampling instants.
-        measured: What the sensors report.
-        vendor: What the controller reports.
-        force_sensor: Reading of the flange sensor, sensor axes, ON the robot. (M, 6) [N, N·m]
-        truth: What really happened.
-    """
-
-    scenario: Scenario
-    seed: int
-    robot: Robot
-    nominal: Robot
-    samples: Samples
-    measured: Measured
-    vendor: Vendor
+    scenario: Scenario  #: The experiment.
+    seed: int  #: The seed used.
+    robot: Robot  #: The profile.
+    nominal: Robot  #: The controller's robot: the profile with the payload it knows.
+    samples: Samples  #: True signals at the sampling instants.
+    measured: Measured  #: What the sensors report.
+    vendor: Vendor  #: What the controller reports.
+    #: Reading of the flange sensor, sensor axes, ON the robot. (M, 6) [N, N·m]
     force_sensor: Array | None
-    truth: Truth
+    truth: Truth  #: What really happened.
 
     @property
     def recording(self) -> Recording:
@@ -175,9 +159,6 @@ def simulate_pair(
     """Run an experiment, and if it is one of a pair also the free run of the same arm.
 
     The free run has the same arm and motion, no payload and no contacts; its noise differs.
-
-    Raises:
-        ParameterError: If a pair has nothing to leave out, or the scenario is impossible.
     """
     run = simulate(scenario, seed, progress)
     if not scenario.pair:

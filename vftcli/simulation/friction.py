@@ -25,54 +25,34 @@ SHAPES = (
     *("amplitude", "slope", "shift", "load_coulomb", "presliding", "presliding_length"),
 )
 
+#: What does not grow with the speed for ever.
 DRY = ("coulomb", "load_coulomb", "presliding", "amplitude")
-"""What does not grow with the speed for ever."""
-WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")
-"""What does: the film of oil."""
+WET = ("viscous", "quadratic", "logarithmic", "bend_slopes")  #: What does: the film of oil.
+#: Speed below which the dry friction of a joint that gives fades: of forms tried on a UR10e, a·s
+#: beside a sign smoothed over 3 mrad/s leaves a momentum observer least on unseen logs. [rad/s]
 CREEP = 3e-3
-"""Speed below which the dry friction of a joint that gives fades: of forms tried on a UR10e, a·s
-beside a sign smoothed over 3 mrad/s leaves a momentum observer least on unseen logs. [rad/s]"""
 
 
 @dataclass(frozen=True, kw_only=True)
 class TrueFriction:
-    """Friction parameters of an n-joint arm. (n,) each
+    """Friction parameters of an n-joint arm. (n,) each"""
 
-    Attributes:
-        coulomb: Dry friction while sliding. [N·m]
-        viscous: Viscous coefficient. [N·m·s/rad]
-        quadratic: Signed quadratic coefficient. [N·m·s²/rad²]
-        offset: Torque independent of motion. [N·m]
-        logarithmic: Logarithmic rise a. [N·m]
-        logarithmic_velocity: Velocity b from which it flattens. [rad/s]
-        amplitude: Amplitude of the sigmoid. [N·m]
-        slope: Slope of the sigmoid. [s/rad]
-        shift: Shift of the sigmoid. [rad/s]
-        load_coulomb: Growth of the dry friction with the gravity torque carried. [1]
-        presliding: Presliding friction at full deflection. [N·m]
-        presliding_length: Deflection s₀ at which it is full. [rad]
-        bends: Speeds v_k at which the rise of a bent line changes. (K, n) [rad/s]
-        bend_slopes: By how much it changes there, m_k. (K, n) [N·m·s/rad]
-        stribeck: Excess of the breakaway torque, as a share of `coulomb`.
-        stribeck_velocity: Velocity over which it fades. [rad/s]
-    """
-
-    coulomb: Array
-    viscous: Array
-    quadratic: Array
-    offset: Array
-    logarithmic: Array
-    logarithmic_velocity: Array
-    amplitude: Array
-    slope: Array
-    shift: Array
-    load_coulomb: Array
-    presliding: Array
-    presliding_length: Array
-    bends: Array
-    bend_slopes: Array
-    stribeck: float = 0.0
-    stribeck_velocity: float = 0.05
+    coulomb: Array  #: Dry friction while sliding. [N·m]
+    viscous: Array  #: Viscous coefficient. [N·m·s/rad]
+    quadratic: Array  #: Signed quadratic coefficient. [N·m·s²/rad²]
+    offset: Array  #: Torque independent of motion. [N·m]
+    logarithmic: Array  #: Logarithmic rise a. [N·m]
+    logarithmic_velocity: Array  #: Velocity b from which it flattens. [rad/s]
+    amplitude: Array  #: Amplitude of the sigmoid. [N·m]
+    slope: Array  #: Slope of the sigmoid. [s/rad]
+    shift: Array  #: Shift of the sigmoid. [rad/s]
+    load_coulomb: Array  #: Growth of the dry friction with the gravity torque carried. [1]
+    presliding: Array  #: Presliding friction at full deflection. [N·m]
+    presliding_length: Array  #: Deflection s₀ at which it is full. [rad]
+    bends: Array  #: Speeds v_k at which the rise of a bent line changes. (K, n) [rad/s]
+    bend_slopes: Array  #: By how much it changes there, m_k. (K, n) [N·m·s/rad]
+    stribeck: float = 0.0  #: Excess of the breakaway torque, as a share of `coulomb`.
+    stribeck_velocity: float = 0.05  #: Velocity over which it fades. [rad/s]
 
     def dry(self, dq: Array, load: Array | None = None) -> Array:
         """Largest dry friction torque at velocities `dq` (n,) [rad/s]. (n,) [N·m]
@@ -153,9 +133,6 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     The profile's tanh(q̇/smoothing) becomes a real dry friction. Of a sigmoid, the share
     `spec.sticking` becomes dry friction of the same plateau, half the amplitude to each side; of
     the Coulomb torque the share `spec.presliding` becomes presliding friction.
-
-    Raises:
-        ParameterError: If a share or the presliding length is beyond what joints have.
     """
     if not 0.0 <= spec.presliding <= 1.0:
         raise ParameterError(f"friction.presliding is {spec.presliding:g}; it is a share, 0 to 1")
@@ -183,11 +160,7 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
 
 
 def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
-    """The friction that the scenario gives an arm whose robot file has none. (n,) each
-
-    Raises:
-        ParameterError: If the file has some, or it is not one positive number a joint.
-    """
+    """The friction that the scenario gives an arm whose robot file has none. (n,) each"""
     given = {"coulomb": spec.coulomb, "viscous": spec.viscous}
     table = {name: np.array(values) for name, values in given.items() if values is not None}
     for name, values in table.items():
@@ -211,9 +184,6 @@ def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:
     """Where bent lines bend, and by how much their slopes change there. (K, n), (K, n)
 
     Lines of fewer points than others bend by nothing at speed zero.
-
-    Args:
-        joints: One model a joint.
     """
     most = max(max(len(joint.speeds) for joint in joints) - 1, 0)
     bends, changes = np.zeros((2, most, len(joints)))

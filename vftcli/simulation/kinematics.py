@@ -10,14 +10,13 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import needed
 
 ITERATIONS = 100
+#: A pose counts as reached when position and rotation error are below this. [m, rad]
 REACHED = 1e-10
-"""A pose counts as reached when position and rotation error are below this. [m, rad]"""
-
+#: Number of joints → a pose from which such an arm can work, the flange looking down. [rad]
 HOMES: dict[int, tuple[float, ...]] = {
     6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
     7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),
 }
-"""Number of joints → a pose from which such an arm can work, the flange looking down. [rad]"""
 
 
 class FlangePose(NamedTuple):
@@ -62,11 +61,7 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
 
 
 def follow(robot: Robot, poses: list[FlangePose], start: Array, what: str) -> Array:
-    """Joint positions along a path of flange poses, each from the one before. (K, n) [rad]
-
-    Raises:
-        ParameterError: If a pose is out of reach or outside the joint limits.
-    """
+    """Joint positions along a path of flange poses, each from the one before. (K, n) [rad]"""
     q, path = np.array(start, dtype=float), []
     for k, pose in enumerate(poses):
         found = reach(robot.model, pose, q)
@@ -102,11 +97,7 @@ def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
 
 
 def check_start(robot: Robot, start: tuple[float, ...]) -> Array:
-    """Return a start pose, the usual one if none is given. (n,) [rad]
-
-    Raises:
-        ParameterError: If it has the wrong number of joints.
-    """
+    """Return a start pose, the usual one if none is given. (n,) [rad]"""
     start = start or HOMES.get(robot.joints, (0.0,) * robot.joints)
     if len(start) != robot.joints:
         raise ParameterError(

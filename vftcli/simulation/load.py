@@ -51,11 +51,7 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """The tables of a scenario file.
-
-    Raises:
-        ParameterError: If it cannot be read, or is not TOML.
-    """
+    """The tables of a scenario file."""
     try:
         return toml_tables(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:

@@ -15,28 +15,19 @@ from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
 
 @dataclass(frozen=True, kw_only=True)
 class TrueArm:
-    """The arm as it is, beside the robot the controller and the observers believe in.
+    """The arm as it is, beside the robot the controller and the observers believe in."""
 
-    Attributes:
-        chain: Geometry and inertia, payload and sensor mounted.
-        friction: Friction.
-        gain: What the torque measurement reads for a unit of torque. (n,)
-        offset: What it reads for none. (n,) [N·m]
-        nominal: The controller's robot: the profile with the payload it knows of.
-    """
-
-    chain: Chain
-    friction: TrueFriction
-    gain: Array
-    offset: Array
-    nominal: Robot
+    chain: Chain  #: Geometry and inertia, payload and sensor mounted.
+    friction: TrueFriction  #: Friction.
+    gain: Array  #: What the torque measurement reads for a unit of torque. (n,)
+    offset: Array  #: What it reads for none. (n,) [N·m]
+    nominal: Robot  #: The controller's robot: the profile with the payload it knows of.
 
 
+#: Largest relative deviation: drawn twice as large, it leaves nothing negative.
 LARGEST_SHARE = 0.45
-"""Largest relative deviation: drawn twice as large, it leaves nothing negative."""
-
+#: Deviations that are not relative, and their largest. [m, N·m]
 ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
-"""Deviations that are not relative, and their largest. [m, N·m]"""
 
 
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
@@ -46,11 +37,7 @@ def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Ar
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
-    """Return a payload section as a load on the flange, its mass and tensor scaled.
-
-    Raises:
-        ParameterError: If it is beyond what robots carry.
-    """
+    """Return a payload section as a load on the flange, its mass and tensor scaled."""
     values = {"mass": (spec.mass,), "com": spec.com, "inertia": spec.inertia}
     for key, numbers in values.items():
         if why := out_of_bounds(key, numbers):
@@ -64,9 +51,6 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
 
     The same numbers are drawn whatever the sizes are, so that switching one error off leaves the
     others as they were.
-
-    Raises:
-        ParameterError: If a size is negative, or so large that no arm could be drawn.
     """
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():

@@ -35,21 +35,13 @@ class Command(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Periodic:
-    """Joint positions as a Fourier series in the phase 2πt/period.
+    """Joint positions as a Fourier series in the phase 2πt/period."""
 
-    Attributes:
-        period: Time of one round. [s]
-        cycles: Rounds.
-        mean: Mean positions. (n,) [rad]
-        cosine: Cosine coefficients. (H, n) [rad]
-        sine: Sine coefficients. (H, n) [rad]
-    """
-
-    period: float
-    cycles: float
-    mean: Array
-    cosine: Array
-    sine: Array
+    period: float  #: Time of one round. [s]
+    cycles: float  #: Rounds.
+    mean: Array  #: Mean positions. (n,) [rad]
+    cosine: Array  #: Cosine coefficients. (H, n) [rad]
+    sine: Array  #: Sine coefficients. (H, n) [rad]
 
     @property
     def duration(self) -> float:
@@ -70,17 +62,12 @@ class Periodic:
 
 @dataclass(frozen=True, kw_only=True)
 class Stretches:
-    """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them.
+    """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them."""
 
-    Attributes:
-        times: Start and end of each stretch, in order. (K, 2) [s]
-        paths: Chebyshev coefficients of q over s in [−1, 1], one a stretch. (D, n) [rad]
-        duration: Length with the rest at the end. [s]
-    """
-
-    times: Array
+    times: Array  #: Start and end of each stretch, in order. (K, 2) [s]
+    #: Chebyshev coefficients of q over s in [−1, 1], one a stretch. (D, n) [rad]
     paths: tuple[Array, ...]
-    duration: float
+    duration: float  #: Length with the rest at the end. [s]
 
     def at(self, t: Array) -> Reference:
         """Where the stretches lead at times `t` (T,) [s]; between them the motion rests."""

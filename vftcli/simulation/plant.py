@@ -11,12 +11,10 @@ from vftcli.signals.packages import needed
 from vftcli.simulation.friction import TrueFriction
 from vftcli.simulation.stiction import slide_or_stick
 
-LARGEST_STEP = 1e-3
-"""Largest inner step. [s]"""
-
+LARGEST_STEP = 1e-3  #: Largest inner step. [s]
+#: Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians and
+#: placements are current) and the velocities, at the middle of the step.
 External = Callable[[Any, Any, Array], Array]
-"""Torque of the contacts (n,) [N·m] from the Pinocchio model and data (joint Jacobians and
-placements are current) and the velocities, at the middle of the step."""
 
 
 class Plant:
@@ -32,8 +30,8 @@ class Plant:
 
     Attributes:
         q, v: Positions and velocities now. (n,) [rad, rad/s]
-        q_mid, v_mid, a: Positions, velocities and accelerations for which the last step's balance
-            M a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
+        q_mid, v_mid, a: Positions, velocities and accelerations for which the last step's balance M
+            a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
         friction: Friction torque over the last step, against positive motion. (n,) [N·m]
         external: Torque of the contacts over the last step. (n,) [N·m]
         centre: c of the play operator. (n,) [rad]

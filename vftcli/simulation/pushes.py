@@ -21,19 +21,12 @@ ORIGIN = (0.0, 0.0, 0.0)
 
 
 class Place(NamedTuple):
-    """Where a contact's point is and how it moves, in base axes.
+    """Where a contact's point is and how it moves, in base axes."""
 
-    Attributes:
-        rotation: Orientation of the link (the flange for link 0). (3, 3)
-        position: The point. (3,) [m]
-        velocity: Its velocity. (3,) [m/s]
-        spin: Angular velocity of the link. (3,) [rad/s]
-    """
-
-    rotation: Array
-    position: Array
-    velocity: Array
-    spin: Array
+    rotation: Array  #: Orientation of the link (the flange for link 0). (3, 3)
+    position: Array  #: The point. (3,) [m]
+    velocity: Array  #: Its velocity. (3,) [m/s]
+    spin: Array  #: Angular velocity of the link. (3,) [rad/s]
 
 
 class Touch(Protocol):
@@ -108,30 +101,18 @@ class Segments:
 
 @dataclass(frozen=True, kw_only=True)
 class ProfileSpec:
-    """A stated wrench, switched on and off smoothly at stated times.
-
-    Attributes:
-        name: Name of the contact.
-        spans: Start and end of each application. (K, 2) [s]
-        force: Force ON the robot. (3,) [N]
-        torque: Moment ON the robot about the point. (3,) [N·m]
-        rise: Time to the full wrench. [s]
-        fall: Time of the release. [s]
-        axes: "base" or "link": what the components refer to.
-        link: The link it acts on; 0 for the flange.
-        point: The point in the link's frame. (3,) [m]
-    """
+    """A stated wrench, switched on and off smoothly at stated times."""
 
     KIND: ClassVar[str] = "profile"
-    name: str
-    spans: tuple[tuple[float, float], ...]
-    force: Vector = ORIGIN
-    torque: Vector = ORIGIN
-    rise: float = 0.2
-    fall: float = 0.2
-    axes: str = "base"
-    link: int = 0
-    point: Vector = ORIGIN
+    name: str  #: Name of the contact.
+    spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
+    force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
+    torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
+    rise: float = 0.2  #: Time to the full wrench. [s]
+    fall: float = 0.2  #: Time of the release. [s]
+    axes: str = "base"  #: "base" or "link": what the components refer to.
+    link: int = 0  #: The link it acts on; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
         """Make the contact ready to act; nothing is drawn."""
@@ -144,26 +125,16 @@ class ProfileSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadSpec:
-    """A load hung on a string: its weight, pulling straight down at the point.
-
-    Attributes:
-        name: Name of the contact.
-        weight: Weight. [N]
-        spans: When it hangs. (K, 2) [s]
-        rise: Time in which the string takes the load. [s]
-        fall: Time in which it comes off. [s]
-        link: The link it hangs on; 0 for the flange.
-        point: The point in the link's frame. (3,) [m]
-    """
+    """A load hung on a string: its weight, pulling straight down at the point."""
 
     KIND: ClassVar[str] = "load"
-    name: str
-    weight: float
-    spans: tuple[tuple[float, float], ...]
-    rise: float = 0.5
-    fall: float = 0.3
-    link: int = 0
-    point: Vector = ORIGIN
+    name: str  #: Name of the contact.
+    weight: float  #: Weight. [N]
+    spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
+    rise: float = 0.5  #: Time in which the string takes the load. [s]
+    fall: float = 0.3  #: Time in which it comes off. [s]
+    link: int = 0  #: The link it hangs on; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
         """Make the load ready to hang; nothing is drawn."""
@@ -175,76 +146,47 @@ class LoadSpec:
 
 
 class PushStyle(NamedTuple):
-    """Ranges from which pushes are drawn evenly.
+    """Ranges from which pushes are drawn evenly."""
 
-    Attributes:
-        length: Shortest and longest push. [s]
-        pause: Shortest and longest pause between pushes. [s]
-        force: Smallest and largest peak force. [N]
-        torque: Smallest and largest peak moment. [N·m]
-    """
-
-    length: tuple[float, float]
-    pause: tuple[float, float]
-    force: tuple[float, float]
-    torque: tuple[float, float]
+    length: tuple[float, float]  #: Shortest and longest push. [s]
+    pause: tuple[float, float]  #: Shortest and longest pause between pushes. [s]
+    force: tuple[float, float]  #: Smallest and largest peak force. [N]
+    torque: tuple[float, float]  #: Smallest and largest peak moment. [N·m]
 
 
+#: Name of a style of pushing → what it draws from.
 STYLES: dict[str, PushStyle] = {
     "slow": PushStyle((0.8, 2.0), (0.3, 1.0), (20.0, 60.0), (0.0, 3.0)),
     "taps": PushStyle((0.14, 0.40), (0.3, 0.9), (30.0, 136.0), (0.0, 4.0)),
     "mixed": PushStyle((0.1, 1.5), (0.3, 1.0), (20.0, 90.0), (1.0, 6.0)),
 }
-"""Name of a style of pushing → what it draws from."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class PushesSpec:
-    """Pushes of random strength and direction, as a hand gives them, drawn from the seed.
-
-    Attributes:
-        name: Name of the contact.
-        style: "slow", "taps" or "mixed"; the ranges below override its own.
-        begin: No push before this. [s]
-        end: No push after this; 0 for the end of the log. [s]
-        length: Shortest and longest push. [s]
-        pause: Shortest and longest pause. [s]
-        force: Smallest and largest peak force. [N]
-        torque: Smallest and largest peak moment. [N·m]
-        vertical: Share of the force that may point along base z.
-        link: The link it acts on; 0 for the flange.
-        point: The point in the link's frame. (3,) [m]
-    """
+    """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
 
     KIND: ClassVar[str] = "pushes"
-    name: str
-    style: str = "slow"
-    begin: float = 0.0
-    end: float = 0.0
-    length: tuple[float, float] | None = None
-    pause: tuple[float, float] | None = None
-    force: tuple[float, float] | None = None
-    torque: tuple[float, float] | None = None
-    vertical: float = 0.5
-    link: int = 0
-    point: Vector = ORIGIN
+    name: str  #: Name of the contact.
+    style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
+    begin: float = 0.0  #: No push before this. [s]
+    end: float = 0.0  #: No push after this; 0 for the end of the log. [s]
+    length: tuple[float, float] | None = None  #: Shortest and longest push. [s]
+    pause: tuple[float, float] | None = None  #: Shortest and longest pause. [s]
+    force: tuple[float, float] | None = None  #: Smallest and largest peak force. [N]
+    torque: tuple[float, float] | None = None  #: Smallest and largest peak moment. [N·m]
+    vertical: float = 0.5  #: Share of the force that may point along base z.
+    link: int = 0  #: The link it acts on; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
     def ranges(self) -> PushStyle:
-        """The style's ranges, with those that are stated in their place.
-
-        Raises:
-            ParameterError: If there is no such style.
-        """
+        """The style's ranges, with those that are stated in their place."""
         check_choice("style", self.style, STYLES)
         given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
         return STYLES[self.style]._replace(**given)
 
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
-        """Draw the pushes of a run of `duration` [s], one after another until none fits.
-
-        Raises:
-            ParameterError: If there is no such style, or lengths and pauses are not positive.
-        """
+        """Draw the pushes of a run of `duration` [s], one after another until none fits."""
         style = self.ranges()
         if min(style.length[0], style.pause[0]) <= 0:
             raise ParameterError(f"contacts.{self.name}: length and pause must be positive")

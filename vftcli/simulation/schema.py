@@ -11,21 +11,12 @@ from vftcli.signals.parsing import shown
 
 Section = TypeVar("Section")
 
+#: Largest number of a scenario in any of its units; a clock that counts from 1970 starts below.
 LARGEST = 1e10
-"""Largest number of a scenario in any of its units; a clock that counts from 1970 starts below."""
 
 
 def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
-    """Make a section's dataclass from its TOML table.
-
-    Args:
-        cls: The dataclass; its fields are the keys, those without a default are required.
-        table: The parsed table.
-        where: The section's name as a user writes it, "" for the top level.
-
-    Raises:
-        ParameterError: If a key is unknown, missing or of another type.
-    """
+    """Make a section's dataclass from its TOML table."""
     known = [f.name for f in fields(cls)]  # type: ignore[arg-type]
     if extra := [key for key in table if key not in known]:
         raise ParameterError(

@@ -10,8 +10,8 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.arm import Arm, History, JointSignals
 from vftcli.simulation.scenario import SensingSpec
 
+#: Logging rate by kind of drive measurement, for robots that state none. [Hz]
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
-"""Logging rate by kind of drive measurement, for robots that state none. [Hz]"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,36 +19,24 @@ class Samples(JointSignals):
     """The sampling of a run: when, and the true signals then, one row a sample.
 
     The drive torque is averaged over the sampling interval, or that at the instant.
-
-    Attributes:
-        time: True time of each sample. (M,) [s]
-        stamp: The same on the log's clock, before jitter. (M,) [s]
     """
 
-    time: Array
-    stamp: Array
+    time: Array  #: True time of each sample. (M,) [s]
+    stamp: Array  #: The same on the log's clock, before jitter. (M,) [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """What the sensors report at each sample.
+    """What the sensors report at each sample."""
 
-    Attributes:
-        stamp: Time stamps, jittering. (M,) [s]
-        q: Positions. (M, n) [rad]
-        dq: Velocities. (M, n) [rad/s]
-        torque: Drive torques; for a robot that measures currents, K times `current`. (M, n) [N·m]
-        current: Motor currents, None for a robot that measures torques. (M, n) [A]
-        temperature: Joint temperatures. (M, n) [°C]
-        rows: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
-    """
-
-    stamp: Array
-    q: Array
-    dq: Array
+    stamp: Array  #: Time stamps, jittering. (M,) [s]
+    q: Array  #: Positions. (M, n) [rad]
+    dq: Array  #: Velocities. (M, n) [rad/s]
+    #: Drive torques; for a robot that measures currents, K times `current`. (M, n) [N·m]
     torque: Array
-    current: Array | None
-    temperature: Array
+    current: Array | None  #: Motor currents, None for a robot that measures torques. (M, n) [A]
+    temperature: Array  #: Joint temperatures. (M, n) [°C]
+    #: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
     rows: tuple[int, ...]
 
 

@@ -13,10 +13,10 @@ from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
 from vftcli.simulation.schema import unknown_name
 
+#: Natural frequency of the position loop by name. [rad/s]
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
-"""Natural frequency of the position loop by name. [rad/s]"""
+#: Largest natural frequency times step: beyond it the sampled loop is badly damped or unstable.
 FASTEST_LOOP = 0.4
-"""Largest natural frequency times step: beyond it the sampled loop is badly damped or unstable."""
 
 
 class Servo:

@@ -14,36 +14,24 @@ from vftcli.simulation.pushes import ORIGIN, Place, Vector
 
 @dataclass(frozen=True, kw_only=True)
 class HandSpec:
-    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor.
-
-    Attributes:
-        name: Name of the contact.
-        spans: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
-        moves: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
-        turns: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
-        reach: Time in which the hand makes its move. [s]
-        release: Time in which the hand lets go, before the end of each span. [s]
-        stiffness: Spring to the hand's position. [N/m]
-        damping: Damper. [N·s/m]
-        twist_stiffness: Spring to the hand's orientation. [N·m/rad]
-        twist_damping: Damper. [N·m·s/rad]
-        link: The link it holds; 0 for the flange.
-        point: The point in the link's frame. (3,) [m]
-    """
+    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
 
     KIND: ClassVar[str] = "hand"
-    name: str
+    name: str  #: Name of the contact.
+    #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
     spans: tuple[tuple[float, float], ...]
+    #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
     moves: tuple[Vector, ...] = ()
+    #: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
     turns: tuple[Vector, ...] = ()
-    reach: float = 0.6
-    release: float = 0.08
-    stiffness: float = 200.0
-    damping: float = 15.0
-    twist_stiffness: float = 0.0
-    twist_damping: float = 0.0
-    link: int = 0
-    point: Vector = ORIGIN
+    reach: float = 0.6  #: Time in which the hand makes its move. [s]
+    release: float = 0.08  #: Time in which the hand lets go, before the end of each span. [s]
+    stiffness: float = 200.0  #: Spring to the hand's position. [N/m]
+    damping: float = 15.0  #: Damper. [N·s/m]
+    twist_stiffness: float = 0.0  #: Spring to the hand's orientation. [N·m/rad]
+    twist_damping: float = 0.0  #: Damper. [N·m·s/rad]
+    link: int = 0  #: The link it holds; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
     def start(self, rng: np.random.Generator, duration: float) -> "Hand":
         """Make the hand ready to grab; nothing is drawn."""
@@ -109,26 +97,16 @@ class Hand:
 
 @dataclass(frozen=True, kw_only=True)
 class StopSpec:
-    """A hard stop: a plane that pushes back when the point goes beyond it.
-
-    Attributes:
-        name: Name of the contact.
-        through: A point of the plane in the base frame. (3,) [m]
-        normal: Its normal, pointing to the free side. (3,)
-        stiffness: Stiffness of the plane. [N/m]
-        damping: Damping while pressed. [N·s/m]
-        link: The link that meets it; 0 for the flange.
-        point: The point in the link's frame. (3,) [m]
-    """
+    """A hard stop: a plane that pushes back when the point goes beyond it."""
 
     KIND: ClassVar[str] = "stop"
-    name: str
-    through: Vector
-    normal: Vector = (0.0, 0.0, 1.0)
-    stiffness: float = 2e4
-    damping: float = 200.0
-    link: int = 0
-    point: Vector = ORIGIN
+    name: str  #: Name of the contact.
+    through: Vector  #: A point of the plane in the base frame. (3,) [m]
+    normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
+    stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
+    damping: float = 200.0  #: Damping while pressed. [N·s/m]
+    link: int = 0  #: The link that meets it; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
 
     def start(self, rng: np.random.Generator, duration: float) -> "StopSpec":
         """The stop itself: nothing is drawn, and it remembers nothing."""

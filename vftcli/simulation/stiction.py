@@ -10,8 +10,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 
-GUESSES = 12
-"""Active-set guesses before the slower sweeps that always converge take over."""
+GUESSES = 12  #: Active-set guesses before the slower sweeps that always converge take over.
 SWEEPS = 2000
 
 

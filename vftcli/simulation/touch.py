@@ -16,49 +16,31 @@ from vftcli.simulation.springs import HandSpec, StopSpec
 
 @dataclass(frozen=True, kw_only=True)
 class RandomWalkSpec:
-    """Joint torques that walk at random, the disturbance model of the Kalman observers.
-
-    Attributes:
-        name: Name of the contact.
-        intensity: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
-        initial: Standard deviation at the start. [N·m]
-        begin: The walk is zero before this. [s]
-    """
+    """Joint torques that walk at random, the disturbance model of the Kalman observers."""
 
     KIND: ClassVar[str] = "random-walk"
-    name: str
+    name: str  #: Name of the contact.
+    #: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
     intensity: tuple[float, ...]
-    initial: float = 0.0
-    begin: float = 0.0
+    initial: float = 0.0  #: Standard deviation at the start. [N·m]
+    begin: float = 0.0  #: The walk is zero before this. [s]
 
 
+#: Contacts that act with a wrench on a link, told apart by their `kind`.
 WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
-"""Contacts that act with a wrench on a link, told apart by their `kind`."""
-
-ContactSpec = WrenchSpec | RandomWalkSpec
-"""Every kind of ``[[contacts]]`` a scenario can have."""
+ContactSpec = WrenchSpec | RandomWalkSpec  #: Every kind of ``[[contacts]]`` a scenario can have.
 
 
 class Mounted(NamedTuple):
-    """A contact and the body it acts on.
+    """A contact and the body it acts on."""
 
-    Attributes:
-        name: The contact's name.
-        contact: What it exerts.
-        joint: The joint that carries the body, from 1.
-        turn: Orientation of the link's frame in the joint's frame. (3, 3)
-        point: The contact's point in the joint's frame. (3,) [m]
-        on_flange: Whether it acts on the flange.
-        lever: The point in flange axes from the flange origin, for contacts there. (3,) [m]
-    """
-
-    name: str
-    contact: Touch
-    joint: int
-    turn: Array
-    point: Array
-    on_flange: bool
-    lever: Array
+    name: str  #: The contact's name.
+    contact: Touch  #: What it exerts.
+    joint: int  #: The joint that carries the body, from 1.
+    turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
+    point: Array  #: The contact's point in the joint's frame. (3,) [m]
+    on_flange: bool  #: Whether it acts on the flange.
+    lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
 
 
 class Walk(NamedTuple):
@@ -69,11 +51,7 @@ class Walk(NamedTuple):
 
 
 def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: float) -> Mounted:
-    """Put a contact on its link.
-
-    Raises:
-        ParameterError: If the arm has no such link.
-    """
+    """Put a contact on its link."""
     if not 0 <= spec.link <= chain.joints:
         raise ParameterError(
             f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
@@ -89,11 +67,7 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
 def draw_walk(
     spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
 ) -> Walk:
-    """Draw a random walk of joint torques over `steps` inner steps of `step` [s].
-
-    Raises:
-        ParameterError: If there is neither one intensity nor one a joint, or one is negative.
-    """
+    """Draw a random walk of joint torques over `steps` inner steps of `step` [s]."""
     if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
         raise ParameterError(
             f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "

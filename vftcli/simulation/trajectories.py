@@ -12,35 +12,24 @@ from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec,
 from vftcli.simulation.kinematics import FlangePose, check_limits, check_start, flange_pose, follow
 from vftcli.simulation.motion import Command, Periodic, Reference, Stretches, straight_paths
 
+#: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
 HARMONICS = 48
-"""Harmonics kept of a periodic path; those of a circle fall below rounding long before."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CircleSpec:
-    """A horizontal circle of the flange at constant speed and orientation.
-
-    Attributes:
-        start: Joint positions at a point of the circle; empty takes the usual pose. (n,) [rad]
-        radius: Radius. [m]
-        period: Time of one round. [s]
-        cycles: Rounds.
-        towards: Direction from the start to the centre, from base x about base z. [rad]
-    """
+    """A horizontal circle of the flange at constant speed and orientation."""
 
     KIND: ClassVar[str] = "circle"
+    #: Joint positions at a point of the circle; empty takes the usual pose. (n,) [rad]
     start: tuple[float, ...] = ()
-    radius: float = 0.2
-    period: float = 4.0
-    cycles: float = 5.0
-    towards: float = 0.0
+    radius: float = 0.2  #: Radius. [m]
+    period: float = 4.0  #: Time of one round. [s]
+    cycles: float = 5.0  #: Rounds.
+    towards: float = 0.0  #: Direction from the start to the centre, from base x about base z. [rad]
 
     def motion(self, robot: Robot) -> Command:
-        """The circle as a Fourier series of the joints.
-
-        Raises:
-            ParameterError: If it is out of reach, or winds a joint up.
-        """
+        """The circle as a Fourier series of the joints."""
         if self.radius <= 0 or self.period <= 0 or self.cycles <= 0:
             raise ParameterError("trajectory radius, period and cycles must be positive")
         start = check_start(robot, self.start)
@@ -67,16 +56,11 @@ class CircleSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class HoldSpec:
-    """A held pose.
-
-    Attributes:
-        start: Joint positions. (n,) [rad]
-        length: How long. [s]
-    """
+    """A held pose."""
 
     KIND: ClassVar[str] = "hold"
-    start: tuple[float, ...] = ()
-    length: float = 10.0
+    start: tuple[float, ...] = ()  #: Joint positions. (n,) [rad]
+    length: float = 10.0  #: How long. [s]
 
     def motion(self, robot: Robot) -> Command:
         """A motion that stays at the pose, the usual one if none is given."""
@@ -90,26 +74,17 @@ class HoldSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class OffsetsSpec:
-    """Straight lines of the flange at constant orientation between stated points, at rest there.
-
-    Attributes:
-        moves: Rows (start time, end time, x, y, z): by the end time the flange is displaced from
-            the start by (x, y, z) in base axes. [s, m]
-        length: Length of the whole motion. [s]
-        start: Joint positions at the offset (0, 0, 0). (n,) [rad]
-    """
+    """Straight lines of the flange at constant orientation between stated points, at rest there."""
 
     KIND: ClassVar[str] = "offsets"
+    #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from the start
+    #: by (x, y, z) in base axes. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
-    length: float
-    start: tuple[float, ...] = ()
+    length: float  #: Length of the whole motion. [s]
+    start: tuple[float, ...] = ()  #: Joint positions at the offset (0, 0, 0). (n,) [rad]
 
     def motion(self, robot: Robot) -> Command:
-        """Each line as a polynomial path of the joints, run through with minimum jerk.
-
-        Raises:
-            ParameterError: If a point is out of reach or the times do not increase.
-        """
+        """Each line as a polynomial path of the joints, run through with minimum jerk."""
         from numpy.polynomial import chebyshev
 
         q = check_start(robot, self.start)
@@ -131,26 +106,17 @@ class OffsetsSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class JointMovesSpec:
-    """Straight moves in joint space between stated displacements from the start, at rest there.
-
-    Attributes:
-        moves: Rows (start time, end time, one displacement a joint): by the end time the joints
-            are displaced from the start by these. [s, rad]
-        length: Length of the whole motion. [s]
-        start: Joint positions at no displacement. (n,) [rad]
-    """
+    """Straight moves in joint space between stated displacements from the start, at rest there."""
 
     KIND: ClassVar[str] = "joint-moves"
+    #: Rows (start time, end time, one displacement a joint): by the end time the joints are
+    #: displaced from the start by these. [s, rad]
     moves: tuple[tuple[float, ...], ...]
-    length: float
-    start: tuple[float, ...] = ()
+    length: float  #: Length of the whole motion. [s]
+    start: tuple[float, ...] = ()  #: Joint positions at no displacement. (n,) [rad]
 
     def motion(self, robot: Robot) -> Command:
-        """The moves, straight in joint space and with minimum jerk.
-
-        Raises:
-            ParameterError: If a row has another length or the times do not increase.
-        """
+        """The moves, straight in joint space and with minimum jerk."""
         start = check_start(robot, self.start)
         if any(len(row) != 2 + robot.joints for row in self.moves):
             raise ParameterError(
@@ -187,11 +153,7 @@ def check_times(times: list[tuple[float, float]], length: float) -> None:
 
 
 def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
-    """Return the reference of a trajectory at times `t`, inside the robot's limits.
-
-    Raises:
-        ParameterError: If it leaves the workspace or the limits.
-    """
+    """Return the reference of a trajectory at times `t`, inside the robot's limits."""
     reference = spec.motion(robot).at(t)
     check_limits(robot, reference.q, reference.dq, f"trajectory {spec.KIND!r}")
     return reference

@@ -16,29 +16,19 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What really happened at each sample, on the log's clock.
+    """What really happened at each sample, on the log's clock."""
 
-    Attributes:
-        t: Time since the log's first sample, on its clock without jitter. (M,) [s]
-        tau_ext: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
-        wrench: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
-        contacts: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
-        walks: Name → joint torque of each random walk. (M, n) [N·m]
-        q, dq, ddq: True positions, velocities, accelerations. (M, n)
-        torque: True drive torque in the log's sampling (average or instant). (M, n) [N·m]
-        friction: True friction torque. (M, n) [N·m]
-    """
-
-    t: Array
-    tau_ext: Array
-    wrench: Array
+    t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
+    tau_ext: Array  #: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
+    wrench: Array  #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
+    #: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
     contacts: dict[str, Array]
-    walks: dict[str, Array]
-    q: Array
+    walks: dict[str, Array]  #: Name → joint torque of each random walk. (M, n) [N·m]
+    q: Array  #: True positions, velocities, accelerations. (M, n)
     dq: Array
     ddq: Array
-    torque: Array
-    friction: Array
+    torque: Array  #: True drive torque in the log's sampling (average or instant). (M, n) [N·m]
+    friction: Array  #: True friction torque. (M, n) [N·m]
 
     def columns(self) -> dict[str, Array]:
         """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""

@@ -19,18 +19,12 @@ from vftcli.simulation.servo import rigid_torque
 
 @dataclass(frozen=True, kw_only=True)
 class Vendor:
-    """The controller's own quantities at each sample.
+    """The controller's own quantities at each sample."""
 
-    Attributes:
-        target_torque: Nominal rigid-body torque of the reference. (M, n) [N·m]
-        target_current: That and the nominal friction as current, None without drive constants.
-            (M, n) [A]
-        tau_ext: Its estimate of the external torque ON the robot. (M, n) [N·m]
-    """
-
-    target_torque: Array
+    target_torque: Array  #: Nominal rigid-body torque of the reference. (M, n) [N·m]
+    #: That and the nominal friction as current, None without drive constants. (M, n) [A]
     target_current: Array | None
-    tau_ext: Array
+    tau_ext: Array  #: Its estimate of the external torque ON the robot. (M, n) [N·m]
 
 
 def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:

@@ -12,6 +12,7 @@ from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
 
+#: Name at ``--as`` → the function that writes it.
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
     "rtde": RTDE.write,
     "ur-rtde": UR_RTDE.write,
@@ -19,7 +20,6 @@ WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
     "rosbag2": write_rosbag2,
     "parquet": write_parquet,
 }
-"""Name at ``--as`` → the function that writes it."""
 
 UR_JOINTS, FRANKA_JOINTS = 6, 7
 

@@ -11,11 +11,9 @@ from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.truth import AXES, Truth
 from vftcli.simulation.writers.signals import joint_signals
 
-TRUTH_FRAME = "base axes, moment about the flange point"
-"""Of the truth's wrench."""
-
+TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
+#: Of the wrench of one contact elsewhere on the arm.
 AT_CONTACT = "base axes, moment about the point that is touched"
-"""Of the wrench of one contact elsewhere on the arm."""
 
 
 def write_parquet(path: Path, simulation: Simulation) -> None:

@@ -21,37 +21,26 @@ from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 
-RECEIVED_LATER_NS = 400_000
-"""How long after its stamp a message reaches the recorder. [ns]"""
-MODE_MOVE = 2
-"""ROBOT_MODE_MOVE of FrankaRobotState."""
+RECEIVED_LATER_NS = 400_000  #: How long after its stamp a message reaches the recorder. [ns]
+MODE_MOVE = 2  #: ROBOT_MODE_MOVE of FrankaRobotState.
 
 JOINT_STATE = "sensor_msgs/JointState"
 WRENCH_STAMPED = "geometry_msgs/WrenchStamped"
 ROBOT_STATE = "franka_msgs/FrankaRobotState"
 
-WRENCH, TWIST = ("force", "torque"), ("linear", "angular")
-"""Names of a message's two vectors."""
-
-UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])
-"""The quaternion of no rotation, x, y, z, w."""
+WRENCH, TWIST = ("force", "torque"), ("linear", "angular")  #: Names of a message's two vectors.
+UPRIGHT = np.array([[0.0, 0.0, 0.0, 1.0]])  #: The quaternion of no rotation, x, y, z, w.
 
 Rows = NDArray[np.int64]
 Nanoseconds = NDArray[np.int64]
 
 
 class WrittenTopic(NamedTuple):
-    """Messages of one topic.
+    """Messages of one topic."""
 
-    Attributes:
-        name: The topic.
-        type: The message type, as package/Name.
-        messages: One serialised message a row. (R, size) uint8
-    """
-
-    name: str
-    type: str
-    messages: Any
+    name: str  #: The topic.
+    type: str  #: The message type, as package/Name.
+    messages: Any  #: One serialised message a row. (R, size) uint8
 
 
 def write_rosbag2(path: Path, simulation: Simulation) -> None:

@@ -15,10 +15,11 @@ from vftcli.signals.errors import ParameterError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.signals import vendor_signals
 
+#: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
+#: row that follows, the last repeated: a command is executed one cycle later.
 Columns = Mapping[str, str | tuple[float, ...]]
-"""Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
-row that follows, the last repeated: a command is executed one cycle later."""
-
+#: The default record_configuration.xml of the official client. The constants are of what the
+#: simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
 CLIENT: Columns = {
     "timestamp": "time",
     "target_q": "target_q",
@@ -53,16 +54,13 @@ CLIENT: Columns = {
     "runtime_state": (2,),
     "joint_position_deviation_ratio": (0.0,),
 }
-"""The default record_configuration.xml of the official client. The constants are of what the
-simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL."""
-
+#: What ur_rtde's `startFileRecording` writes.
 RECORDER: Columns = {
     "safety_mode" if name == "safety_status" else name: content
     for name, content in CLIENT.items()
     if name != "joint_position_deviation_ratio"
 }
-"""What ur_rtde's `startFileRecording` writes."""
-
+#: What `franka::logToCSV` writes; tau_ext_hat_filtered is minus the torque ON the arm.
 FRANKA: Columns = {
     "time": "milliseconds",
     "success_rate": (1,),
@@ -78,11 +76,9 @@ FRANKA: Columns = {
     "cmd.O_dP_EE_d": "next target_twist",
     "cmd.tau_J_d": "next torque_command",
 }
-"""What `franka::logToCSV` writes; tau_ext_hat_filtered is minus the torque ON the arm."""
-
+#: The short recipe of a UR log: joint motion, currents and the target moment alone.
 SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment", "actual_q",
          "actual_qd", "actual_current")  # fmt: skip
-"""The short recipe of a UR log: joint motion, currents and the target moment alone."""
 
 
 class VendorTable(NamedTuple):
@@ -96,11 +92,7 @@ class VendorTable(NamedTuple):
     decimals: int | None = None  # to which it is rounded before
 
     def write(self, path: Path, simulation: Simulation) -> None:
-        """Write the log.
-
-        Raises:
-            ParameterError: If the scenario asks for a recipe that is none.
-        """
+        """Write the log."""
         known, rows = vendor_signals(simulation), np.array(simulation.measured.rows)
         names, texts = [], []
         for name, content in self.recipe(simulation).items():
