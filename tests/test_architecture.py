@@ -4,7 +4,9 @@ Every rule lists what breaks it, so that a failure names the file.
 """
 
 import ast
+import io
 import re
+import tokenize
 import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Iterator
@@ -77,6 +79,8 @@ TOUCHES = {
     "write_csv", "loadtxt", "savetxt",
 }  # fmt: skip
 """What a function is called that touches files."""
+
+FUNCTION = (ast.FunctionDef, ast.AsyncFunctionDef)
 
 SENTENCES = {"notes", "remarks", "repairs", "warnings"}
 """Names of what is read aloud; nothing else may be done with one of its items."""
@@ -264,6 +268,43 @@ def test_a_function_is_asked_for_a_dozen_things_at_most() -> None:
 def test_a_file_fits_a_few_screens() -> None:
     lines = {file: (PACKAGE / file).read_text("utf-8").count("\n") for file in modules()}
     assert not {file: count for file, count in lines.items() if count > 400}
+
+
+MOST = {
+    "lines of Python": 0,
+    "files": 0,
+    "functions": 0,
+    "functions over 60 lines": 0,
+    "names, operators, numbers": 0,
+    "characters a line that is not blank": 0,
+    "noqa": 0,
+    "lines of TOML, JavaScript, CSS": 0,
+}
+"""The size of the package: whoever makes it smaller lowers these, nobody raises them."""
+
+
+@pytest.mark.slow
+def test_the_package_does_not_grow() -> None:
+    texts = {file: (PACKAGE / file).read_text("utf-8") for file in modules()}
+    code = {tokenize.NAME, tokenize.OP, tokenize.NUMBER}
+    filled = [line for text in texts.values() for line in text.split("\n") if line.strip()]
+    every = [f for tree in modules().values() for f in ast.walk(tree) if isinstance(f, FUNCTION)]
+    data = [p for p in PACKAGE.rglob("*") if p.suffix in {".toml", ".js", ".css", ".html"}]
+    size = {
+        "lines of Python": sum(text.count("\n") for text in texts.values()),
+        "files": len(texts),
+        "functions": len(every),
+        "functions over 60 lines": sum(f.end_lineno - f.lineno >= 60 for f in every),
+        "names, operators, numbers": sum(
+            token.type in code
+            for text in texts.values()
+            for token in tokenize.generate_tokens(io.StringIO(text).readline)
+        ),
+        "characters a line that is not blank": sum(map(len, filled)) / len(filled),
+        "noqa": sum(text.count("# noqa") for text in texts.values()),
+        "lines of TOML, JavaScript, CSS": sum(p.read_text("utf-8").count("\n") for p in data),
+    }
+    assert not {name: size[name] for name, most in MOST.items() if size[name] > most}
 
 
 def codes() -> Counter[str]:
