@@ -271,14 +271,14 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 0,
-    "files": 0,
-    "functions": 0,
-    "functions over 60 lines": 0,
-    "names, operators, numbers": 0,
-    "characters a line that is not blank": 0,
-    "noqa": 0,
-    "lines of TOML, JavaScript, CSS": 0,
+    "lines of Python": 65_113,
+    "files": 453,
+    "functions": 3469,
+    "functions over 60 lines": 12,
+    "names, operators, numbers": 431_897,
+    "characters a line that is not blank": 49.6,
+    "noqa": 195,
+    "lines of TOML, JavaScript, CSS": 5698,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
