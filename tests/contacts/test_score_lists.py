@@ -51,13 +51,13 @@ def test_wrist_contacts_are_hardly_ever_placed_elsewhere() -> None:
         ("ur5-table1", "peak", 6.0),
         ("taps", "peak", 6.0),
         ("ur5-circle", "direction", 5.0),
-        short("ur5-table1", "direction", 3.0, "3.1 degrees: half of them are shorter than .25 s"),
+        ("ur5-table1", "direction", 3.0),
         ("taps", "direction", 3.0),
         ("ur5-circle", "impulse", 0.15),
         ("ur5-table1", "impulse", 0.08),
         ("taps", "impulse", 0.08),
-        ("ur5-circle", "width", 8.0),
-        ("ur5-table1", "width", 9.0),
+        ("ur5-circle", "width", 10.0),  # 9.6: what the places that fit differ by is in the band
+        ("ur5-table1", "width", 10.5),  # 10.0 likewise; 8 and 9 held .76 and .90 of the peaks
         ("taps", "width", 10.5),
         ("ur5-sensor", "false", 1),
         short("ur5-drag", "false", 1, "2: a rest after motion is told as a contact"),
@@ -70,7 +70,7 @@ def test_a_list_errs_by_no_more_than_its_bar(name: str, figure: str, bar: float)
 @pytest.mark.statistical
 @pytest.mark.parametrize(
     ("name", "bar"),
-    [("ur5-circle", 0.76), ("ur5-table1", 0.90), ("taps", 0.88), ("panda-bearing", 0.80)],
+    [("ur5-circle", 0.93), ("ur5-table1", 0.95), ("taps", 0.88), ("panda-bearing", 0.80)],
 )
 def test_a_peak_lies_in_its_band(name: str, bar: float) -> None:
     assert reached(name).held >= bar
