@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.disturbance import TIE, Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.intervals import near, runs_of
@@ -22,11 +22,9 @@ from vftcli.virtual_sensor.smoother.noise import (
     PUSHED_TIME,
     REST_TIME,
     SEEN,
-    TIE,
     UNSEEN_SHARE,
     UNSEEN_TIME,
     fit_joints,
-    resting,
     steps,
 )
 
@@ -90,7 +88,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
     pieces = [piece.part(slice(*run)) for piece in free for run in stretches(piece)]
     if not pieces:
         return None
-    moving = ~np.concatenate([resting(piece) for piece in pieces])
+    moving = ~np.concatenate([piece.rests for piece in pieces])
     share = moving.mean(axis=0)
     bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
     each = fit_joints(bridged)
@@ -126,7 +124,7 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
         np.maximum(spread**2 / 6.0, LEAST_NOISE),
         np.maximum(DRY_SHARE * dry, LEAST_ERROR),
     )
-    moving = log.known[:, None] & ~resting(log)
+    moving = log.known[:, None] & ~log.rests
     asked = moving.mean(axis=0) >= SEEN
     if learned is not None:
         # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
@@ -157,7 +155,7 @@ def stretches(piece: Blocks) -> list[tuple[int, int]]:
 
 def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
     """The blocks with d of the given joints bridged in a straight line where they rest."""
-    d, still = piece.d.copy(), resting(piece)
+    d, still = piece.d.copy(), piece.rests
     for j in np.flatnonzero(joints):
         moves = ~still[:, j]
         if moves.any():
@@ -231,7 +229,7 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
             none. (K,)
     """
     step = steps(blocks)
-    rests = resting(blocks)
+    rests = blocks.rests
     count = max(round(RECENT / float(np.median(blocks.length))), 1)
     moved = moved_before(~rests, count)
     unseen = noise.seen < 0.5
