@@ -37,7 +37,7 @@ from vftcli.observers.choice import ObserverChoice  # noqa: E402
 from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
 from vftcli.repetition.free_motion import FreeMotion  # noqa: E402
 from vftcli.repetition.free_run import ModelledRun  # noqa: E402
-from vftcli.repetition.standstill import standing  # noqa: E402
+from vftcli.signals.rest import standing  # noqa: E402
 
 GROUPS = ("planted", "pieces", "steady", *scenarios.SIMULATED, "bullet")
 

@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 
 from vftcli.identification.excitation import (
-    SLOW,
-    STICTION_SPEED,
     TOUCH_MARGIN,
     TOUCH_TIME,
     ContactSpan,
@@ -17,6 +15,7 @@ from vftcli.identification.excitation import (
     unexplained_torque,
 )
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.rest import MOVES, SLIDES
 
 T = np.arange(0, 10, 0.01)
 
@@ -45,7 +44,7 @@ def test_times_of_several_logs_add_up(prepared):
 
 
 def test_a_slow_joint_does_not_move(prepared):
-    dq = np.column_stack([np.full(len(T), 0.9 * SLOW), np.full(len(T), 1.1 * SLOW)])
+    dq = np.column_stack([np.full(len(T), 0.9 * MOVES), np.full(len(T), 1.1 * MOVES)])
     assert find_excitation([prepared(T, dq=dq)]).moves.tolist() == [False, True]
 
 
@@ -93,7 +92,7 @@ def test_samples_that_tell_nothing_are_no_contact(prepared):
 
 def test_standstill_is_spread_by_a_period_of_the_filter(prepared):
     dq = np.full((len(T), 1), 0.5)
-    dq[500] = 0.9 * STICTION_SPEED
+    dq[500] = 0.9 * SLIDES
     near = near_standstill(prepared(1.2 * T, dq=dq))[:, 0]
     # 1 / 8 Hz is 10.4 samples of 12 ms: 10 to either side
     assert np.flatnonzero(near).tolist() == list(range(490, 511))

@@ -20,7 +20,6 @@ from vftcli.identification.payload import (
     payload_from_pair,
     payload_from_poses,
     resting_poses,
-    standing,
     stretch_covariance,
 )
 from vftcli.identification.processing import gravity_torque
@@ -29,6 +28,7 @@ from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
+from vftcli.signals.rest import held
 from vftcli.simulation import load_scenario
 from vftcli.simulation.experiment import simulate_pair
 
@@ -186,7 +186,7 @@ def test_rests_are_averaged_without_their_edges():
     np.testing.assert_allclose(q, np.vstack([POSES, POSES]), atol=1e-12)
     np.testing.assert_allclose(torque[:5], gravity_torque(UR5, POSES), atol=1e-9)
     assert len(resting_poses([steps(POSES, dwell=0.45)], UR5)[0]) < 5  # shorter than a dwell
-    moving = ~standing(recording)
+    moving = ~held(recording.q, recording.median_step)
     assert moving[100:120].all()
     assert not moving[130:209].any()  # half a window of 0.2 s inside the rest
 

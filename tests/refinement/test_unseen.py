@@ -18,7 +18,6 @@ from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import (
     FOLDS,
     LARGEST,
-    MOVES,
     SCALES,
     WORTH,
     WORTHLESS,
@@ -27,6 +26,7 @@ from vftcli.refinement.unseen import (
     guarded,
     mask_of,
 )
+from vftcli.signals.rest import MOVES
 
 STRIDE = 3
 

@@ -39,6 +39,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.signals.rest import MOVES, faster
 from vftcli.virtual_sensor.smoother.noise import UNSEEN_SHARE
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
@@ -50,9 +51,9 @@ FALSE_MARGIN = 1.5
 AT_ENDS = 0.3
 #: A payload of the robot's file is named where it weighs as much as a load to this share.
 SAME_MASS = 0.1
-#: The arm rests around a contact where no joint is faster than this [rad/s] in 95 % of the samples
-#: from so long [s] before it to so long after it.
-RESTS, AROUND = 0.02, 1.0
+#: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the samples from
+#: so long before it to so long after it. [s]
+AROUND = 1.0
 
 
 def list_contacts(
@@ -164,7 +165,7 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
 def carried(load: FreeLoad, run: ModelledRun) -> CarriedLoad:
     """A load that the arm carries, with the payload of the robot's file that weighs as much."""
     t, dq = run.recording.t, run.recording.require("dq")
-    moves = t[np.any(np.abs(dq) > RESTS, axis=1)]
+    moves = t[faster(dq).any(axis=1)]
     span = (float(moves[0]), float(moves[-1])) if len(moves) else (float(t[0]), float(t[-1]))
     apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
     name = min(apart, key=lambda key: apart[key], default=None)
@@ -208,7 +209,7 @@ def rests_around(recording: Recording, found: Found, span: Run) -> bool:
     t = found.log.blocks.t
     first, last = np.searchsorted(recording.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
     speed = np.abs(recording.require("dq")[first:last])
-    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < RESTS)
+    return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
 
 def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:

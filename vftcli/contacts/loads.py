@@ -10,6 +10,7 @@ from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import REST, faster
 from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import DRIVES, SmoothedWrench, smooth_wrench
 
@@ -18,7 +19,6 @@ SHARE = 0.5
 #: Several contacts are one load if their forces add up to more than this share of their sizes:
 #: pushes that follow one another come from different sides.
 ALIKE = 0.95
-MOVES = 0.01  #: A joint that is faster moves. [rad/s]
 #: The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]
 AROUND = 1.0
 PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
@@ -31,7 +31,7 @@ def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
     """
     if not contacts:
         return False
-    moving = np.any(np.abs(recording.require("dq")) > MOVES, axis=1)
+    moving = np.any(faster(recording.require("dq"), REST), axis=1)
     t = recording.t
     first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
     lasts = np.array([contact.stop - contact.start for contact in contacts])

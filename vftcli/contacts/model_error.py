@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.disturbance import TIE, Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.intervals import near, runs_of
@@ -22,11 +22,9 @@ from vftcli.virtual_sensor.smoother.noise import (
     PUSHED_TIME,
     REST_TIME,
     SEEN,
-    TIE,
     UNSEEN_SHARE,
     UNSEEN_TIME,
     fit_joints,
-    resting,
     steps,
 )
 
@@ -90,7 +88,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
     pieces = [piece.part(slice(*run)) for piece in free for run in stretches(piece)]
     if not pieces:
         return None
-    moving = ~np.concatenate([resting(piece) for piece in pieces])
+    moving = ~np.concatenate([piece.rests for piece in pieces])
     share = moving.mean(axis=0)
     bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
     each = fit_joints(bridged)
@@ -126,7 +124,7 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
         np.maximum(spread**2 / 6.0, LEAST_NOISE),
         np.maximum(DRY_SHARE * dry, LEAST_ERROR),
     )
-    moving = log.known[:, None] & ~resting(log)
+    moving = log.known[:, None] & ~log.rests
     asked = moving.mean(axis=0) >= SEEN
     if learned is not None:
         # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
@@ -157,7 +155,7 @@ def stretches(piece: Blocks) -> list[tuple[int, int]]:
 
 def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
     """The blocks with d of the given joints bridged in a straight line where they rest."""
-    d, still = piece.d.copy(), resting(piece)
+    d, still = piece.d.copy(), piece.rests
     for j in np.flatnonzero(joints):
         moves = ~still[:, j]
         if moves.any():
@@ -231,16 +229,14 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
             none. (K,)
     """
     step = steps(blocks)
-    rests = resting(blocks)
-    count = max(round(RECENT / float(np.median(blocks.length))), 1)
-    moved = moved_before(~rests, count)
+    rests, length = blocks.rests, float(np.median(blocks.length))
+    moved = moved_before(~rests, max(round(RECENT / length), 1))
     unseen = noise.seen < 0.5
     in_motion = noise.variance + unseen * (UNSEEN_SHARE * noise.dry) ** 2
     motion_time = np.where(unseen, np.maximum(noise.time, UNSEEN_TIME), noise.time)
     variance = np.where(rests, noise.variance + (CREEP_SHARE * noise.dry) ** 2, in_motion)
     time = np.where(rests, np.maximum(noise.time, REST_TIME), motion_time)
-    starts = ~rests & rested_within(rests, count)
-    time = np.where(starts, np.minimum(time, START_TIME), time)
+    time = np.where(~rests & (moved < 1.0), np.minimum(time, START_TIME), time)
     if pushed is not None:
         held = rests & pushed[:, None]
         variance = np.where(held, noise.variance + (PUSHED_SHARE * noise.dry) ** 2, variance)
@@ -254,7 +250,9 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
     decay[0] = 0.0
     added[0] = variance[0] + np.where(rests[0], anew[0], 0.0)
     white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
-    spikes = np.where(near_motion(~rests, blocks), SPIKES_MOVING, SPIKES_RESTING)
+    # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
+    reach = max(round(SPIKE_REACH / length - TIE), 1)
+    spikes = np.where(near(~rests, reach), SPIKES_MOVING, SPIKES_RESTING)
     return ErrorCourse(decay, added, white, spikes)
 
 
@@ -265,16 +263,3 @@ def moved_before(moving: Mask, count: int) -> Array:
     many = np.maximum(np.arange(len(moving)) - first, 1)
     share: Array = (total[:-1] - total[first]) / many[:, None]
     return share
-
-
-def rested_within(rests: Mask, count: int) -> Mask:
-    """Blocks that follow a rest of a joint by no more than `count` blocks. (K, n)"""
-    found: Mask = moved_before(rests, count) > 0.0
-    return found
-
-
-def near_motion(moving: Mask, blocks: Blocks) -> Mask:
-    """Blocks within `SPIKE_REACH` of a joint's motion. (K, n)"""
-    # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
-    count = max(round(SPIKE_REACH / float(np.median(blocks.length)) - TIE), 1)
-    return near(moving, count)

@@ -28,7 +28,6 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
-from vftcli.virtual_sensor.smoother.noise import resting
 from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the error of the
@@ -207,7 +206,7 @@ class Measurer:
             evidence=float(self.found.best[number]),
             joint_torque=J.T @ values,
             joint_torque_sd=torque_sd,
-            at_rest=bool(resting(blocks)[peak].all()),
+            at_rest=bool(blocks.rests[peak].all()),
             vendor_force=vendor_force(
                 self.run, self.found.places[0].jacobian[peak], peak, blocks.t
             ),

@@ -3,14 +3,13 @@
 import numpy as np
 
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import MOVES
 
 SHORT = 0.3  #: Longest row that a stop explains. [s]
 #: When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
 #: row, which is known to a block. A knock on an arm that stood still is none of this. [s]
 BEFORE, AROUND, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
-#: A speed that counts as motion and one that counts as rest [rad/s]; and what may be left of the
-#: speed before, while the arm rings.
-MOVED, RESTS, LEFT = 0.02, 0.02, 0.05
+LEFT = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
 
 
 def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:
@@ -31,6 +30,6 @@ def follows_stop(recording: Recording, start: float, stop: float, block: float) 
     )
     if not len(before) or not len(after):
         return False
-    rests = after.max(axis=0) < np.maximum(RESTS, LEFT * around.max(axis=0))
+    rests = after.max(axis=0) < np.maximum(MOVES, LEFT * around.max(axis=0))
     # A median, since noise must not pass for motion.
-    return bool(np.median(before, axis=0).max() > MOVED and rests.all())
+    return bool(np.median(before, axis=0).max() > MOVES and rests.all())

@@ -37,16 +37,14 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import median_step
 
 #: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that a threshold is laid on. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
-#: Speed from which a joint moves [rad/s], and fewest such samples that its level is taken from.
-MOVING, LEAST_MOVING = 0.01, 50
-#: Within so long of a rest a joint's torque may be `NEAR_REST_SHARE` of its dry friction. [s]
-NEAR_REST = 0.3
+LEAST_MOVING = 50  #: Fewest samples in motion that a joint's level is taken from.
 #: What tells a contact from an error of the model: motion that is known to be free; the samples
 #: that the fit of the whole log calls free; the drives' dry friction; or nothing.
 Basis = Literal["free motion", "whole log", "friction", "none"]
@@ -251,7 +249,7 @@ def torque_level(pieces: Sequence[FreePiece]) -> Array:
         t = piece.run.recording.t
         use = piece.inside & (t >= t[0] + SETTLED)
         values.append(observed(piece.run)[use])
-        moves.append(np.abs(piece.run.recording.require("dq")[use]) > MOVING)
+        moves.append(faster(piece.run.recording.require("dq")[use], REST))
     torque, moving = np.abs(np.concatenate(values)), np.concatenate(moves)
     found = np.empty(torque.shape[1])
     for j, column in enumerate(torque.T):
@@ -272,8 +270,8 @@ def expected_torque(run: ModelledRun, level: Array | None) -> Array:
     least = np.full(len(dry), LEAST_ERROR) if level is None else level
     sd = np.tile(np.maximum(least, DRY_SHARE * dry), (recording.samples, 1))
     count = max(round(NEAR_REST / median_step(recording.t)), 1)
-    still = np.abs(recording.require("dq")) < MOVING
-    return np.where(near(still, count), np.maximum(sd, NEAR_REST_SHARE * dry), sd)
+    close = near(slower(recording.require("dq")), count)
+    return np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
 class SelfTest(NamedTuple):

@@ -8,6 +8,7 @@ from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_un
 from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
+from vftcli.signals.rest import NONZERO
 
 SLOW_RATE = 50.0  #: Below this rate a contact of a tenth of a second is a handful of samples. [Hz]
 #: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
@@ -89,5 +90,5 @@ def stale_rows(recording: Recording) -> Iterator[Remark]:
     # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
     if recording.dq is None or share < STALE or share > 0.9:
         return
-    if np.abs(recording.dq[last]).max() >= 1e-3:
+    if np.abs(recording.dq[last]).max() >= NONZERO:
         yield fact("stale-rows", stale=len(last), share_percent=100 * share)

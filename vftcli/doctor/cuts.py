@@ -20,6 +20,7 @@ from vftcli.signals.intervals import runs_of
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, fact, warning
+from vftcli.signals.rest import REST
 from vftcli.signals.source import Cut
 
 #: Times its largest torque that no drive gives: the slack is that of drive constants. [1]
@@ -43,7 +44,6 @@ APART = 0.25  #: Time that is cut on both sides of where two recordings meet. [s
 #: Time for which rows that all repeat one another are no late packets, and how many times as many
 #: rows they are as the log's usual repeats. [s, -]
 FROZEN, UNUSUAL = 0.25, 10
-MOVES = 1e-2  #: Speed at which an arm surely moves. [rad/s]
 GAP_STEPS = 4.0  #: A step of more than this many usual ones is a gap: what lies in it is not known.
 #: Share of gravity's torque that the drives of an arm on its brakes carry at most, and that they
 #: carry at least without. [1]
@@ -228,7 +228,7 @@ def frozen_rows(recording: Recording) -> Mask:
     long = np.array([recording.t[stop] - recording.t[start] >= FROZEN for start, stop in runs])
     usual = float(np.median(lengths[~long])) if not long.all() else 1.0
     for (start, stop), enough in zip(runs, long & (lengths >= UNUSUAL * usual), strict=True):
-        if enough and np.max(np.abs(dq[start])) > MOVES:
+        if enough and np.max(np.abs(dq[start])) > REST:
             found[start + 1 : stop + 1] = True
     return found
 
@@ -325,7 +325,7 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     speed = np.maximum.reduceat(fastest, first)
     heavy = weight > HEAVY**2
     held = heavy & (share > HELD)
-    free = heavy & (speed < MOVES) & (np.abs(share) < LET_GO)
+    free = heavy & (speed < REST) & (np.abs(share) < LET_GO)
     if not free.any() or np.count_nonzero(held) <= np.count_nonzero(free):
         return
     rows = np.zeros(torque.shape, dtype=bool)

@@ -22,6 +22,7 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.rest import MOVES
 from vftcli.signals.series import median_step
 
 WINDOW = 0.15  #: Length of a window; each begins in the middle of the one before. [s]
@@ -31,7 +32,6 @@ WINDOWS, BLOCK, LEAST = 320, 16, 60
 INSIDE = 12  #: Instants of a window at which the model is computed.
 EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01  #: Lags that are tried, and how far apart they are. [s]
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
-MOVES = 0.02  #: Speed of a window from which it tells a lag. [rad/s]
 KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be contact.
 #: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)

@@ -14,8 +14,8 @@ from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, warning
+from vftcli.signals.rest import COMMANDED, slower
 
-REST = 2e-3  #: Speed below which a joint counts as resting. [rad/s]
 MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
 USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
 #: Torque per current of UR's five joint sizes, e-Series and CB3: the controllers' own tables.
@@ -69,8 +69,7 @@ def resting(recording: Recording) -> Mask:
     if recording.dq is None:
         return np.zeros(recording.samples, dtype=bool)
     speed = recording.dq if recording.target_dq is None else recording.target_dq
-    still = (np.abs(speed) < REST).all(axis=1)
-    return np.asarray(still & (np.abs(recording.dq) < 5 * REST).all(axis=1))
+    return np.asarray((slower(speed, COMMANDED) & slower(recording.dq)).all(axis=1))
 
 
 def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Remark]:

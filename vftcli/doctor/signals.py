@@ -12,8 +12,8 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.rest import NONZERO
 
-MOVING = 1e-3  #: Speed from which a joint counts as moving. [rad/s]
 TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Net share of work from which a joint's effort counts as inverted.
 #:
@@ -126,7 +126,7 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     share = np.sum(power, axis=0) / np.where(gross > 0, gross, 1.0)
     travel = np.sum(np.abs(np.diff(recording.q[rows], axis=0)), axis=0)
     # One way only, gravity alone can take or give work.
-    reversing = (speed.max(axis=0) > MOVING) & (speed.min(axis=0) < -MOVING)
+    reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
     return np.asarray(share)
 
@@ -164,7 +164,7 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
         return
     name, value = effort
     is_current = name == "current"
-    forward = recording.dq[:, found[0]] > MOVING
+    forward = recording.dq[:, found[0]] > NONZERO
     yield warning(
         "effort-sign-by-work" if is_most(len(found), judged) else "effort-sign-of-some",
         on_joints(found),

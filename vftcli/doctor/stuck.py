@@ -9,13 +9,14 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.doctor.findings import on_joints
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.intervals import runs_of
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
+from vftcli.signals.rest import HELD
 
 LONG = 0.5  #: Time for which a signal has to repeat itself. [s]
 MANY = 10  #: Steps for which it has to.
@@ -33,7 +34,6 @@ TRAVEL = 0.05  #: Travel of a joint whose effort cannot be zero throughout. [rad
 #: 100 Hz. [rad]
 COARSE = 2e-4
 SOME = 2000  #: Samples that tell most of what a column is like.
-STILL = 1e-3  #: Travel below which a joint stands. [rad]
 ONCE = 0.2  #: Share of a log that no effort stays at its limit in one go.
 CLIPPED = 0.1  #: Time at the very extreme from which an effort is clipped. [s]
 
@@ -73,7 +73,7 @@ def travel_of(recording: Recording) -> Array:
 def still_joints(recording: Recording) -> Iterator[Remark]:
     """Joints that never move, or an arm that does not."""
     travel = travel_of(recording)
-    still = np.flatnonzero(travel < STILL)
+    still = np.flatnonzero(travel < HELD)
     if still.size == recording.joints:
         yield fact("at-rest", travel_mrad=1e3 * float(travel.max()))
     elif still.size:
@@ -139,7 +139,8 @@ def long_repeats(recording: Recording, name: str) -> Iterator[Stretch]:
     same = value[1:] == value[:-1]
     others = [n for n in ("q", "dq", *EFFORTS) if n != name]
     for j in range(value.shape[1]):
-        first, last = edges_of(same[:, j])
+        # A run of steps that change nothing ends with the sample behind its last step.
+        first, last = np.array(runs_of(same[:, j]), dtype=np.intp).reshape(-1, 2).T
         long = (t[last] - t[first] >= LONG) & (last - first >= MANY)
         if not long.any():
             continue
@@ -160,13 +161,6 @@ def varies(recording: Recording, names: list[str], joint: int, rows: slice) -> b
             if np.mean(column[1:] != column[:-1]) > 0.5:
                 return True
     return False
-
-
-def edges_of(mask: Mask) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First and last sample of every run of equal samples, given which steps change nothing."""
-    walled = np.concatenate([[False], mask, [False]])
-    edges = np.flatnonzero(walled[1:] != walled[:-1])
-    return edges[::2], edges[1::2]
 
 
 def farthest(t: Array, way: Array) -> float:
@@ -278,10 +272,8 @@ def is_clipped(value: Array, position: Array, least: int = 10) -> bool:
         below = float(np.max(sign * value[~at]))
         if np.count_nonzero(sign * value == below) > 0.2 * count:
             continue
-        first, last = edges_of(at[1:] & at[:-1])
-        runs = zip(first.tolist(), last.tolist(), strict=True)
-        long = [slice(a, b + 1) for a, b in runs if b - a + 1 >= least]
-        if any(np.ptp(position[run]) > STILL for run in long):
+        long = [slice(*run) for run in runs_of(at) if run[1] - run[0] >= least]
+        if any(np.ptp(position[run]) > HELD for run in long):
             return True
     return False
 

@@ -13,6 +13,7 @@ from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning
+from vftcli.signals.rest import MOVES
 
 #: What a joint rubs less for each kelvin: UR's five joint sizes .011–.022 between 28 and 45 °C.
 PER_KELVIN = 0.015
@@ -22,7 +23,6 @@ ASSUMED = 10.0  #: The same where the robot file does not say the temperature of
 #: Where the law stands on measurements (28 to 46 °C), and 15 to 20 K beyond. [°C]
 HOLDS = (15.0, 65.0)
 NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
-MOVING = 0.02  #: Speed from which a joint's friction is that of motion. [rad/s]
 
 
 def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]:
@@ -110,7 +110,7 @@ def distance_of(j: int, joint: JointFriction, speed: Array, temperature: Array) 
         speed: Its speed. (T,) [rad/s]
         temperature: Its temperature, NaN where not measured. (T,) [°C]
     """
-    used = (speed > MOVING) & ~np.isnan(temperature)
+    used = (speed > MOVES) & ~np.isnan(temperature)
     if joint.model == "none" or not used.any():
         return None
     if joint.temperature:

@@ -17,6 +17,7 @@ from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.rest import MOVES
 
 #: Length of a window: short beside motion, long beside the noise of single samples and an arm's
 #: vibration. [s]
@@ -61,7 +62,6 @@ UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns"}
 #: are those of half the rate, and sound logs repeat up to a third.
 HELD = 0.55
 STEPS, BLOCK = 8000, 500  #: Steps that are looked at, at most, in blocks.
-MOVES = 0.02  #: Speed from which a velocity that repeats itself is held rather than small. [rad/s]
 CRUISE = 0.2  #: A velocity that repeats itself for longer may be a constant one. [s]
 
 

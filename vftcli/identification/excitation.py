@@ -11,12 +11,11 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.intervals import intervals, near
 from vftcli.signals.remarks import Remark, Where, warning
+from vftcli.signals.rest import MOVES, SLIDES, slower
 from vftcli.signals.series import median_step
 
-SLOW = 0.02  #: A joint must move faster than this to identify anything. [rad/s]
 ENOUGH = 1.0  #: Time it must do so, and for both ways to count the time each way. [s]
 TOUCH = 7.0  #: Residual that counts as contact, in robust standard deviations of its joint.
-STICTION_SPEED = 0.05  #: Speed near which a joint may stick. [rad/s]
 TOUCH_TIME = 0.15  #: Time it must last. [s]
 TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
 #: Share of the torque's variation that the profile's links and fitted friction must explain in the
@@ -38,13 +37,13 @@ def find_excitation(motions: Sequence[PreparedLog]) -> Excitation:
         if motion.samples < 2:
             continue
         step = median_step(motion.t)
-        times[0] += step * np.count_nonzero(motion.dq > SLOW, axis=0)
-        times[1] += step * np.count_nonzero(motion.dq < -SLOW, axis=0)
+        times[0] += step * np.count_nonzero(motion.dq > MOVES, axis=0)
+        times[1] += step * np.count_nonzero(motion.dq < -MOVES, axis=0)
     moves = times.sum(axis=0) >= ENOUGH
     if not np.any(moves):
         names = ", ".join(m.recording.name for m in motions)
         raise IdentificationError(
-            f"{names}: no joint moves faster than {SLOW:g} rad/s for {ENOUGH:g} s; a log at rest "
+            f"{names}: no joint moves faster than {MOVES:g} rad/s for {ENOUGH:g} s; a log at rest "
             "identifies no friction and no inertia. Record free motion, or use --find-payload "
             "on static poses"
         )
@@ -87,7 +86,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
 
 def near_standstill(motion: PreparedLog) -> Mask:
     """Whether a joint is slow enough to stick within a filter's length of a sample. (M, n)"""
-    slow = np.abs(motion.dq) < STICTION_SPEED
+    slow = slower(motion.dq, SLIDES)
     if motion.samples < 2:
         return slow
     step = median_step(motion.t)

@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.excitation import SLOW
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
@@ -19,6 +18,7 @@ from vftcli.identification.result import root_mean_square
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
+from vftcli.signals.rest import MOVES
 
 PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
@@ -104,7 +104,7 @@ class JointData(NamedTuple):
 
     def parts(self, j: int) -> list[Array]:
         """The rows that cross-validation of joint j (from 0) leaves out in turn."""
-        return left_out(self.lengths, [speed > SLOW for speed in self.speeds(j)])
+        return left_out(self.lengths, [speed > MOVES for speed in self.speeds(j)])
 
     def slow(self, signals: Array) -> Array:
         """Signals in the band in which an observer listens, each log by itself. (M, k)"""

@@ -19,20 +19,19 @@ from vftcli.robots.drive import drive_torque, gain_sd
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.intervals import intervals
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.rest import held
 from vftcli.signals.series import resample_columns
 
 STATIC = 4  #: Parameters that gravity tells: mass and three first moments.
 SAME_MOTION = 5e-3  #: Position difference up to which two logs are the same motion. [rad rms]
 COARSE, FINE = 0.05, 5e-4  #: Steps in which the shift between two logs is sought. [s]
 DWELL = 0.5  #: Shortest rest that counts as a pose. [s]
-#: A pose is held while no joint moves further than `STILL` [rad] within `WINDOW` [s].
-WINDOW, STILL = 0.2, 1e-3
 POSES = 4  #: Fewest different poses for mass and centre of mass.
 APART = 0.1  #: Poses are different if a joint is this far elsewhere. [rad]
 MOST_NAMED = 4  #: Logs that are called by their names; there may be thousands of episodes.
@@ -326,21 +325,11 @@ def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array,
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
     q, torque = [], []
     for recording in recordings:
-        effort = drive_torque(recording, robot)
-        for start, stop in intervals(recording.t, standing(recording), least=DWELL):
+        effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
+        for start, stop in intervals(recording.t, still, least=DWELL):
             edge = (stop - start) // 5  # where the arm still settles or already leaves
             span = slice(start + edge, stop - edge)
             q.append(recording.q[span].mean(axis=0))
             torque.append(effort[span].mean(axis=0))
     n = robot.joints
     return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
-
-
-def standing(recording: Recording) -> Mask:
-    """Whether no joint travels further than `STILL` around a sample. (T,)"""
-    reach = max(1, round(0.5 * WINDOW / recording.median_step))
-    held = np.zeros(recording.samples, dtype=bool)
-    if recording.samples > 2 * reach:
-        travel = np.abs(recording.q[2 * reach :] - recording.q[: -2 * reach])
-        held[reach:-reach] = np.all(travel <= STILL, axis=1)
-    return held

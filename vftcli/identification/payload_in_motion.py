@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.excitation import SLOW
 from vftcli.identification.payload import (
     APART,
     DWELL,
@@ -34,6 +33,7 @@ from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
+from vftcli.signals.rest import faster
 
 LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
 #: What a weighing needs: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
@@ -123,7 +123,7 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
         raise IdentificationError(f"{names}: no log is long enough to be filtered")
     d, A, q, dq = (np.concatenate(each) for each in zip(*signals, strict=True))
     A = np.concatenate([A, dq[:, :, None] * np.eye(robot.joints)], axis=2)
-    usable = (np.abs(dq) > SLOW).astype(float)
+    usable = faster(dq).astype(float)
 
     def left_by(columns: Array) -> tuple[Array, Array]:
         fit = fit_all_joints(columns, d, usable)

@@ -15,6 +15,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import NONZERO, faster
 from vftcli.signals.series import gaps_of
 
 
@@ -26,7 +27,6 @@ class Processing:
     cutoff: float = 8.0
     #: Samples kept per period of the cutoff when the filtered log is decimated.
     oversampling: float = 6.0
-    still: float = 1e-3  #: Speed below which a joint counts as at rest. [rad/s]
     #: Length of a stop from which on it identifies nothing, because of stiction. [s]
     rest: float = 0.3
     gap: float = 10.0  #: Steps longer than this many median steps are left out.
@@ -49,7 +49,7 @@ class Processing:
             "positions are never differentiated",
             "decimation": float(self.stride(step)),
             "kept_rate_hz": round(1.0 / (step * self.stride(step)), 6),
-            "scored_span": f"first to last sample with |dq| > {self.still:g} rad/s",
+            "scored_span": f"first to last sample with |dq| > {NONZERO:g} rad/s",
         }
 
     def stride(self, step: float) -> int:
@@ -104,7 +104,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
     dq, torque = recording.require("dq"), drive_torque(recording, robot)
     t, stride = recording.t, processing.stride(recording.median_step)
     # Before the first and after the last movement stiction holds what no model of velocity knows.
-    moving = np.flatnonzero(np.any(np.abs(dq) > processing.still, axis=1))
+    moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
     columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}
     for j in range(recording.joints):
@@ -127,9 +127,8 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
 def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
-    for j, column in enumerate(np.abs(dq).T):
-        stops = intervals(t, column <= processing.still, least=processing.rest)
-        usable[:, j] = ~covered(stops, len(t))
+    for j, moves in enumerate(faster(dq, NONZERO).T):
+        usable[:, j] = ~covered(intervals(t, ~moves, least=processing.rest), len(t))
     # What the filter makes of a gap reaches half a period of its cutoff to either side.
     margin = 0.5 / processing.cutoff
     for k in gaps_of(t, processing.gap):

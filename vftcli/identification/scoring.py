@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.identification.excitation import SLOW
 from vftcli.identification.least_squares import fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.result import Trace, root_mean_square
@@ -17,6 +16,7 @@ from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.rest import faster
 from vftcli.signals.series import resample_columns
 
 EXPLAINS = 0.4  #: Share of a residual that a cause must explain to be named.
@@ -133,8 +133,7 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
 
 def in_motion(motion: PreparedLog, j: int) -> Mask:
     """Where joint j (from 0) moves fast enough to tell its friction. (M,)"""
-    moving: Mask = motion.usable[:, j] & (np.abs(motion.dq[:, j]) > SLOW)
-    return moving
+    return motion.usable[:, j] & faster(motion.dq[:, j])
 
 
 def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:

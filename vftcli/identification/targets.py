@@ -34,6 +34,7 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import NONZERO, SLIDES, faster
 
 #: Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]
 CUTOFF = 4.0
@@ -49,7 +50,6 @@ SHAPES = (
 WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
 )
-MOVING = 0.05  #: Speed from which a joint moves enough to show its friction. [rad/s]
 UNASKED = 0.5  #: Share of the motion with a target velocity below which a hand led the arm.
 #: Share of the law that a joint's friction has at most when a hand leads the arm; programs feed .8
 #: to 1.3 of it forward, by temperature and load.
@@ -142,8 +142,7 @@ def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
         recording, t = log.recording, log.recording.t
         current, moment = recording.require("target_current"), recording.require("target_torque")
         step = resolution(current[:, j])
-        at_rest = np.all(np.abs(recording.require("dq")) <= log.motion.processing.still, axis=1)
-        for start, stop in runs_of(at_rest):
+        for start, stop in runs_of(~np.any(faster(recording.require("dq"), NONZERO), axis=1)):
             inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
             if np.count_nonzero(inside) > 3:
                 i, m = current[start:stop, j][inside], moment[start:stop, j][inside]
@@ -233,7 +232,7 @@ def controller_friction(
     """
     speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
     fast = float(np.quantile(speed, 0.9))
-    if fast < MOVING:
+    if fast < SLIDES:
         return None
     y = np.concatenate([constant * log.current[:, j] - log.moment[:, j] for log in logs])
     load = np.concatenate([log.columns.load[log.motion.kept, j] for log in logs])
@@ -263,7 +262,7 @@ def refuse_guided(log: Targets, robot: Robot) -> None:
     the law tells.
     """
     recording, dq = log.recording, log.recording.require("dq")
-    moves = np.abs(dq) > MOVING
+    moves = faster(dq, SLIDES)
     guided = False
     if recording.target_dq is not None:
         asked = np.any(recording.target_dq != 0.0, axis=1)
@@ -271,7 +270,7 @@ def refuse_guided(log: Targets, robot: Robot) -> None:
     elif robot.torque_constant is not None and robot.friction:
         law = friction_torque(robot.friction, log.motion.dq)
         fed = robot.torque_constant * log.current - log.moment
-        used = np.where(np.abs(log.motion.dq) > MOVING, law, 0.0)
+        used = np.where(faster(log.motion.dq, SLIDES), law, 0.0)
         size = np.sum(used**2, axis=0)
         shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
         guided = bool(np.min(shares, initial=1.0) < GUIDED)

@@ -32,6 +32,7 @@ from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import sentence
+from vftcli.signals.rest import slower
 
 #: How far an item lets the answer be believed.
 Standing = Literal["good", "caution", "bad", "unknown"]
@@ -39,7 +40,6 @@ Standing = Literal["good", "caution", "bad", "unknown"]
 MARKS = {"good": "✓", "caution": "△", "bad": "✗", "unknown": "–"}
 #: The standings, the worst first.
 SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
-STILL = 0.01  #: A joint slower than this rests. [rad/s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -325,8 +325,7 @@ def resting(recording: Recording) -> Mask:
     """The joints that rest in most of a log. (n,)"""
     if recording.dq is None:
         return np.zeros(recording.joints, dtype=bool)
-    shares = [np.mean(np.abs(speed) < STILL) for speed in recording.dq.T]
-    return np.asarray(np.array(shares) > FULL_OF_REST)
+    return np.asarray(slower(recording.dq).mean(axis=0) > FULL_OF_REST)
 
 
 def joint_words(joints: Sequence[int]) -> str:

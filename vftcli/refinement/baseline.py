@@ -12,12 +12,12 @@ from vftcli.refinement.tuning import gains_of
 from vftcli.repetition.free_load import FreeLoad, free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.repetition.standstill import standing
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.rest import standing
 
 if TYPE_CHECKING:
     from vftcli.refinement.whole_log import WholeLogBias

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from vftcli.refinement.normal_equations import FittedError
 from vftcli.refinement.robust_fit import WholeLogFit
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.rest import faster
 
 FOLDS = 5  #: Contiguous parts of the free samples, each predicted from the others.
 MARGIN = 0.5  #: Left out at both ends of a fold: neighbours in time know each other. [s]
 SCALES = (0.0, 0.1, 0.3, 1.0)  #: How far the model is let go: factors on its standard deviations.
 LARGEST = 6.0  #: A residual counts at most so many scales.
-MOVES = 0.02  #: A joint moves where it is faster than this. [rad/s]
 #: A joint that moves in less than this share of the free samples is judged by all of them.
 SELDOM = 0.2
 WORTH = 0.9  #: A joint is corrected in full if at most this share of its unseen error is left, …
@@ -45,7 +45,7 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
         fit: The fit.
         dq: Joint velocities at its samples. (S, n) [rad/s]
     """
-    moves: Mask = np.abs(dq) > MOVES
+    moves = faster(dq)
     judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
     folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
     left_out = [mask_of(len(fit.free), outer) for _, outer in folds]

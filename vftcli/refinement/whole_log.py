@@ -25,12 +25,13 @@ from vftcli.refinement.model_error import (
 from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import MOVES, Guarded, faded, guarded
+from vftcli.refinement.unseen import Guarded, faded, guarded
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
 
 #: From its first to its last motion a log has to take this long: a shorter one tells inertia from a
@@ -168,7 +169,7 @@ def motion_of(run: ModelledRun) -> tuple[float, Remark | None]:
         short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
         return duration, short
     # noise is no motion
-    moves = np.any(np.abs(zero_phase(t, dq, CUTOFF)) > MOVES, axis=1)
+    moves = faster(zero_phase(t, dq, CUTOFF)).any(axis=1)
     moving = float(np.count_nonzero(moves) * median_step(t))
     span = float(np.ptp(t[moves])) if moves.any() else 0.0
     share = moving / duration

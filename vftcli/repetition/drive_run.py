@@ -5,7 +5,6 @@ from functools import cached_property
 
 import numpy as np
 
-from vftcli.repetition.standstill import duration, standing
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
@@ -13,6 +12,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import duration, standing
 from vftcli.signals.series import median_step
 
 

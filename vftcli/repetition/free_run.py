@@ -12,6 +12,7 @@ from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import resting
 from vftcli.signals.series import white_noise
 from vftcli.signals.shown import Shown
 
@@ -74,8 +75,6 @@ class ModelledRun(Shown):
     @cached_property
     def rests(self) -> Mask:
         """Where a joint rests. (T, n)"""
-        from vftcli.repetition.standstill import resting
-
         return resting(self.recording.t, self.recording.require("dq"))
 
     def with_terms(self, terms: DynamicsTerms) -> "ModelledRun":

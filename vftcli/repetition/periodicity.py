@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.repetition.standstill import standing
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.rest import standing
 from vftcli.signals.series import resample_columns
 
 LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.

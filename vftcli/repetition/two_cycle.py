@@ -13,13 +13,13 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import FreeRun, ModelledRun
 from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
 from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
-from vftcli.repetition.standstill import STILL
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.rest import REST, faster
 
 BLOCK = 1.0  #: Length of the pieces whose scatter tells chance from change. [s]
 #: Standard errors from which on a change is believed: contacts alone rarely look like one.
@@ -222,7 +222,7 @@ def friction_change(motion: DriveRun, tau: Array, moving: Mask) -> Array:
     piece = ((t - t[0]) / BLOCK).astype(np.int64)
     change = np.zeros(n)
     for j in range(n):
-        used = np.isfinite(tau[:, j]) & moving[:, j] & (np.abs(motion.dq[:, j]) > STILL)
+        used = np.isfinite(tau[:, j]) & moving[:, j] & faster(motion.dq[:, j], REST)
         along = tau[used, j] * np.sign(motion.dq[used, j])
         count = np.bincount(piece[used]).astype(np.float64)
         total = np.bincount(piece[used], weights=along)

@@ -7,8 +7,11 @@ import numpy as np
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
 from vftcli.signals.intervals import runs_of
+from vftcli.signals.rest import REST, slower
 from vftcli.signals.series import gaps_of, median_step, resample_columns
 
+#: What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s.
+TIE = 1e-6
 GAP = 5.5  #: A step of more than this many median steps is a gap; no stretch reaches across.
 
 
@@ -42,6 +45,12 @@ class Blocks(NamedTuple):
     q: Array  #: Joint positions at its middle. (K, n) [rad]
     velocity: Array  #: Mean joint velocity over it, from the positions. (K, n) [rad/s]
     known: Mask  #: Whether its disturbance is known: not across a gap of the clock. (K,)
+
+    @property
+    def rests(self) -> Mask:
+        """Blocks in which each joint rests. (K, n)"""
+        # Steps of an encoder make speeds of just `REST`: they move, whatever rounding makes of it.
+        return slower(self.velocity, (1.0 - TIE) * REST)
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""

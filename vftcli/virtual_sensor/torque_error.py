@@ -16,7 +16,6 @@ from vftcli.observers.error_band import error_band, free_error
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Part, spectra_of
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.repetition.standstill import resting
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
@@ -105,8 +104,7 @@ def from_free_part(
             (n,) [(N·m)²]
     """
     friction = dry_friction(run.robot.friction, run.robot.joints)
-    rests = resting(run.recording.t, run.recording.require("dq"))
-    sd, seen = {}, True
+    rests, sd, seen = run.rests, {}, True
     for torque in torques:
         inside = torque.tau[free]
         error = free_error(inside - np.nanmean(inside, axis=0), rests[free], friction)

@@ -10,9 +10,9 @@ from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.rest import NEAR_REST
 from vftcli.virtual_sensor.smoother.noise import (
     ASSUMED_SHARE,
-    NEAR_REST,
     UNSEEN_SHARE,
     FreeTerms,
     fit_spectrum,

@@ -23,11 +23,9 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import grown, runs_of
+from vftcli.signals.rest import NEAR_REST
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
-STILL = 0.01  #: A joint slower than this over a block rests: what holds it is stiction. [rad/s]
-#: What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s.
-TIE = 1e-6
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
 #: A joint that rests under a contact: the push re-settles its stiction within so long. [s]
 PUSHED_TIME = 0.3
@@ -38,8 +36,6 @@ UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
 USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
 LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
-#: Where no free part tells, stiction counts this long before and after a rest too. [s]
-NEAR_REST = 0.3
 ASSUMED_SHARE = 0.2  #: Where no free part tells: the model error of motion, as a share of F_c.
 
 
@@ -75,14 +71,14 @@ class TorqueNoise:
         if pushed is None:
             return found
         again = self.moving + (PUSHED_SHARE / REST_SHARE) ** 2 * self.resting
-        return np.where(resting(blocks) & pushed[:, None], again, found)
+        return np.where(blocks.rests & pushed[:, None], again, found)
 
     def time(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
         """Correlation time of the model error in every block; as `variance`. (K, n) [s]"""
         found = np.where(self.rests(blocks), self.resting_time, self.moving_time)
         if pushed is None:
             return found
-        return np.where(resting(blocks) & pushed[:, None], PUSHED_TIME, found)
+        return np.where(blocks.rests & pushed[:, None], PUSHED_TIME, found)
 
     def decay(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
         """Share of the model error that is kept from one block to the next, likewise. (K, n)"""
@@ -90,19 +86,12 @@ class TorqueNoise:
 
     def rests(self, blocks: Blocks) -> Mask:
         """Blocks in which each joint rests, those within `near` of one too. (K, n)"""
-        still = resting(blocks)
-        return np.column_stack([grown(blocks.t, column, self.near) for column in still.T])
+        return np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
 
 
 def steps(blocks: Blocks) -> Array:
     """Time from the middle of the block before; 0 for the first. (K,) [s]"""
     return np.diff(blocks.t, prepend=blocks.t[:1])
-
-
-def resting(blocks: Blocks) -> Mask:
-    """Blocks in which each joint rests. (K, n)"""
-    # Steps of an encoder make speeds of just `STILL`: they move, whatever rounding makes of them.
-    return np.asarray(np.abs(blocks.velocity) < (1.0 - TIE) * STILL)
 
 
 def torque_noise(
@@ -127,7 +116,7 @@ def torque_noise(
     # An offset is an error too.
     every = np.concatenate([s.d for s in stretches])
     variance += every.mean(axis=0) ** 2
-    moving = ~np.concatenate([resting(s) for s in stretches])
+    moving = ~np.concatenate([s.rests for s in stretches])
     unseen = moving.mean(axis=0) < SEEN
     return TorqueNoise(
         white=white,
@@ -169,7 +158,7 @@ def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
     without motion counts as it is.
     """
     blocks = disturbance_blocks(piece.terms, piece.q, seconds, piece.inside)
-    motion = np.flatnonzero(blocks.known & ~resting(blocks).all(axis=1))
+    motion = np.flatnonzero(blocks.known & ~blocks.rests.all(axis=1))
     if len(motion):
         blocks = blocks.part(slice(int(motion[0]), int(motion[-1]) + 1))
     runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.free_load import FreeLoad
-from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import DynamicsTerms
@@ -21,7 +21,7 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.virtual_sensor.smoother.noise import TIE, FreeTerms, TorqueNoise, torque_noise
+from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise, torque_noise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, gated, wrench_model
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]

@@ -4,13 +4,15 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.repetition.standstill import (
+from vftcli.signals.rest import (
     AROUND,
     BREAKAWAY,
     LEAST,
-    STILL,
+    REST,
     duration,
+    faster,
     resting,
+    slower,
     standing,
 )
 
@@ -22,8 +24,14 @@ def speeds(*stops: tuple[int, int]) -> np.ndarray:
     """A joint at 0.5 rad/s that stops over the samples first to last, both included."""
     dq = np.full((400, 1), 0.5)
     for first, last in stops:
-        dq[first : last + 1] = 0.5 * STILL
+        dq[first : last + 1] = 0.5 * REST
     return dq
+
+
+def test_a_joint_at_just_a_speed_is_neither_slower_nor_faster() -> None:
+    dq = np.array([[0.02, -0.02, 0.021, -0.021, 0.019, -0.019, 0.0]])
+    assert faster(dq, 0.02).tolist() == [[False] * 2 + [True] * 2 + [False] * 3]
+    assert slower(dq, 0.02).tolist() == [[False] * 4 + [True] * 3]
 
 
 def test_a_stop_lasts_from_its_first_sample_through_its_last() -> None:
@@ -73,7 +81,7 @@ def test_rest_is_what_lasts_longer_than_half_of_the_time_around() -> None:
     t = np.arange(0.0, 2.0, 0.01)
     dq = np.where((t > 0.795) & (t < 1.195), 0.0, 0.5)[:, None]
     found = resting(t, dq)
-    near = [np.abs(dq[np.abs(t - x) <= AROUND + 1e-9, 0]) < STILL for x in t]
+    near = [np.abs(dq[np.abs(t - x) <= AROUND + 1e-9, 0]) < REST for x in t]
     expected = np.array([np.mean(slow) > 0.5 for slow in near])
     # rounding of the clock may move one sample in or out of the window
     assert np.count_nonzero(found[:, 0] != expected) <= 2

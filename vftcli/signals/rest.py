@@ -1,0 +1,75 @@
+"""Where a joint rests: there it keeps whatever stiction it came to rest with.
+
+In every function t is a clock (T,) [s], and dq are joint velocities (T, n) [rad/s].
+"""
+
+import numpy as np
+
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.intervals import grown, runs_of
+from vftcli.signals.series import median_step
+
+#: Speeds between rest and motion, by what each decides. Above the first, more than noise and last
+#: digits, a joint has a direction, and a log's motion begins. [rad/s]
+NONZERO = 1e-3
+COMMANDED = 2e-3  #: Below it a controller holds a joint: what it commands has no noise. [rad/s]
+#: Below it stiction holds the joint: above what sensors add to a joint that is held, up to what
+#: the steps of an encoder make over a block of 24 ms. [rad/s]
+REST = 0.01
+MOVES = 0.02  #: Above it, twice that, no noise is motion: friction is that of motion. [rad/s]
+SLIDES = 0.05  #: Below it a joint of filtered speed may stick, above it its friction shows. [rad/s]
+HELD, WINDOW = 1e-3, 0.2  #: Way up to which a joint is held [rad], and within how long. [s]
+LEAST = 0.25  #: Shorter stops are reversals, which the friction model's account of them covers. [s]
+BREAKAWAY = 0.1  #: Time around a stop in which the joint settles or breaks away. [s]
+AROUND = 0.15  #: Time before and after a sample that says whether the joint rests in it. [s]
+NEAR_REST = 0.3  #: Stiction counts this long around a rest too, where no free part tells. [s]
+
+
+def slower(dq: Array, speed: float = REST) -> Mask:
+    """Where joints are slower than a speed [rad/s]; at just that they are neither. As `dq`"""
+    return np.asarray((dq < speed) & (dq > -speed))
+
+
+def faster(dq: Array, speed: float = MOVES) -> Mask:
+    """Where joints are faster than a speed [rad/s]. As `dq`"""
+    return np.asarray((dq > speed) | (dq < -speed))
+
+
+def duration(t: Array, dq: Array) -> Array:
+    """How long the stop lasts that a sample belongs to, 0 where the joint moves. (T, n) [s]"""
+    length = np.zeros(dq.shape)
+    step = median_step(t)
+    for j, slow in enumerate(slower(dq).T):
+        for start, stop in runs_of(slow):
+            length[start:stop, j] = t[stop - 1] - t[start] + step
+    return length
+
+
+def standing(t: Array, dq: Array) -> Mask:
+    """Where a joint stops for at least `LEAST` seconds, the moments before and after too. (T, n)"""
+    # A joint is stuck before its speed is zero and settles after it has broken away.
+    return np.column_stack([grown(t, long, BREAKAWAY) for long in (duration(t, dq) >= LEAST).T])
+
+
+def resting(t: Array, dq: Array) -> Mask:
+    """Where a joint is slower than `REST` for more than half of the time around. (T, n)
+
+    Unlike `standing` it knows no shortest stop: it tells friction at rest from friction in motion.
+    """
+    first = np.searchsorted(t, t - AROUND, side="left")
+    last = np.searchsorted(t, t + AROUND, side="right")
+    rests, count = np.zeros(dq.shape, dtype=bool), np.zeros(len(t) + 1, dtype=np.intp)
+    for j, slow in enumerate(slower(dq).T):
+        np.cumsum(slow, out=count[1:])
+        rests[:, j] = 2 * (count[last] - count[first]) > last - first
+    return rests
+
+
+def held(q: Array, step: float) -> Mask:
+    """Where no joint travels further than `HELD`, by positions q (T, n) [rad] at steps [s]. (T,)"""
+    reach = max(1, round(0.5 * WINDOW / step))
+    found = np.zeros(len(q), dtype=bool)
+    if len(q) > 2 * reach:
+        travel = np.abs(q[2 * reach :] - q[: -2 * reach])
+        found[reach:-reach] = np.all(travel <= HELD, axis=1)
+    return found
