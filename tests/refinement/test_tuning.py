@@ -80,6 +80,7 @@ def test_alarms_that_nothing_can_avoid_are_said() -> None:
         ("fast", None),
         ("delay", None),
         ("delay=-1", None),
+        ("delay=nan", None),
         ("rmse=3", None),
         ("bandwidth=x", None),
         ("false-alarms=2", None),

@@ -162,9 +162,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     remarks = (*remarks_on(free, len(found["joints"]), rate), *untold)
     made = Thresholds(
         rate=rate,
-        joints=found["joints"],
-        axes=found["axes"],
-        force=found["force"],
+        **found,
         of_vendor=free[0].of_vendor,
         logged_wrench=free[0].logged_wrench,
         remarks=remarks,
@@ -240,14 +238,11 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tup
         where, duration = Where(signals.recording.name), signals.recording.duration
         if duration < LONG_ENOUGH and longest.count >= ENOUGH:
             remarks.append(caution("free-log-too-short", where, duration_s=duration))
-        if signals.frame and (share := known_share(signals)) < SELDOM:
+        if not signals.frame:
+            continue
+        if (share := float(np.mean(np.isfinite(signals.wrench[:, 0])))) < SELDOM:
             remarks.append(caution("wrench-seldom-known", where, share=share))
     return tuple(remarks)
-
-
-def known_share(signals: ComparedSignals) -> float:
-    """Share of the samples in which the wrench is known."""
-    return float(np.mean(np.isfinite(signals.wrench[:, 0])))
 
 
 class CountedAlarms(NamedTuple):

@@ -35,7 +35,7 @@ from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, caution
 
 if TYPE_CHECKING:
-    from vftcli.observers.matching import MatchTarget
+    from vftcli.observers.matching import Goal
 
 PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
@@ -59,7 +59,7 @@ class ObserverChoice:
     gains: str = PAPER_GAINS
     gains_file: Path | None = None  #: A file of gains that go before the robot's own, or None.
     #: What every observer is to have alike on every joint, or None.
-    match: "MatchTarget | None" = None
+    match: "Goal | None" = None
     as_printed: bool = False  #: Whether the paper's printed formulas run, and its numeric dynamics.
     causal: bool = False  #: Whether to leave out what could not run while the log is being written.
     #: Whether estimates start at the static residual of the first sample, not at zero.

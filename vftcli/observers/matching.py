@@ -1,8 +1,8 @@
-"""Equal footing: gains that give every observer the same delay or the same bandwidth."""
+"""Goals for gains, and the gains that give every observer one delay or one bandwidth."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -16,31 +16,49 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, fact
 
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
+#: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
+GOALS = {
+    "rmse": "rmse",
+    "delay": "delay=S (seconds)",
+    "bandwidth": "bandwidth=HZ",
+    "false-alarms": "false-alarms=PER_HOUR",
+}
+#: Observer → the parameter that is moved, the least value and the largest. [rad/s], [1/s] or Q_τ,
+#: the one number that moves a Kalman filter's ω_n alone.
+KNOBS: dict[type, tuple[str, float, float]] = {
+    FilteredDynamicsObserver: ("omega", 1e-3, 1e6),
+    MomentumObserver: ("gain", 1e-3, 1e6),
+    KalmanObserver: ("q_tau_diag", 1e-9, 1e18),
+}
 
 
-class MatchTarget(NamedTuple):
-    """What every observer is to have on every joint."""
+class Goal(NamedTuple):
+    """What gains are for."""
 
-    quantity: str  #: "delay" or "bandwidth".
-    value: float  #: [s] or [Hz]
+    name: str  #: A key of `GOALS`.
+    value: float = float("nan")  #: Its number, NaN for the smallest error. [s], [Hz] or [1/h]
+    #: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
+    threshold: Array | None = None
 
 
-def parse_target(text: str) -> MatchTarget:
-    """Read ``delay=S`` or ``bandwidth=HZ``."""
-    quantity, _, number = text.partition("=")
+def parse_target(
+    text: str, option: str = "--match", allowed: Iterable[str] = ("delay", "bandwidth")
+) -> Goal:
+    """Read one of some goals as an option has it: ``rmse``, the others as ``delay=S``."""
+    name, equals, number = text.partition("=")
+    name = name.strip()
     try:
         value = float(number)
     except ValueError:
         value = float("nan")
-    if quantity.strip() not in MEASURES or not (np.isfinite(value) and value > 0):
-        raise ParameterError(
-            f"--match {text!r} is not delay=S (seconds) or bandwidth=HZ, a positive number"
-        )
-    return MatchTarget(quantity.strip(), value)
+    if name not in allowed or not (0.0 < value < np.inf if name != "rmse" else not equals):
+        forms = " or ".join(GOALS[each] for each in allowed)
+        raise ParameterError(f"{option} {text!r} is not {forms}, a positive number")
+    return Goal(name, value)
 
 
 def match_observers(
-    observers: Sequence[Observer], goal: MatchTarget, setup: Setup
+    observers: Sequence[Observer], goal: Goal, setup: Setup
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
     """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
 
@@ -53,10 +71,10 @@ def match_observers(
             "--match tunes the corrected observers; the printed ones have another response. Leave "
             "--match or --as-printed away"
         )
-    tuned = tuple(tune(observer, goal, setup) for observer in observers)
+    tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
     remarks = [
         fact("delay-matched", delay_s=goal.value)
-        if goal.quantity == "delay"
+        if goal.name == "delay"
         else fact("bandwidth-matched", bandwidth_Hz=goal.value)
     ]
     if {"fdo", "gmo"} <= {observer.name for observer in tuned}:
@@ -64,69 +82,49 @@ def match_observers(
     return tuned, tuple(remarks)
 
 
-def tune(observer: Observer, goal: MatchTarget, setup: Setup) -> Observer:
-    """One observer with the gain that reaches the goal on every joint."""
+def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
+    """One observer with the gain that reaches a delay or bandwidth on every joint."""
     if type(observer) not in KNOBS:
         raise ParameterError(
-            f"--match cannot tune {observer.name}: it has no {goal.quantity} of its own to set; "
+            f"--match cannot tune {observer.name}: it has no {goal.name} of its own to set; "
             "choose fdo, gmo, kfo-fe or kfo-zoh with --observer"
         )
-    turn, low, high = KNOBS[type(observer)]
-    measure = MEASURES[goal.quantity]
-    rising = goal.quantity == "bandwidth"
-    a, b = (np.full(setup.joints, np.log(limit)) for limit in (low, high))
-    ends = [measure(turn(observer, np.exp(x)), goal.value, setup) for x in (a, b)]
+    knob, low, high = KNOBS[type(observer)]
+
+    def turned(x: Array) -> Observer:
+        value = np.exp(x)
+        # A cutoff is one for all joints.
+        changed: dict[str, Any] = {knob: float(value[0]) if knob == "omega" else value}
+        return replace(cast("MomentumObserver", observer), **changed)
+
+    rising = goal.name == "bandwidth"
+    a, b = (np.full(joints, np.log(limit)) for limit in (low, high))
+    ends = [excess(turned(x), goal, step, joints) for x in (a, b)]
     if not np.all((np.minimum(*ends) <= 0.0) & (np.maximum(*ends) >= 0.0)):
-        raise ParameterError(out_of_reach(observer, goal, setup))
+        unit, limit = (
+            ("Hz", f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)")
+            if rising
+            else ("s", f"a delay of more than half a sample ({0.5 * step:g} s)")
+        )
+        raise ParameterError(
+            f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
+            f"{1.0 / step:.4g} Hz; choose {limit}"
+        )
     # Both measures are monotonic in the gain, so that halving its logarithm finds the one crossing.
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
-        above = measure(turn(observer, np.exp(middle)), goal.value, setup) > 0.0
+        above = excess(turned(middle), goal, step, joints) > 0.0
         a, b = np.where(above == rising, a, middle), np.where(above == rising, middle, b)
-    return turn(observer, np.exp(0.5 * (a + b)))
+    return turned(0.5 * (a + b))
 
 
-def out_of_reach(observer: Observer, goal: MatchTarget, setup: Setup) -> str:
-    """The message that no gain gives an observer the delay or bandwidth that is wanted."""
-    limit = (
-        f"a delay of more than half a sample ({0.5 * setup.step:g} s)"
-        if goal.quantity == "delay"
-        else f"a bandwidth well below half the sample rate ({0.5 / setup.step:.4g} Hz)"
-    )
-    unit = {"delay": "s", "bandwidth": "Hz"}[goal.quantity]
-    return (
-        f"--match {goal.quantity}={goal.value:g}: no gain gives {observer.name} a "
-        f"{goal.quantity} of {goal.value:g} {unit} at {1.0 / setup.step:.4g} Hz; choose {limit}"
-    )
+def excess(observer: Observer, goal: Goal, step: float, joints: int) -> Array:
+    """How far an observer's delay, or its share of a sinusoid at a bandwidth, is above the goal.
 
-
-def excess_response(observer: Observer, goal: float, setup: Setup) -> Array:
-    """Gain at the wanted bandwidth, relative to that of a constant, less 1/√2. (n,)"""
-    frequency = np.array([goal])
-    response = np.abs(observer.frequency_response(frequency, setup.step, setup.joints)[0])
-    constant = observer.tuning(setup.step, setup.joints).dc_gain
-    excess: Array = response / constant - np.sqrt(0.5)
-    return excess
-
-
-#: Quantity of ``--match`` → how far an observer is above the goal.
-MEASURES: dict[str, Callable[[Observer, float, Setup], Array]] = {
-    "delay": lambda observer, goal, on: observer.tuning(on.step, on.joints).delay - goal,
-    "bandwidth": excess_response,
-}
-#: Observer → what makes it anew with another cutoff ω [rad/s], gain K [1/s] or Q_τ on each joint,
-#: and the least and the largest there is. A cutoff is one for all joints.
-KNOBS: dict[type, tuple[Callable[[Observer, Array], Observer], float, float]] = {
-    FilteredDynamicsObserver: (
-        lambda _, value: FilteredDynamicsObserver(omega=float(value[0])),
-        1e-3,
-        1e6,
-    ),
-    MomentumObserver: (lambda _, value: MomentumObserver(gain=value), 1e-3, 1e6),
-    # Q_τ is the one number that moves a Kalman filter's ω_n alone.
-    KalmanObserver: (
-        lambda kalman, value: replace(cast("KalmanObserver", kalman), q_tau_diag=value),
-        1e-9,
-        1e18,
-    ),
-}
+    (n,) [s] or [1]
+    """
+    tuning = observer.tuning(step, joints)
+    if goal.name == "delay":
+        return tuning.delay - goal.value
+    gain = np.abs(observer.frequency_response(np.array([goal.value]), step, joints)[0])
+    return np.asarray(gain / tuning.dc_gain - np.sqrt(0.5))

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.observers import FilteredDynamicsObserver, MomentumObserver, Observer, Setup
+from vftcli.observers import FilteredDynamicsObserver, MomentumObserver, Observer
 from vftcli.observers.auto_tuning import (
     Curve,
     Kind,
@@ -17,7 +17,7 @@ from vftcli.observers.auto_tuning import (
     natural_frequencies,
     noise_level,
 )
-from vftcli.observers.matching import MatchTarget, tune
+from vftcli.observers.matching import GOALS, Goal, parse_target, tune
 from vftcli.observers.observer import Complex
 from vftcli.observers.settings import Gains
 from vftcli.observers.spectra import Spectra
@@ -25,19 +25,6 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark
-
-#: The smallest expected error, a delay behind a slow ramp [s], a −3 dB bandwidth [Hz], or at most
-#: so many false alarms an hour on each joint, beyond --threshold.
-GOALS = ("rmse", "delay", "bandwidth", "false-alarms")
-
-
-class TuningGoal(NamedTuple):
-    """What the gains are for."""
-
-    name: str  #: One of `GOALS`.
-    value: float = float("nan")  #: Its number, NaN for the smallest error.
-    #: Torque beyond which an estimate raises an alarm. (n,) or (1,) [N·m]
-    threshold: Array | None = None
 
 
 class Tuned(NamedTuple):
@@ -59,24 +46,14 @@ class Tuned(NamedTuple):
         return {key: value for key, value in self._asdict().items() if key != "running"}
 
 
-def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
-    """Read ``rmse``, ``delay=S``, ``bandwidth=HZ`` or ``false-alarms=PER_HOUR``.
+def parse_goal(text: str, threshold: str | None = None) -> Goal:
+    """Read what ``--goal`` and ``--threshold`` ask for.
 
     Args:
-        text: The word.
+        text: As `parse_target` reads it, any of `GOALS`.
         threshold: One number or one a joint, positive. [N·m]
     """
-    name, equals, number = text.partition("=")
-    name = name.strip()
-    try:
-        value = float(number) if equals else float("nan")
-    except ValueError:
-        value = -1.0
-    if name not in GOALS or (name == "rmse") == bool(equals) or value <= 0.0 or np.isinf(value):
-        raise ParameterError(
-            f"--goal {text!r} is not rmse, delay=S, bandwidth=HZ or false-alarms=PER_HOUR with a "
-            "positive number"
-        )
+    goal = parse_target(text, "--goal", GOALS)
     level = None
     if threshold is not None:
         level = np.array(numbers(threshold) or [np.nan])
@@ -84,12 +61,12 @@ def parse_goal(text: str, threshold: str | None = None) -> TuningGoal:
             raise ParameterError(
                 f"--threshold {threshold!r} is not a positive number or one a joint [N·m]"
             )
-    if name == "false-alarms" and level is None:
+    if goal.name == "false-alarms" and level is None:
         raise ParameterError(
             "--goal false-alarms needs to know what raises an alarm: add --threshold N·m, one "
             "number or one a joint"
         )
-    return TuningGoal(name, value, level)
+    return goal._replace(threshold=level)
 
 
 def momentum(rate: Array) -> Observer:
@@ -97,7 +74,7 @@ def momentum(rate: Array) -> Observer:
     return MomentumObserver(gain=rate)
 
 
-def tune_all(spectra: Spectra, goal: TuningGoal) -> tuple[Tuned, ...]:
+def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     """Gains of FDO, GMO, KFO and smoother for a goal, one line an observer.
 
     The smoother has no delay: for a delay it gets the gains with the smallest error.
@@ -153,12 +130,10 @@ def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
 
 def gains_of(spectra: Spectra) -> Gains:
     """The gains with the smallest expected error, as a gains file holds them."""
-    return {line.section: dict(line.gains) for line in tune_all(spectra, TuningGoal("rmse"))}
+    return {line.section: dict(line.gains) for line in tune_all(spectra, Goal("rmse"))}
 
 
-def bounds_reached(
-    tuned: Sequence[Tuned], spectra: Spectra, goal: TuningGoal
-) -> tuple[Remark, ...]:
+def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tuple[Remark, ...]:
     """A warning on every gain that reached a bound of the search."""
     if goal.name not in {"rmse", "false-alarms"}:
         return ()
@@ -177,7 +152,7 @@ def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:
     }
 
 
-def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
+def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     """The rate of each joint that reaches the goal. (n,) [rad/s]"""
     grid = natural_frequencies(spectra.step)
     if goal.name == "false-alarms" and goal.threshold is not None:
@@ -191,10 +166,8 @@ def rates(kind: Kind, spectra: Spectra, goal: TuningGoal) -> Array:
         return np.full(spectra.joints, goal.value / fraction)
     if goal.name == "rmse" or kind is kalman_smoother:
         return np.asarray(grid[np.argmin(expected_error(kind, grid, spectra), axis=0)])
-    n = spectra.joints
-    setup = Setup(gains={}, settings={}, joints=n, step=spectra.step, as_printed=False)
-    observer = tune(kind(np.full(n, 10.0)), MatchTarget(goal.name, goal.value), setup)
-    return np.array(observer.tuning(spectra.step, n).omega_n)
+    n, start = spectra.joints, kind(np.full(spectra.joints, 10.0))
+    return np.array(tune(start, goal, spectra.step, n).tuning(spectra.step, n).omega_n)
 
 
 def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
