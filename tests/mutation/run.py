@@ -49,8 +49,8 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["tests/evaluation", "tests/virtual_sensor/test_sensor.py", "tests/test_pipeline.py"],
     ),
     "identification": (
-        ["identification/least_squares.py", "identification/payload.py", "robots/regressor.py"],
-        ["tests/identification", "tests/robots"],
+        ["signals/least_squares.py", "identification/payload.py", "robots/regressor.py"],
+        ["tests/signals/test_least_squares.py", "tests/identification", "tests/robots"],
     ),
     "admittance": (
         ["admittance/law.py", "admittance/stability.py", "admittance/metrics.py"],

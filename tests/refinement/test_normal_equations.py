@@ -114,13 +114,13 @@ def test_sums_over_parts_are_sums_over_their_samples(rows, weight):
         kept = part & taken
         flat, w = A[kept].reshape(-1, A.shape[-1]), weight[kept].ravel()
         d = rows.d[kept].ravel()
-        np.testing.assert_allclose(found.matrix, flat.T @ (flat * w[:, None]), atol=1e-8)
-        np.testing.assert_allclose(found.vector, flat.T @ (w * d), atol=1e-8)
-        assert found.constant == pytest.approx(np.sum(w * d**2))
+        np.testing.assert_allclose(found.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
+        np.testing.assert_allclose(found.right, flat.T @ (w * d), atol=1e-8)
+        assert found.square == pytest.approx(np.sum(w * d**2))
         rest = taken & ~part
         flat, w = A[rest].reshape(-1, A.shape[-1]), weight[rest].ravel()
-        left = whole.without(found)
-        np.testing.assert_allclose(left.matrix, flat.T @ (flat * w[:, None]), atol=1e-8)
+        left = whole.minus(found)
+        np.testing.assert_allclose(left.gram, flat.T @ (flat * w[:, None]), atol=1e-8)
 
 
 def test_no_load_is_believed_where_there_is_none(rows):

@@ -16,15 +16,12 @@ from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import fit_robustly
 from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import (
-    FOLDS,
     LARGEST,
     SCALES,
     WORTH,
     WORTHLESS,
     faded,
-    fold_spans,
     guarded,
-    mask_of,
 )
 from vftcli.signals.rest import MOVES
 
@@ -76,7 +73,7 @@ def test_the_unseen_share_is_that_of_dense_fits(wrong):
         A[:, :, P + k] = rows.loads.made_by(np.eye(sizes[-1])[k])
     squares = np.zeros((len(SCALES), 3))
     free = np.flatnonzero(wrong.free)
-    for fold in np.array_split(free, FOLDS):
+    for fold in np.array_split(free, 5):
         near = (np.arange(samples) >= fold[0] - 17) & (np.arange(samples) <= fold[-1] + 17)
         rest = wrong.free & ~near
         flat, w = A[rest].reshape(-1, A.shape[-1]), wrong.weight[rest].ravel()
@@ -151,17 +148,3 @@ def test_between_worth_it_and_not_a_part_is_used():
     np.testing.assert_allclose(
         faded(share, WORTH, WORTHLESS), [1.0, 1.0, 0.8, 0.2, 0.0, 0.0], atol=1e-12
     )
-
-
-def test_folds_are_contiguous_and_apart():
-    free = np.concatenate([np.arange(5, 40), np.arange(60, 100)])
-    spans = fold_spans(free, 3)
-    assert len(spans) == FOLDS
-    assert spans[0][0].start == 5
-    assert spans[-1][0].stop == 100
-    for inner, outer in spans:
-        assert outer.start == max(inner.start - 3, 0)
-        assert outer.stop == inner.stop + 3
-    held = [np.count_nonzero(np.isin(np.arange(100), free)[inner]) for inner, _ in spans]
-    assert held == [15] * 5
-    assert np.flatnonzero(mask_of(10, slice(2, 5))).tolist() == [2, 3, 4]

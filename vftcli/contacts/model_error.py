@@ -16,6 +16,7 @@ from vftcli.robots.disturbance import TIE, Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.intervals import near, runs_of
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
 from vftcli.virtual_sensor.smoother.noise import (
     LEAST_NOISE,
@@ -118,8 +119,8 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
     bends = [np.diff(log.d[a:b], n=2, axis=0) for a, b in runs_of(log.known) if b - a > 2]
     if not bends:
         return None
-    # The median of |x| is sd/1.4826, a second difference of white noise has 6 R.
-    spread = 1.4826 * np.median(np.abs(np.concatenate(bends)), axis=0)
+    # A second difference of white noise has 6 R.
+    spread = robust_sd(np.concatenate(bends))
     white, least = (
         np.maximum(spread**2 / 6.0, LEAST_NOISE),
         np.maximum(DRY_SHARE * dry, LEAST_ERROR),

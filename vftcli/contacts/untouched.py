@@ -36,6 +36,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.intervals import near, runs_of
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import median_step
@@ -237,9 +238,8 @@ def observer_noise(run: ModelledRun) -> Array:
     torque = observed(run)
     step = max(round(2.0 / (GAIN * median_step(run.recording.t))), 1)
     bends = torque[2 * step :] - 2.0 * torque[step:-step] + torque[: -2 * step]
-    if not len(bends):
-        return np.zeros(torque.shape[1])
-    return np.asarray(1.4826 * np.median(np.abs(bends), axis=0) / np.sqrt(6.0))
+    noise: Array = robust_sd(bends) / np.sqrt(6.0)
+    return noise
 
 
 def torque_level(pieces: Sequence[FreePiece]) -> Array:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.least_squares import inverse_of
 
 KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
 ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
@@ -77,7 +78,7 @@ def solve(target: Array, by: Terms, noise: float = 1.0) -> RobustFit:
         values = np.zeros(columns.shape[2])
         inner = np.ix_(used, used)
         matrix = (gram[kept].sum(axis=0) + ridge)[inner]
-        values[used] = solution_of(matrix, moment[kept].sum(axis=0)[used])
+        values[used] = inverse_of(matrix) @ moment[kept].sum(axis=0)[used]
         # Friction that would drive the arm is another error in disguise: it is left out.
         wrong = by.positive & (values < 0)
         used &= ~wrong
@@ -90,13 +91,3 @@ def solve(target: Array, by: Terms, noise: float = 1.0) -> RobustFit:
     variance = OVERLAP * float(np.mean(rest[kept] ** 2))
     sd[used] = np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix, hermitian=True))) * variance)
     return RobustFit(values, sd, rest, kept)
-
-
-def solution_of(matrix: Array, moment: Array) -> Array:
-    """Solution of normal equations, directions that the data do not show left at zero. (k,)"""
-    if not len(moment):
-        return moment
-    # Scaled to a unit diagonal: kilograms and N·m s need not be alike in size.
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-300))
-    inverse = np.linalg.pinv(matrix * np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    return np.asarray(scale * (inverse @ (scale * moment)))

@@ -12,7 +12,6 @@ from vftcli.identification.excitation import (
 )
 from vftcli.identification.friction_fit import LIGHT
 from vftcli.identification.friction_shapes import Shape
-from vftcli.identification.least_squares import Normal, normal
 from vftcli.identification.processing import PreparedLog
 from vftcli.identification.scoring import apparent_load, predicted_torque
 from vftcli.identification.stacking import ParameterColumns, WeightedLog, residuals
@@ -21,6 +20,7 @@ from vftcli.identification.warm_up import warm_up_remarks
 from vftcli.robots.friction import dry_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.least_squares import NormalEquations, normal_equations
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 LOAD_EXPLAINS = 0.8  #: Share of what the profile misses that a load must explain to be suspected.
@@ -96,13 +96,8 @@ def links_explain(
         for span in motion.chunks():
             A = layout.rows(motion, columns, span).reshape(-1, layout.size)
             rest = (w[span] / np.where(before > 0, before, 1.0) ** 2).ravel()
-            parts.append(normal(A, motion.tau[span].ravel(), rest))
-    whole = Normal(
-        np.sum([part.gram for part in parts], axis=0),
-        np.sum([part.right for part in parts], axis=0),
-        0.0,
-    )
-    x = whole.solution()
+            parts.append(normal_equations(A, motion.tau[span].ravel(), rest))
+    x = NormalEquations(*(sum(sums) for sums in zip(*parts, strict=True))).solution()
     freed = [
         residuals(layout, WeightedLog(motion, columns, w), x)
         for motion, columns, w in zip(data.motions, data.columns, used, strict=True)

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.processing import PreparedLog
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.intervals import intervals, near
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.rest import MOVES, SLIDES, slower
 from vftcli.signals.series import median_step

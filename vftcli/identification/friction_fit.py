@@ -13,11 +13,11 @@ from vftcli.identification.friction_shapes import (
     Shape,
     bent,
 )
-from vftcli.identification.least_squares import cross_validated, fit_column, left_out
 from vftcli.identification.result import root_mean_square
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
+from vftcli.signals.least_squares import cross_validated, fit_column, left_out
 from vftcli.signals.rest import MOVES
 
 PLAIN = ("coulomb", "viscous", "offset")

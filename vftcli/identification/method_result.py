@@ -9,13 +9,13 @@ import numpy as np
 from vftcli.identification.base_parameters import BaseParameters
 from vftcli.identification.friction_fit import ShapeChoice
 from vftcli.identification.friction_shapes import Shape
-from vftcli.identification.least_squares import robust_sd
 from vftcli.identification.result import Number, number
 from vftcli.identification.training import JointFit, Training
 from vftcli.robots.friction import falling_speed, steady_torque
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 #: Standard deviation over value up to which a number counts as determined by the logs.
@@ -66,7 +66,7 @@ def check_friction(j: int, friction: JointFriction, data: Training) -> list[Rema
     """A remark if the friction found would push joint j (from 0) at some speed, or falls."""
     speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in data.motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
-    noise = max(robust_sd(m.tau[:, j]) for m in data.motions)
+    noise = max(robust_sd(m.tau)[j] for m in data.motions)
     # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.
     if np.all(torque < -0.01 * noise):
         raise IdentificationError(

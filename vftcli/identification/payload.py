@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.least_squares import folds, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
@@ -23,6 +22,7 @@ from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.intervals import intervals
+from vftcli.signals.least_squares import folds, inverse_of, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import held
@@ -185,11 +185,7 @@ def weighted_rows(A: Array, values: Array, usable: Array, left: Array) -> tuple[
 def inverse_gram(rows: Array) -> Array:
     """(AᵀA)⁻¹ of rows (N, n, k), columns scaled; zero where the data says nothing. (k, k)"""
     flat = rows.reshape(-1, rows.shape[2])
-    scale = np.linalg.norm(flat, axis=0)
-    scale[scale == 0.0] = 1.0
-    unit = flat / scale
-    inverse: Array = np.linalg.pinv(unit.T @ unit, rcond=1e-10, hermitian=True)
-    return inverse / np.outer(scale, scale)
+    return inverse_of(flat.T @ flat)
 
 
 def stretch_covariance(A: Array, left: Array, usable: Array) -> Array:

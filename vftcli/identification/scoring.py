@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.identification.least_squares import fit_column
 from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
 from vftcli.identification.result import Trace, root_mean_square
 from vftcli.robots.drive import uses_current
@@ -14,6 +13,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import faster

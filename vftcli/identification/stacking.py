@@ -12,17 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
-from vftcli.identification.least_squares import (
-    FOLDS,
-    correlation_time,
-    folds,
-    huber,
-    robust_sd,
-)
 from vftcli.identification.processing import PreparedLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
 
 
 class ParameterColumns(NamedTuple):
@@ -147,7 +141,7 @@ def joint_sigma(logs: Sequence[WeightedLog], left: Sequence[Array]) -> Array:
     sigma = np.empty(n)
     for j in range(n):
         parts = [r[d.weights[:, j] > 0, j] for d, r in zip(logs, left, strict=True)]
-        sigma[j] = max(robust_sd(np.concatenate(parts)), 1e-9)
+        sigma[j] = np.maximum(robust_sd(np.concatenate(parts)), 1e-9)
     return sigma
 
 

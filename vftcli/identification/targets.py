@@ -18,7 +18,6 @@ from vftcli.identification.friction_shapes import (
     Shape,
     bent,
 )
-from vftcli.identification.least_squares import fit_column, solve
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
@@ -33,6 +32,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.intervals import runs_of
+from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 

@@ -20,7 +20,6 @@ from vftcli.identification.friction_fit import (
     choose_shape,
 )
 from vftcli.identification.friction_shapes import FrictionColumns, Shape
-from vftcli.identification.least_squares import ColumnFit, fit_column
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
@@ -33,6 +32,7 @@ from vftcli.robots.drive import drive_torque, uses_current
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.least_squares import ColumnFit, fit_column
 from vftcli.signals.recording import Recording
 
 #: Share of a fit's cross-validated error from which down on the profile's friction is kept.

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.identification.least_squares import folds
 from vftcli.identification.training import JointFit, Training
 from vftcli.robots.friction import SMOOTHING, dry_friction
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
+from vftcli.signals.least_squares import folds
 from vftcli.signals.remarks import Remark, Where, caution
 
 THIRDS = 3  #: Stretches in which a log's friction is compared.

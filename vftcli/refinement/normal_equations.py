@@ -15,22 +15,10 @@ from numpy.typing import NDArray
 from vftcli.refinement.model_error import column_numbers
 from vftcli.refinement.slow_load import SlowLoads
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.least_squares import NormalEquations
 
 BLOCK = 64  #: Rows that are substituted at a time.
 PENALTY = 2.0  #: What a column of a load has to gain before it is believed (Akaike's criterion).
-
-
-class Sums(NamedTuple):
-    """Sums over rows, of which others can be taken off."""
-
-    matrix: Array  #: AᵀWA. (P, P)
-    vector: Array  #: AᵀWd. (P,)
-    constant: float  #: dᵀWd.
-
-    def without(self, other: "Sums") -> "Sums":
-        """The sums over the rows that are left."""
-        constant = self.constant - other.constant
-        return Sums(self.matrix - other.matrix, self.vector - other.vector, constant)
 
 
 class FittedError(NamedTuple):
@@ -82,7 +70,7 @@ class Rows:
             variance.append(np.einsum("ij,ij->i", part, column))
         return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
 
-    def model_sums(self, weight: Array) -> Sums:
+    def model_sums(self, weight: Array) -> NormalEquations:
         """Sums over all rows of the model's columns alone.
 
         Args:
@@ -94,7 +82,7 @@ class Rows:
             add(sums, X * np.sqrt(weight[:, j, None]), column_numbers(j, self.joints))
         return finished(sums)
 
-    def all_sums(self, weight: Array, taken: Mask, parts: Sequence[Mask]) -> list[Sums]:
+    def all_sums(self, weight: Array, taken: Mask, parts: Sequence[Mask]) -> list[NormalEquations]:
         """Sums of all columns, of the model's and of the loads', over some samples.
 
         Args:
@@ -144,23 +132,25 @@ def add(total: Array, X: Array, numbers: NDArray[np.intp], also: Sequence[Array]
         sums[np.ix_(places, places)] += product
 
 
-def finished(total: Array) -> Sums:
+def finished(total: Array) -> NormalEquations:
     """The sums in a matrix that has those with d in its last row and column."""
-    return Sums(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
+    return NormalEquations(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
 
 
-def solve(sums: Sums, unknowns: int, sizes: Sequence[int], scale: float = 1.0) -> FittedError:
+def solve(
+    sums: NormalEquations, unknowns: int, sizes: Sequence[int], scale: float = 1.0
+) -> FittedError:
     """The most likely model error, with the slow loads that make the rows likely enough.
 
     The loads' groups are nested, and so are the Cholesky factors with and without them: one factor
     gives the objective of every group, c − Σ z² over its columns, z = L⁻¹AᵀWd.
     """
-    scales = np.ones(len(sums.vector))
+    scales = np.ones(len(sums.right))
     scales[:unknowns] = scale
-    matrix = sums.matrix * scales * scales[:, None]
+    matrix = sums.gram * scales * scales[:, None]
     matrix.flat[:: len(matrix) + 1] += 1.0
     factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
-    z = forward_solved(factor, scales * sums.vector)
+    z = forward_solved(factor, scales * sums.right)
     gained = np.concatenate([[0.0], np.cumsum(z**2)])
     loads = min(sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
     size = unknowns + loads

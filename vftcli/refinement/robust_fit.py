@@ -9,14 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.refinement.normal_equations import FittedError, Rows, Sums, solve
+from vftcli.refinement.normal_equations import FittedError, Rows, solve
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import covered, runs_of
+from vftcli.signals.least_squares import SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 
 CORRELATED = 0.3  #: Residuals this close in time count as one. [s]
 LEAST_SCALE = 0.08  #: The residual's scale is at least this share of a joint's dry friction. [1]
 LEAST_TORQUE = 0.02  #: And at least this. [N·m]
-NORMAL = 1.4826  #: Standard deviation of normal noise over the median of its size.
 #: At first the residual's scale comes from so large a quietest share of the samples, …
 QUIET_SHARE = 0.35
 #: … whose largest is this share of the median where the samples are normal noise.
@@ -31,7 +31,6 @@ FREE_PASSES = 3  #: Passes of the second fit.
 CONTACT = 5.0  #: A sample is contact if a joint's residual is larger than this many scales, …
 LASTS = 0.08  #: … for at least so long. [s]
 GROWN = 0.25  #: A contact begins so long before, and ends so long after. [s]
-HUBER = 2.5  #: Residuals beyond so many scales pull with a constant force.
 FEWEST = 30  #: With fewer free samples nothing is called contact.
 
 
@@ -45,7 +44,7 @@ class WholeLogFit:
     scale: Array  #: Size of what neither model nor loads explain. (n,) [N·m]
     weight: Array  #: Weight of every row, its scale and its correlation with others in it. (S, n)
 
-    def solved(self, sums: Sums, scale: float = 1.0) -> FittedError:
+    def solved(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The solution for some of its rows."""
         return solve(sums, self.rows.unknowns, self.rows.loads.sizes, scale)
 
@@ -63,11 +62,10 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
     residual, scale = first_fit(rows, step, counted, least)
     for _ in range(FREE_PASSES):
         free = free_samples(np.max(np.abs(residual) / scale, axis=1), step)
-        size = np.maximum(np.abs(residual), 1e-300)
-        weight = np.minimum(1.0, HUBER * scale / size) / (counted * scale**2)
+        weight = huber(residual / scale) / (counted * scale**2)
         found = solve(rows.all_sums(weight, free, [])[0], rows.unknowns, rows.loads.sizes)
         residual = rows.d + rows.modelled(found.model) + rows.loads.made_by(found.loads)
-        scale = np.maximum(NORMAL * np.median(np.abs(residual[free]), axis=0), least)
+        scale = np.maximum(robust_sd(residual[free]), least)
     return WholeLogFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
 
 
@@ -82,7 +80,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
     """
     residual = rows.d
     quiet = np.quantile(np.abs(residual), QUIET_SHARE, axis=0)
-    scale = np.maximum(NORMAL * quiet / QUIET_QUANTILE, least)
+    scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
     threshold = np.inf
     for _ in range(PASSES):
         worst = largest_around(np.max(np.abs(residual) / scale, axis=1), round(REACH / step))
@@ -93,9 +91,9 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
         weight = share[:, None] / (counted * scale**2)
         found = solve(rows.model_sums(weight), rows.unknowns, (0,))
         residual = rows.d + rows.modelled(found.model)
-        trusted = np.abs(residual[share > TRUSTED])
+        trusted = residual[share > TRUSTED]
         if len(trusted):
-            scale = np.maximum(NORMAL * np.median(trusted, axis=0), least)
+            scale = np.maximum(robust_sd(trusted), least)
     return residual, scale
 
 

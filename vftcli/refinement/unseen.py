@@ -8,14 +8,14 @@ A joint is judged by the samples in which it moves: at rest stiction rules, whic
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.refinement.normal_equations import FittedError
 from vftcli.refinement.robust_fit import WholeLogFit
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
+from vftcli.signals.intervals import covered
+from vftcli.signals.least_squares import FOLDS
 from vftcli.signals.rest import faster
 
-FOLDS = 5  #: Contiguous parts of the free samples, each predicted from the others.
 MARGIN = 0.5  #: Left out at both ends of a fold: neighbours in time know each other. [s]
 SCALES = (0.0, 0.1, 0.3, 1.0)  #: How far the model is let go: factors on its standard deviations.
 LARGEST = 6.0  #: A residual counts at most so many scales.
@@ -47,13 +47,14 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
     """
     moves = faster(dq)
     judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
-    folds = fold_spans(np.flatnonzero(fit.free), round(MARGIN / fit.step))
-    left_out = [mask_of(len(fit.free), outer) for _, outer in folds]
+    folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(fit.free), FOLDS)]
+    left_out = [covered([f], len(fit.free), margin=round(MARGIN / fit.step)) for f in folds]
     whole, *parts = fit.rows.all_sums(fit.weight, fit.free, left_out)
     squares = np.zeros((len(SCALES), fit.rows.joints))
-    for (inner, _), part in zip(folds, parts, strict=True):
+    for fold, part in zip(folds, parts, strict=True):
+        inner = slice(*fold)
         free = fit.free[inner]
-        rest = whole.without(part)
+        rest = whole.minus(part)
         for k, scale in enumerate(SCALES):
             residual = fit.rows.d[inner]
             if scale:
@@ -72,24 +73,3 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
 def faded(value: Array, full: float, none: float) -> Array:
     """How much of something is used: 1 up to a value, 0 from another on, straight between."""
     return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))
-
-
-def fold_spans(free: NDArray[np.intp], margin: int) -> list[tuple[slice, slice]]:
-    """Contiguous folds of the free samples, and each with the margin around it.
-
-    Args:
-        free: The free samples' numbers. (F,)
-        margin: Samples left out at either end.
-    """
-    spans = []
-    for fold in np.array_split(free, FOLDS):
-        first, last = int(fold[0]), int(fold[-1]) + 1
-        spans.append((slice(first, last), slice(max(first - margin, 0), last + margin)))
-    return spans
-
-
-def mask_of(samples: int, span: slice) -> Mask:
-    """A span as a mask. (S,)"""
-    inside = np.zeros(samples, dtype=bool)
-    inside[span] = True
-    return inside

@@ -8,6 +8,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.lag import lag_fit
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 
@@ -271,7 +272,7 @@ def gauss_newton_step(
     own, distance = recording.t[inside], distance[inside]
     middle = float(own.mean())
     speed = resample_columns(t[inside], free.t, slope)
-    scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
+    scale = robust_sd(distance) + 1e-7
     share = speed / (scale**2 + distance**2)
     arm = (own - middle)[:, None]
     a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import standing
 from vftcli.signals.series import resample_columns
@@ -189,7 +190,7 @@ def period_step(
         inside = there <= t[-1]
         distance = resample_columns(there[inside], t, q) - path[inside]
         slope = m * resample_columns(there[inside], t, dq)
-        scale = 1.4826 * np.median(np.abs(distance), axis=0) + 1e-7
+        scale = robust_sd(distance) + 1e-7
         share = 1.0 / (scale**2 + distance**2)
         move += float(np.sum(share * slope * distance))
         weight += float(np.sum(share * slope**2))

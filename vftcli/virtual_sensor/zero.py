@@ -9,6 +9,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.intervals import covered, runs_of
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.wrench import AXES, Wrench, unit_of
@@ -160,8 +161,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
         return None
     # Medians, since a knock in the first half second must move neither level nor spread.
     level = np.median(wrench.values[first], axis=0)
-    # 1.4826 turns a median absolute deviation into a normal standard deviation.
-    spread = 1.4826 * np.median(np.abs(wrench.values[first] - level), axis=0)
+    spread = robust_sd(wrench.values[first] - level)
     away = np.any(np.abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
     loaded = lasting(away & known, t, 0.1) & (t >= SETTLING)
     stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])

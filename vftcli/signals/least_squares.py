@@ -1,4 +1,4 @@
-"""Weighted, robust least squares of one column, with honest standard deviations."""
+"""Least squares: normal equations, Huber weights, robust spreads, folds and cross-validation."""
 
 import itertools
 from collections.abc import Sequence
@@ -13,8 +13,10 @@ from vftcli.signals.errors import IdentificationError
 #: is 1.2 % of the samples.
 HUBER = 2.5
 PASSES = 6  #: Reweighting passes.
-#: Eigenvalues of scaled normal equations below this share of the largest tell nothing.
+#: Eigenvalues of scaled normal equations below this share of the largest tell a solution nothing.
 NULL = 1e-12
+NULL_OF_INVERSE = 1e-10  #: `NULL` of an inverse, in which a single such value outweighs all others.
+SD_PER_MEDIAN = 1.4826  #: Standard deviation of normal noise over the median of its size.
 FOLDS = 5  #: Contiguous stretches of the log for cross-validation.
 
 
@@ -45,32 +47,29 @@ def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
     # Iteratively reweighted least squares: what the last fit leaves decides who is an outlier.
     outliers = np.ones_like(y)
     for _ in range(PASSES):
-        x = normal(A, y, weights * outliers).solution()
+        x = normal_equations(A, y, weights * outliers).solution()
         residual = y - A @ x
-        outliers = huber(residual / max(robust_sd(residual[weights > 0]), 1e-12))
+        outliers = huber(residual / np.maximum(robust_sd(residual[weights > 0]), 1e-12))
     final = weights * outliers
     return ColumnFit(x, deviations(A, residual, final), residual, final)
 
 
-class Normal(NamedTuple):
+class NormalEquations(NamedTuple):
     """Normal equations: all that least squares needs of any number of rows."""
 
-    gram: Array  #: AᵀA. (k, k)
-    right: Array  #: Aᵀy. (k,)
-    square: float  #: yᵀy.
+    gram: Array  #: AᵀWA. (k, k)
+    right: Array  #: AᵀWy. (k,)
+    square: float  #: yᵀWy.
 
-    def minus(self, other: "Normal") -> "Normal":
+    def minus(self, other: "NormalEquations") -> "NormalEquations":
         """The normal equations without some of the rows: least squares of all stretches but one."""
-        return Normal(self.gram - other.gram, self.right - other.right, self.square - other.square)
+        square = self.square - other.square
+        return NormalEquations(self.gram - other.gram, self.right - other.right, square)
 
     def solution(self) -> Array:
         """Least squares with scaled columns; what the data leaves free stays zero. (k,)"""
-        scale = np.sqrt(np.maximum(np.diag(self.gram), 0.0))
-        scale[scale == 0.0] = 1.0
-        values, vectors = np.linalg.eigh(self.gram / np.outer(scale, scale))
-        keep = values > NULL * max(float(values[-1]), 0.0)
-        V = vectors[:, keep]
-        x: Array = V @ ((V.T @ (self.right / scale)) / values[keep]) / scale
+        values, V = shown_directions(self.gram, NULL)
+        x: Array = V @ ((V.T @ self.right) / values)
         return x
 
     def misfit(self, x: Array) -> float:
@@ -78,15 +77,39 @@ class Normal(NamedTuple):
         return max(self.square - 2.0 * float(x @ self.right) + float(x @ self.gram @ x), 0.0)
 
 
-def normal(A: Array, y: Array, weights: Array) -> Normal:
+def normal_equations(A: Array, y: Array, weights: Array) -> NormalEquations:
     """Normal equations of rows A (M, k), y (M,) with weights (M,)."""
     weighted = A * weights[:, None]
-    return Normal(weighted.T @ A, weighted.T @ y, float(weights @ (y * y)))
+    return NormalEquations(weighted.T @ A, weighted.T @ y, float(weights @ (y * y)))
+
+
+def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
+    """Eigenvalues and vectors of a scaled AᵀWA that the data shows. (s,), (k, s)
+
+    The columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in size;
+    the scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
+
+    Args:
+        gram: AᵀWA. (k, k)
+        null: Share of the largest eigenvalue down to which they are kept.
+    """
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    scale[scale == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
+    keep = values > null * np.max(values, initial=0.0)
+    return values[keep], vectors[:, keep] / scale[:, None]
+
+
+def inverse_of(gram: Array) -> Array:
+    """(AᵀWA)⁻¹, zero in directions that the data does not show. (k, k)"""
+    values, V = shown_directions(gram, NULL_OF_INVERSE)
+    inverse: Array = (V / values) @ V.T
+    return inverse
 
 
 def solve(A: Array, y: Array) -> Array:
     """Least squares with scaled columns; what the data leaves free stays zero. (k,)"""
-    return normal(A, y, np.ones_like(y)).solution()
+    return normal_equations(A, y, np.ones_like(y)).solution()
 
 
 def huber(z: Array, limit: float = HUBER) -> Array:
@@ -95,9 +118,11 @@ def huber(z: Array, limit: float = HUBER) -> Array:
     return weights
 
 
-def robust_sd(residual: Array) -> float:
-    """Standard deviation from the median of the absolute values, for normal noise."""
-    return 1.4826 * float(np.median(np.abs(residual))) if residual.size else 0.0
+def robust_sd(residual: Array) -> Array:
+    """Standard deviation of each column by the median of its size; 0 of no rows. (n,) of (M, n)"""
+    if not len(residual):
+        return np.zeros(residual.shape[1:])
+    return np.asarray(SD_PER_MEDIAN * np.median(np.abs(residual), axis=0))
 
 
 def correlation_time(residual: Array) -> float:
@@ -118,11 +143,8 @@ def deviations(A: Array, residual: Array, weights: Array) -> Array:
     used = weights > 0
     freedom = max(1, np.count_nonzero(used) - A.shape[1])
     variance = float(np.sum(weights * residual**2)) / freedom
-    gram = (A * weights[:, None]).T @ A
-    scale = np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    inflation = correlation_time(residual[used])
-    sd: Array = np.sqrt(np.maximum(np.diag(inverse), 0.0) * variance * inflation) / scale
+    inverse = inverse_of((A * weights[:, None]).T @ A)
+    sd: Array = np.sqrt(np.diag(inverse) * variance * correlation_time(residual[used]))
     return sd
 
 
@@ -156,10 +178,10 @@ def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) 
         weights: Of the rows. (M,)
         parts: Rows of each part.
     """
-    whole = normal(A, y, weights)
+    whole = normal_equations(A, y, weights)
     total, count = 0.0, 0.0
     for rows in parts:
-        part = normal(A[rows], y[rows], weights[rows])
+        part = normal_equations(A[rows], y[rows], weights[rows])
         total += part.misfit(whole.minus(part).solution())
         count += float(np.sum(weights[rows]))
     return float(np.sqrt(total / count)) if count > 0 else float("nan")

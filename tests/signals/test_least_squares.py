@@ -3,16 +3,17 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.least_squares import (
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.least_squares import (
     correlation_time,
     cross_validated,
     fit_column,
     folds,
+    inverse_of,
     left_out,
     robust_sd,
     solve,
 )
-from vftcli.signals.errors import IdentificationError
 
 
 def problem(seed, samples=2000):
@@ -57,6 +58,16 @@ def test_what_no_column_tells_stays_zero():
     assert solve(np.hstack([A, np.zeros((len(y), 1))]), y)[-1] == 0.0
 
 
+def test_an_inverse_is_that_of_the_columns_that_tell():
+    """Columns a hundredfold apart, one of nothing: the plain inverse, and zeros."""
+    A = np.hstack([problem(10)[1], np.zeros((2000, 1))])
+    expected = np.zeros((5, 5))
+    expected[:4, :4] = np.linalg.inv(A[:, :4].T @ A[:, :4])
+    # condition number 1e4: rounding below 1e-11
+    scale = np.sqrt(np.diag(expected)).max()
+    np.testing.assert_allclose(inverse_of(A.T @ A), expected, atol=1e-9 * scale**2)
+
+
 def test_too_few_samples_are_refused():
     with pytest.raises(IdentificationError, match="3 samples in motion for 4 unknowns"):
         fit_column(np.ones((3, 4)), np.ones(3), np.ones(3))
@@ -93,9 +104,10 @@ def test_cross_validation_equals_fitting_each_time_anew():
 
 def test_the_robust_spread_of_normal_noise():
     # 100 000 samples: 0.4 % statistical
-    assert robust_sd(np.random.default_rng(1).normal(0, 2.0, 100_000)) == pytest.approx(
-        2.0, rel=0.02
-    )
+    sd = np.array([2.0, 0.5])
+    noise = np.random.default_rng(1).normal(0, sd, (100_000, 2))
+    np.testing.assert_allclose(robust_sd(noise), sd, rtol=0.02)
+    np.testing.assert_array_equal(robust_sd(noise[:0]), [0.0, 0.0])
 
 
 def test_of_several_logs_each_is_left_out_whole() -> None:
