@@ -1,6 +1,7 @@
 """Where observer parameters come from: the command line, the robot file, a file of gains, and what
 is left over; and what goes over what."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -199,3 +200,13 @@ def test_the_upper_layer_wins_parameter_by_parameter() -> None:
 def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="--gains takes auto, paper, or a file"):
         load_gains(tmp_path / "papper", {})
+
+
+def test_gains_come_from_a_pipe_too() -> None:
+    read, write = os.pipe()
+    os.write(write, b"[observers.gmo]\ngain = 12.0\n")
+    os.close(write)
+    try:
+        assert load_gains(Path(f"/dev/fd/{read}"), sections()) == {"gmo": {"gain": 12.0}}
+    finally:
+        os.close(read)

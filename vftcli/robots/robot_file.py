@@ -145,7 +145,8 @@ def joint_label(document: Mapping[str, Any], index: int) -> str:
 def robot_text(path: Path, what: str = "robot file") -> str:
     """The text of a robot file, whatever its format, or of what is kept in a part of one."""
     try:
-        if not path.is_file():
+        # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read twice.
+        if not (path.is_file() or (path.is_fifo() and not path.suffix)):
             raise RobotError(f"{path}: no such {what}")
         if (size := path.stat().st_size) > LARGEST:
             raise RobotError(
