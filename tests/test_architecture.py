@@ -59,7 +59,6 @@ FILES = (
     "batch/datasets/",
     "outputs/",
     "readers/",
-    "observers/settings.py",  # gains in a file of their own
     "robots/robot.py",
     "robots/robot_file.py",
     "robots/writing.py",
@@ -68,7 +67,6 @@ FILES = (
     "signals/remarks.py",  # the catalogue of words
     "simulation/load.py",
     "simulation/scenario.py",
-    "simulation/schema.py",
     "simulation/writers/",
 )
 """Who touches files."""

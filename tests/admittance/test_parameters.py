@@ -68,7 +68,7 @@ def test_which_assignments_are_ours() -> None:
         ("rx.threshold=nan", "no admittance threshold for rx; give it in its"),
         ("position.hysteresis=1", "share of the threshold and must be below 1"),
         ("period=0", "the control period must be positive"),
-        ("position.mass=1,2", "position.mass has 2 values; give one, or 3"),
+        ("position.mass=1,2", "position.mass has 2 values; give one, or one for each of 3"),
         ("position.mass=heavy", "'heavy' is not a number or a list"),
         ("threshold_mode=medium", "there is hard, soft"),
         ("position.weight=3", "no such admittance parameter"),

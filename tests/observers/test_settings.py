@@ -1,6 +1,7 @@
 """Where observer parameters come from: the command line, the robot file, a file of gains, and what
 is left over; and what goes over what."""
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.settings import load_gains, overlay_gains, parse_settings
 from vftcli.observers.table import sections
 from vftcli.robots import PROFILES, load_robot
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import ParameterError, VftError
 
 
 def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -> Setup:
@@ -149,28 +150,31 @@ def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("not toml", "not a TOML file of gains"),
+        ("not toml", "gains.toml: not valid TOML"),
         ("gain = 1.0", r"no \[observers"),
-        ("[observers]\ngain = 1.0", r"no \[observers"),
+        ("[observers]\ngain = 1.0", "line 2: gain is 1.0; it must be a section"),
         ("[observers.gmoo]\ngain = 1.0", "Did you mean gmo"),
         ("[observers.gmo]\ngian = 1.0", "Did you mean gain"),
-        ("[observers.gmo]\ngain = true", "gmo.gain holds True; give a number or one a joint"),
-        ('[observers.gmo]\ngain = [1, "2"]', "gmo.gain holds '2'; give a number"),
-        ("[observers.gmo]\ngain = [nan]", "gmo.gain: nan is out of range"),
+        (
+            "[observers.gmo]\ngain = true",
+            "line 2: gain is True; it must be a number or one a joint",
+        ),
+        ('[observers.gmo]\ngain = [1, "2"]', r"line 2: gain is \[1, '2'\]; it must be a number"),
+        ("[observers.gmo]\ngain = [nan]", r"line 2: gain is \[nan\]; it must be a number"),
         (
             "[observers.fdo]\nomega = 1e20",
             r"fdo.omega: 1e\+20 is out of range; .* to 1e\+06 in size",
         ),
         ("[observers.kfo]\nr_diag = 5e-324", "kfo.r_diag: 5e-324 is out of range"),
         ("[observers.kfo]\nr_diag = 1e300", r"kfo.r_diag: 1e\+300 is out of range"),
-        ("[observers.kfo]\nnoise_convention = 3", "must be a word in quotes"),
-        (f"x = {'[' * 5000}", "not a TOML file of gains: .*nested too deep"),
+        ("[observers.kfo]\nnoise_convention = 3", "must be text in quotes"),
+        (f"x = {'[' * 5000}", "gains.toml: not valid TOML: nested too deep"),
     ],
 )
 def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str) -> None:
     path = tmp_path / "gains.toml"
     path.write_text(text)
-    with pytest.raises(ParameterError, match=words):
+    with pytest.raises(VftError, match=words):
         load_gains(path, sections())
 
 
@@ -196,3 +200,13 @@ def test_the_upper_layer_wins_parameter_by_parameter() -> None:
 def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="--gains takes auto, paper, or a file"):
         load_gains(tmp_path / "papper", {})
+
+
+def test_gains_come_from_a_pipe_too() -> None:
+    read, write = os.pipe()
+    os.write(write, b"[observers.gmo]\ngain = 12.0\n")
+    os.close(write)
+    try:
+        assert load_gains(Path(f"/dev/fd/{read}"), sections()) == {"gmo": {"gain": 12.0}}
+    finally:
+        os.close(read)

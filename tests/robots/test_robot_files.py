@@ -76,7 +76,11 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
         ("mass = 1.0", 'mass = "one"', "line 19: .*mass is 'one'; it must be a finite number"),
         ("mass = 1.0", "mass = nan", "line 19: .*mass is nan; it must be a finite number"),
         ("dof = 2", "dof = 3", r"line 3: dof is 3 but the file has 2 \[\[joints\]\] tables"),
-        ('"xyz-rpy"', '"dh"', "line 4: convention is 'dh'; it is one of standard-dh, modified-dh"),
+        (
+            '"xyz-rpy"',
+            '"dh"',
+            "line 4: convention is 'dh'; it must be one of standard-dh, modified-dh",
+        ),
         ("joint_torque", "amps", "line 5: torque_source is 'amps'"),
         ('"joint_torque"', '"current"', "line 7: joint 1 .*torque_constant is missing"),
         ("coulomb-viscous", "sticky", "line 23: joint 2 .*: model is 'sticky'"),
@@ -91,9 +95,13 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
         ('name = "planar"', "sources = [3]", r"line 2: sources is \[3\]; it must be tables"),
         ('name = "planar"', 'flange_d = ["a", "b"]', "line 2: flange_d is .* a finite number"),
         ('name = "planar"', "ee_rpy = [0, 180, 0]", "line 2: ee_rpy is 180 rad; on a robot it"),
-        ('"xyz-rpy"', "[]", r"line 4: convention is \[\]; it is one of standard-dh"),
-        ('"coulomb-viscous"', "[]", r"line 23: joint 2 \(elbow\): model is \[\]; it is one of"),
-        ('"coulomb-viscous"', "{}", r"line 23: joint 2 \(elbow\): model is {}; it is one of"),
+        ('"xyz-rpy"', "[]", r"line 4: convention is \[\]; it must be one of standard-dh"),
+        (
+            '"coulomb-viscous"',
+            "[]",
+            r"line 23: joint 2 \(elbow\): model is \[\]; it must be one of",
+        ),
+        ('"coulomb-viscous"', "{}", r"line 23: joint 2 \(elbow\): model is {}; it must be one of"),
         ('"elbow"', '"shoulder"', "line 16: joint 2 .*: name is 'shoulder', as another joint's"),
         ("mass = 1.0", "mass = 1e308", r"line 19: .*mass is 1e\+308 kg; on a robot it lies"),
         ("mass = 1.0", f"mass = {10**400}", "line 19: .*mass is 1000.*; it must be a finite"),
@@ -102,7 +110,11 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
         ("mass = 1.0", "mass = 1.0\nrotor_inertia = 1e308", "line 20: .*rotor_inertia is 1e.308"),
         ("mass = 1.0", "mass = 1.0\nq_min = 1\nq_max = 0", "q_min is 1 rad, not below q_max 0"),
         ("viscous = 0.5", "viscous = 0.5\n[observers.gmo]\ngain = nan", "line 27: gain is nan; it"),
-        ("viscous = 0.5", "viscous = 0.5\n[observers]\ngmo = 3", "line 27: gmo must be a section"),
+        (
+            "viscous = 0.5",
+            "viscous = 0.5\n[observers]\ngmo = 3",
+            "line 27: gmo is 3; it must be a section",
+        ),
         ("viscous = 0.5", "viscous = 0.5\n[admittance]\nperiod = true", "line 27: period is True"),
         (
             "viscous = 0.5",
@@ -115,7 +127,7 @@ def test_a_planar_arm_weighs_what_the_textbook_says(tmp_path: Path) -> None:
             "viscous = 0.5\n[admittance.position]\nmass = [nan]",
             r"line 27: mass is \[nan\]; it must be a number or one an axis",
         ),
-        ("dof = 2", "payload = 2", r"line 3: payload must be a section \[payload\]"),
+        ("dof = 2", "payload = 2", "line 3: payload is 2; it must be a section"),
     ],
 )
 def test_a_complaint_names_the_line(tmp_path: Path, old: str, new: str, words: str) -> None:

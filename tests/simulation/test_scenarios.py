@@ -91,7 +91,7 @@ def test_twists_exceed_the_threshold() -> None:
         (["contacts.hand.kind=push"], "Did you mean pushes"),
         (["trajectory.kind=cirlce"], "Did you mean circle"),
         (["trajectory={kind='excitation'}"], "lacks trajectory.mean"),
-        (["step=two"], "must be a number"),
+        (["step=two"], "must be a finite number"),
         (["duration=inf"], "finite"),
         (["pair=1"], "true or false"),
         (["duration"], "is not key=value"),

@@ -1,14 +1,15 @@
 """Admittance parameters: one number for each Cartesian axis, as in Tables III and IV."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import MISSING, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_shape, frozen
+from vftcli.signals.arrays import Array, frozen
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, numbers
+from vftcli.signals.parsing import assignment, check_known, numbers
+from vftcli.signals.schema import NUMBER, set_value, spread
 
 #: The six axes: translation of the flange point along the base axes, rotation about them.
 AXES = ("x", "y", "z", "rx", "ry", "rz")
@@ -19,36 +20,12 @@ GROUPS: dict[str, tuple[int, ...]] = {
     "rotation": (3, 4, 5),
     **{axis: (k,) for k, axis in enumerate(AXES)},
 }
-#: Parameters with one number an axis.
-PER_AXIS = (
-    "mass",
-    "damping",
-    "stiffness",
-    "alpha",
-    "xi",
-    "threshold",
-    "hysteresis",
-    "speed_limit",
-    "speed_scale",
-)
-
-REQUIRED = ("mass", "damping", "stiffness", "alpha", "threshold")
-
-#: The paper's letters, accepted beside the words.
-LETTERS = {
-    "m": "mass",
-    "b": "damping",
-    "k": "stiffness",
-    "m_d": "mass",
-    "b_d": "damping",
-    "k_d": "stiffness",
-    "f_tsd": "threshold",
-    "v_tsd": "speed_limit",
-    "v0": "speed_scale",
-    "ts": "period",
-}
-
 THRESHOLD_MODES = ("hard", "soft", "literal")
+
+
+def axis(*letters: str, positive: bool = True, endless: bool = False) -> dict[str, Any]:
+    """What is known of a field with one number an axis: the paper's letters, its bounds."""
+    return {"letters": letters, "positive": positive, "endless": endless}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,34 +36,41 @@ class Admittance:
     N·m, rad/s. Every array is (6,), in the order of `AXES`.
     """
 
-    mass: Array  #: M_d.
-    damping: Array  #: B_d.
-    stiffness: Array  #: K_d.
-    alpha: Array  #: α of (47).
-    threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
+    mass: Array = field(metadata=axis("m", "m_d"))  #: M_d.
+    damping: Array = field(metadata=axis("b", "b_d", positive=False))  #: B_d.
+    stiffness: Array = field(metadata=axis("k", "k_d"))  #: K_d.
+    alpha: Array = field(metadata=axis())  #: α of (47).
+    #: F_tsd: above it an axis is dragged, below it recovers.
+    threshold: Array = field(metadata=axis("f_tsd", positive=False, endless=True))
     #: ξ of (47), which the paper does not print; None takes B_d/(2√(M_d K_d)), the damping ratio of
     #: the drag phase.
-    xi: Array | None = None
+    xi: Array | None = field(default=None, metadata=axis())
     #: Share of the threshold by which the force has to fall below it before an axis that is dragged
     #: recovers; 0 is the paper's.
-    hysteresis: Array | float = 0.0
-    speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
-    speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
+    hysteresis: Array | float = field(default=0.0, metadata=axis(positive=False))
+    #: Ẋ_tsd; infinite for none.
+    speed_limit: Array | float = field(default=np.inf, metadata=axis("v_tsd", endless=True))
+    #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
+    speed_scale: Array | float = field(default=1.0, metadata=axis("v0"))
     period: float  #: Control period. [s]
     threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.thresholds`.
     source: str = ""  #: Where the numbers come from, in words.
 
     def __post_init__(self) -> None:
-        for name in PER_AXIS:
-            if (value := getattr(self, name)) is not None:
-                array = np.asarray(value, dtype=np.float64)
-                array = np.broadcast_to(array, (6,)) if array.ndim == 0 else array
-                check_shape(array, (6,), name, "the admittance")
-                object.__setattr__(self, name, frozen(array))
-        for name in ("mass", "stiffness", "alpha", "xi", "speed_scale", "speed_limit"):
-            self._check(name, positive=True)
-        for name in ("damping", "threshold", "hysteresis"):
-            self._check(name, positive=False)
+        for name, key in PER_AXIS.items():
+            if getattr(self, name) is None:
+                continue
+            array = spread(getattr(self, name), 6, "axes", f"admittance.{name}")
+            object.__setattr__(self, name, frozen(array))
+            fits = array > 0.0 if key.metadata["positive"] else array >= 0.0
+            if not key.metadata["endless"]:
+                fits &= np.isfinite(array)
+            if not np.all(fits):
+                k = int(np.argmin(fits))
+                needed = "positive" if key.metadata["positive"] else "zero or positive"
+                raise ParameterError(
+                    f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be {needed}"
+                )
         if np.any(np.asarray(self.hysteresis) >= 1.0):
             raise ParameterError(
                 "admittance.hysteresis is a share of the threshold and must be below 1; "
@@ -99,20 +83,6 @@ class Admittance:
         if self.threshold_mode not in THRESHOLD_MODES:
             raise ParameterError(
                 f"threshold mode {self.threshold_mode!r}; there is {', '.join(THRESHOLD_MODES)}"
-            )
-
-    def _check(self, name: str, *, positive: bool) -> None:
-        value = getattr(self, name)
-        if value is None:
-            return
-        wrong = ~(value > 0.0) if positive else ~(value >= 0.0)
-        if name not in {"speed_limit", "threshold"}:
-            wrong |= ~np.isfinite(value)
-        if np.any(wrong):
-            k = int(np.argmax(wrong))
-            needed = "positive" if positive else "zero or positive"
-            raise ParameterError(
-                f"admittance.{name} of axis {AXES[k]} is {value[k]:g}; it must be {needed}"
             )
 
     @property
@@ -134,6 +104,16 @@ class Admittance:
         return replace(self, alpha=np.full(6, float(alpha)))
 
 
+PER_AXIS = {key.name: key for key in fields(Admittance) if key.metadata}
+#: The paper's letters, accepted beside the words.
+LETTERS = {
+    **{letter: name for name, key in PER_AXIS.items() for letter in key.metadata["letters"]},
+    "ts": "period",
+}
+#: Keys of ``[admittance]`` that are not one number an axis.
+PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
+
+
 def from_table(
     table: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
 ) -> Admittance:
@@ -147,85 +127,45 @@ def from_table(
     Raises:
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
-    given = [(name, table.get(name, {})) for name in ("position", "rotation")]
-    values: dict[str, Array] = {}
-    for section, entries in (*given, *settings.items()):
+    groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
+    values = {name: np.full(6, np.nan) for name in PER_AXIS}
+    for section, entries in (*groups, *settings.items()):
+        axes = list(GROUPS[section])
         for name, value in entries.items():
-            if name not in PLAIN:
-                assign(values, section, name, value)
-    plain = {name: table[name] for name in PLAIN if name in table}
-    plain |= {k: v for k, v in settings.get("admittance", {}).items() if k in PLAIN}
-    check_complete(values, plain, robot, has_table=bool(table))
-    xi = values.pop("xi", None)
-    found = Admittance(
-        **values,
-        period=number(plain["period"], "admittance.period"),
-        threshold_mode=str(plain.get("threshold_mode", "hard")),
-        source=str(plain.get("source", "")),
-    )
-    if xi is None:
-        return found
-    # Axes without a ξ of their own keep that of the drag phase.
-    return replace(found, xi=np.where(np.isnan(xi), found.damping_ratio, xi))
-
-
-#: Keys of ``[admittance]`` that are not one number an axis.
-PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
-
-
-def assign(values: dict[str, Array], section: str, name: str, value: Any) -> None:  # noqa: ANN401
-    """Put one number, or one an axis, of a section into its place among the six."""
-    if name not in PER_AXIS:
-        raise ParameterError(
-            f"the admittance has no parameter {name!r}; it has {', '.join((*PER_AXIS, 'period'))}"
-        )
-    axes = GROUPS[section]
-    what = f"{section}.{name}"
-    try:
-        array = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise ParameterError(f"{what} is {value!r}; it must be a number or one an axis") from None
-    if array.ndim != 1 or array.size not in {1, len(axes)}:
-        raise ParameterError(f"{what} has {array.size} values; give one, or {len(axes)}")
-    row = values.setdefault(name, np.full(6, np.nan))
-    row[list(axes)] = array
-
-
-#: What holds for an axis that is given no such number; a missing speed limit is none.
-DEFAULTS = {"hysteresis": 0.0, "speed_limit": np.inf, "speed_scale": 1.0}
-
-
-def check_complete(
-    values: dict[str, Array], plain: Mapping[str, Any], robot: str, *, has_table: bool
-) -> None:
-    """Fill what has a default, and raise a ParameterError for what has none."""
-    for name, default in DEFAULTS.items():
-        row = values.setdefault(name, np.full(6, np.nan))
-        row[np.isnan(row)] = default
-    for name in REQUIRED:
-        row = values.get(name, np.full(6, np.nan))
-        if np.any(np.isnan(row)):
-            absent = np.flatnonzero(np.isnan(row))
-            listed = ", ".join(AXES[k] for k in absent)
-            section = next(key for key, axes in GROUPS.items() if set(axes) <= set(absent))
-            where = "its [admittance]" if has_table else "an [admittance] section, which it lacks,"
+            if name in PLAIN:
+                continue
+            check_known(name, PER_AXIS, f"the admittance has no parameter {name!r}")
+            values[name][axes] = spread(value, len(axes), "axes", f"{section}.{name}")
+    where = "its [admittance]" if table else "an [admittance] section, which it lacks,"
+    for name, key in PER_AXIS.items():
+        absent = np.isnan(values[name])
+        if name != "xi" and key.default is not MISSING:
+            values[name][absent] = key.default
+        elif name != "xi" and np.any(absent):
+            listed = ", ".join(np.array(AXES)[absent])
+            section = next(group for group, axes in GROUPS.items() if np.all(absent[list(axes)]))
             raise ParameterError(
                 f"{robot}: no admittance {name} for {listed}; give it in {where} or "
                 f"with --set {section}.{name}=VALUE"
             )
+    plain = {**table, **settings.get("admittance", {})}
     if "period" not in plain:
         raise ParameterError(
             f"{robot}: no admittance.period; give the control period [s] in its [admittance] or "
             "with --set admittance.period=0.008"
         )
-
-
-def number(value: Any, what: str) -> float:  # noqa: ANN401 - TOML is untyped
-    """One number."""
-    try:
-        return float(value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{what} is {value!r}; it must be a number") from None
+    NUMBER.check("admittance.period", plain["period"])
+    xi = values.pop("xi")
+    found = Admittance(
+        **values,
+        period=float(plain["period"]),
+        threshold_mode=plain.get("threshold_mode", "hard"),
+        source=plain.get("source", ""),
+    )
+    if np.all(np.isnan(xi)):
+        return found
+    # Axes without a ξ of their own keep that of the drag phase.
+    return replace(found, xi=np.where(np.isnan(xi), found.damping_ratio, xi))
 
 
 def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
@@ -245,20 +185,12 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
                 f"--set {text!r}: no such admittance parameter. Sections: {', '.join(GROUPS)}; "
                 f"parameters: {', '.join((*PER_AXIS, 'period'))}"
             )
-        settings.setdefault(section, {})[name] = parse_value(name, value, text)
+        given: Any = value
+        if name not in {"threshold_mode", "source"}:
+            endless = name == "speed_limit" and value.lower() == "none"
+            given = set_value("inf" if endless else value, text)
+        settings.setdefault(section, {})[name] = given
     return settings
-
-
-def parse_value(name: str, text: str, whole: str) -> Any:  # noqa: ANN401
-    """A word, a number, or a list of numbers; ``none`` is no speed limit."""
-    if name in {"threshold_mode", "source"}:
-        return text
-    if name == "speed_limit" and text.lower() == "none":
-        return float("inf")
-    values = numbers(text)
-    if values is None:
-        raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
-    return values[0] if len(values) == 1 else list(values)
 
 
 def is_admittance_setting(assignment: str) -> bool:

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from vftcli.signals.arrays import Array
+from vftcli.robots.profile import checked_gains
+from vftcli.robots.robot_file import RobotFile
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, did_you_mean, numbers, shown, toml_tables
+from vftcli.signals.parsing import assignment, check_known, shown
+from vftcli.signals.schema import PER_JOINT, TEXT, set_value
 
 Value = float | str | list[float]
 Gains = Mapping[str, Mapping[str, Any]]  #: Section of a file → parameter → number, list or word.
@@ -40,7 +40,11 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
         if not dot:
             raise ParameterError(f"--set {text!r} is not {FORM}")
         check_name(section, parameter, sections)
-        settings.setdefault(section, {})[parameter] = parse_value(parameter, value, text)
+        given: Value = value
+        if parameter not in WORDS:
+            given = set_value(value, text)
+            check_range(parameter, given, f"--set {text!r}")
+        settings.setdefault(section, {})[parameter] = given
     return settings
 
 
@@ -48,36 +52,15 @@ def check_name(
     section: str, parameter: str, sections: Mapping[str, Sequence[str]], where: str = ""
 ) -> None:
     """Raise a ParameterError that lists what there is unless the name exists."""
-    start = f"{where}: " if where else ""
-    if section not in sections:
-        raise ParameterError(
-            f"{start}no observer {section!r} to set.{did_you_mean(section, sections)} "
-            f"There is {', '.join(sections)}"
-        )
-    if parameter not in (known := sections[section]):
-        raise ParameterError(
-            f"{start}{section} has no parameter {parameter!r}.{did_you_mean(parameter, known)} "
-            f"It has {', '.join(known)}"
-        )
+    check_known(section, sections, f"{where}no observer {section!r} to set")
+    known = sections[section]
+    check_known(parameter, known, f"{where}{section} has no parameter {parameter!r}")
 
 
-def parse_value(parameter: str, text: str, whole: str) -> Value:
-    """The value of an assignment: a word for a name in `WORDS`, else one number or several."""
-    if parameter in WORDS:
-        return text
-    values = numbers(text)
-    if values is None:
-        raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
-    check_numbers(parameter, values, f"--set {whole!r}")
-    return values[0] if len(values) == 1 else list(values)
-
-
-def check_numbers(parameter: str, values: Iterable[Any], where: str) -> None:
-    """Raise a ParameterError unless every value is a number that a parameter can have."""
+def check_range(parameter: str, values: float | list[float], where: str) -> None:
+    """Raise a ParameterError unless every number is one that a parameter can have."""
     largest = LARGEST.get(parameter, LARGEST_VARIANCE)
-    for value in values:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise ParameterError(f"{where} holds {shown(value)}; give a number or one a joint")
+    for value in values if isinstance(values, list) else [values]:
         # What is not a number is neither zero nor between the two.
         if value != 0 and not SMALLEST <= abs(value) <= largest:
             raise ParameterError(
@@ -96,12 +79,11 @@ def check_gains(gains: Gains, sections: Mapping[str, Sequence[str]], where: str)
     """
     for section, table in gains.items():
         for parameter, value in table.items():
-            check_name(section, parameter, sections, where)
+            check_name(section, parameter, sections, f"{where}: ")
             name = f"{where}: {section}.{parameter}"
+            (TEXT if parameter in WORDS else PER_JOINT).check(name, value)
             if parameter not in WORDS:
-                check_numbers(parameter, value if isinstance(value, list) else [value], name)
-            elif not isinstance(value, str):
-                raise ParameterError(f"{name} is {shown(value)}; it must be a word in quotes")
+                check_range(parameter, value, name)
 
 
 def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
@@ -111,24 +93,17 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
         path: A TOML file with ``[observers.SECTION]`` tables.
         sections: Sections and parameters there are.
     """
-    try:
-        document = toml_tables(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
+    if not path.exists():
         raise ParameterError(
             f"{path}: no such file of gains; --gains takes auto, paper, or a file of `vftcli tune`"
-        ) from None
-    except OSError as error:
-        raise ParameterError(f"{path}: cannot be read as gains ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise ParameterError(f"{path}: not a TOML file of gains: not text") from None
-    except ParameterError as error:
-        raise ParameterError(f"{path}: not a TOML file of gains: {error}") from None
-    gains = document.get("observers")
-    if not isinstance(gains, dict) or not all(isinstance(v, dict) for v in gains.values()):
+        )
+    root = RobotFile(path, "file of gains").root
+    if "observers" not in root.values:
         raise ParameterError(
             f"{path}: no [observers.*] tables; a gains file is what vftcli tune writes, as "
             "[observers.gmo] gain = 10.0"
         )
+    gains = checked_gains(root.section("observers"))
     check_gains(gains, sections, str(path))
     return gains
 
@@ -150,16 +125,3 @@ def parameters_given(
         if name != section:
             found |= source.get(name, {})
     return found
-
-
-def joint_values(value: Any, joints: int, what: str) -> Array:  # noqa: ANN401 - TOML is untyped
-    """One number a joint from one number or a list of them. (n,)"""
-    try:
-        array = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise ParameterError(f"{what} is {value!r}; it must be a number or one a joint") from None
-    if array.ndim != 1 or array.size not in {1, joints}:
-        raise ParameterError(
-            f"{what} has {array.size} values; give one, or one for each of {joints} joints"
-        )
-    return np.array(np.broadcast_to(array, (joints,)))

@@ -13,13 +13,13 @@ from vftcli.observers.settings import (
     PARAMETERS,
     Gains,
     Settings,
-    joint_values,
     parameters_given,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.schema import spread
 
 if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra
@@ -104,7 +104,7 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
     """
     given = parameters_given(name, name, setup.gains, setup.settings)
     if parameter in given:
-        return joint_values(given[parameter], setup.joints, f"{name}.{parameter}"), ()
+        return spread(given[parameter], setup.joints, "joints", f"{name}.{parameter}"), ()
     rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
     if "kfo" in setup.gains or "kfo" in setup.settings:
         kalman, _ = build_kfo("fe")(read_as("density", setup))
@@ -134,7 +134,7 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
         convention = str(given.pop("noise_convention", "density"))
         convention = "literal" if setup.as_printed else convention
         values = {
-            key: joint_values(value, setup.joints, f"kfo.{key}")
+            key: spread(value, setup.joints, "joints", f"kfo.{key}")
             for key, value in given.items()
             if key in PARAMETERS["kfo"]
         }

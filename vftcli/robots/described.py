@@ -21,7 +21,7 @@ from vftcli.robots.mjcf import mjcf_tree
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, is_finite, robot_text
+from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, robot_text
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
 from vftcli.robots.xacro_text import NAMESPACE, urdf_of_xacro
@@ -30,6 +30,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.schema import is_finite
 
 #: First element of a description → who reads it.
 READERS: dict[str, Callable[[Path, ET.Element], BodyTree]] = {

@@ -13,12 +13,23 @@ from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
 from vftcli.robots.conventions import CONVENTIONS, Kinematics
 from vftcli.robots.friction import PRESLIDING, falling_friction
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section, is_finite
+from vftcli.robots.robot_file import RobotFile, Section
 from vftcli.robots.temperature import lawless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_matrix
 from vftcli.signals.remarks import fact
+from vftcli.signals.schema import (
+    NUMBER,
+    PER_AXIS,
+    PER_JOINT,
+    SWITCH,
+    TABLE,
+    TEXT,
+    TEXTS,
+    Kind,
+    several,
+)
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
@@ -67,8 +78,9 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     }
     noise = {name: column(joints, f"noise_{name}") for name in SensorNoise.__dataclass_fields__}
     friction, limits = checked_friction(joints), checked_limits(joints)
-    endless = [joint.switch("endless") for joint in joints]
-    notes = [fact("robot-file-note", text=text) for text in root.texts("notes")]
+    endless = [joint.value("endless", SWITCH, False) for joint in joints]
+    notes = root.value("notes", TEXTS, ())
+    notes = [notes] if isinstance(notes, str) else notes
     return Robot(
         name=(name := root.text("name", root.file.path.stem)),
         title=root.text("title", name),
@@ -92,7 +104,10 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         sources=root.tables("sources"),
         published=root.section("published").values,
         document=root.values,
-        remarks=(*notes, *falling_friction(friction, limits.qd_max)),
+        remarks=(
+            *(fact("robot-file-note", text=text) for text in notes if text),
+            *falling_friction(friction, limits.qd_max),
+        ),
         path=root.file.path,
     )
 
@@ -192,13 +207,12 @@ def checked_gear(joints: Sequence[Section], key: str) -> Array | None:
 
 def checked_friction(joints: Sequence[Section]) -> tuple[JointFriction, ...]:
     """Return one friction model a joint; a joint without one has the model "none"."""
-    models = []
-    for joint in joints:
-        values = joint.values.get("friction", {"model": "none"})
-        if not isinstance(values, dict):
-            joint.refuse("friction must be a section [joints.friction]", "friction")
-        section = Section(joint.file, values, "joints.friction", joint.joint)
-        models.append(checked_joint_friction(section))
+    models = [
+        checked_joint_friction(joint.section("friction"))
+        if "friction" in joint.values
+        else JointFriction()
+        for joint in joints
+    ]
     return tuple(models) if any(m.model != "none" for m in models) else ()
 
 
@@ -229,7 +243,7 @@ def checked_joint_friction(section: Section) -> JointFriction:
 
 def checked_points(section: Section) -> dict[str, tuple[float, ...]]:
     """Return the points of a bent line: rising speeds [rad/s] and a torque [N·m] at each."""
-    speeds, torques = section.numbers("speeds", 2), section.numbers("torques", 2)
+    speeds, torques = (tuple(section.bounded(key, several(2))) for key in ("speeds", "torques"))
     if len(torques) != len(speeds):
         section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
     if any(fast <= slow for slow, fast in itertools.pairwise(speeds)):
@@ -248,36 +262,35 @@ def checked_limits(joints: Sequence[Section]) -> Limits:
 
 def checked_gains(section: Section) -> dict[str, Mapping[str, Any]]:
     """Return the ``[observers.*]`` tables: each value is a number, a list of them, or a word."""
-    for name, table in section.values.items():
-        if not isinstance(table, dict):
-            section.refuse(f"{name} must be a section, as [observers.gmo] gain = 10.0", name)
-        own = Section(section.file, table, f"observers.{name}")
-        for key, value in table.items():
-            numbers = value if isinstance(value, list) and value else [value]
-            if not isinstance(value, str) and not all(map(is_finite, numbers)):
-                own.refuse(f"{key} is {shown(value)}; it must be a number or one a joint", key)
+    for name in section.values:
+        own = section.section(name)
+        for key, value in own.values.items():
+            own.value(key, TEXT if isinstance(value, str) else PER_JOINT)
     return dict(section.values)
 
 
+#: Key of ``[admittance]`` → its kind.
+ADMITTANCE = {
+    "confidence": TEXT,
+    "period": NUMBER,
+    "position": TABLE,
+    "rotation": TABLE,
+    "source": TEXT,
+    "start": Kind("one number a joint", several(1).fits),
+    "threshold_mode": TEXT,
+}
+
+
 def checked_admittance(section: Section) -> Mapping[str, Any]:
-    """Return ``[admittance]``, the types of its keys checked; their range the admittance knows."""
-    if section.values:
-        for key in ("threshold_mode", "source", "confidence"):
-            section.text(key)
-        section.number("period", 1.0)
-        start = section.values.get("start", [0.0])
-        if not isinstance(start, list) or not start or not all(map(is_finite, start)):
-            section.refuse(f"start is {shown(start)}; it must be one number a joint", "start")
-    known = {"threshold_mode", "source", "confidence", "period", "start", "position", "rotation"}
-    if unknown := section.values.keys() - known:
-        name = min(unknown)
-        section.refuse(f"no key {name!r}; it has {', '.join(sorted(known))}", name)
-    for name in ("position", "rotation"):
-        axes = Section(section.file, section.section(name).values, f"admittance.{name}")
-        for key, value in axes.values.items():
-            numbers = value if isinstance(value, list) else [value]
-            if not all(is_finite(number) or number == math.inf for number in numbers):
-                axes.refuse(f"{key} is {shown(value)}; it must be a number or one an axis", key)
+    """Return ``[admittance]``, the kinds of its keys checked; their range the admittance knows."""
+    for key in section.values:
+        if key not in ADMITTANCE:
+            section.refuse(f"no key {key!r}; it has {', '.join(ADMITTANCE)}", key)
+        section.value(key, ADMITTANCE[key])
+    section.number("period", 1.0)
+    for axes in map(section.section, ("position", "rotation")):
+        for key in axes.values:
+            axes.value(key, PER_AXIS)
     return section.values
 
 

@@ -1,6 +1,5 @@
 """The text of a robot file and its tables, every complaint with the line that is wrong."""
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -11,7 +10,8 @@ import numpy as np
 from vftcli.robots.bounds import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.parsing import shown, toml_tables
+from vftcli.signals.parsing import toml_tables
+from vftcli.signals.schema import NUMBER, TABLE, TEXT, Kind, tables, vector, word_of
 
 #: Endings of robot descriptions; what they are their content decides.
 DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
@@ -21,9 +21,9 @@ LARGEST = 16 << 20  #: Largest robot file; one with all its words has a hundredt
 class RobotFile:
     """A parsed robot file that can point at the line a complaint is about."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, what: str = "robot file") -> None:
         self.path = path
-        self.text = robot_text(path)
+        self.text = robot_text(path, what)
         try:
             self.document = toml_tables(self.text)
         except ParameterError as error:
@@ -78,110 +78,60 @@ class Section(NamedTuple):
             whose = f"joint {self.joint + 1}{f' ({label})' if label else ''}: "
         raise RobotError(f"{where}: {whose}{message}")
 
-    def number(self, key: str, default: float | None = None) -> float:
-        """Return a finite number, `default` if the key is absent, or complain about its line."""
-        if key not in self.values:
-            if default is not None:
-                return default
-            self.refuse(f"{key} is missing", key)
-        value = self.values[key]
-        if not is_finite(value):
-            self.refuse(f"{key} is {shown(value)}; it must be a finite number", key)
-        self.check_bounds(key, [float(value)])
-        return float(value)
+    def value(self, key: str, kind: Kind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
+        """The value of a key, `default` if it is absent, or a complaint about its line."""
+        if key in self.values:
+            if why := kind.broken(key, self.values[key]):
+                self.refuse(why, key)
+        elif default is None:
+            self.refuse(f"{key} is missing; it must be {kind.words}", key)
+        return self.values.get(key, default)
 
-    def check_bounds(self, key: str, values: Sequence[float]) -> None:
-        """Complain about a key's line if one of its numbers is beyond what robots have."""
-        if why := out_of_bounds(key, values):
+    def bounded(self, key: str, kind: Kind, default: Sequence[float] | None = None) -> list[float]:
+        """The numbers of a key, each of them such as robots have."""
+        value = self.value(key, kind, default)
+        found = [float(item) for item in (value if isinstance(value, list) else [value])]
+        if why := out_of_bounds(key, found):
             self.refuse(why, key)
+        return found
+
+    def number(self, key: str, default: float | None = None) -> float:
+        """A finite number, `default` if the key is absent."""
+        if key not in self.values and default is not None:
+            return default
+        return self.bounded(key, NUMBER)[0]
 
     def vector(self, key: str, length: int, default: Sequence[float] | None = None) -> Array:
-        """Return `length` finite numbers, `default` if absent, or complain. (length,)"""
-        if key not in self.values and default is None:
-            self.refuse(f"{key} is missing; it has {length} numbers", key)
-        value = self.values.get(key, default)
-        if key in self.values and not (
-            isinstance(value, list) and len(value) == length and all(map(is_finite, value))
-        ):
-            self.refuse(f"{key} is {shown(value)}; it must be {length} finite numbers", key)
-        found = np.array([float(item) for item in value])
-        self.check_bounds(key, found.tolist())
-        return found
-
-    def numbers(self, key: str, least: int) -> tuple[float, ...]:
-        """Return a list of at least `least` finite numbers, or complain about its line."""
-        value = self.values.get(key)
-        if not isinstance(value, list) or len(value) < least or not all(map(is_finite, value)):
-            said = f"is {shown(value)}; it" if key in self.values else "is missing; it"
-            self.refuse(f"{key} {said} must be a list of at least {least} finite numbers", key)
-        found = tuple(float(item) for item in value)
-        self.check_bounds(key, found)
-        return found
-
-    def switch(self, key: str) -> bool:
-        """Return true or false, false if the key is absent, or complain."""
-        value = self.values.get(key, False)
-        if not isinstance(value, bool):
-            self.refuse(f"{key} is {shown(value)}; it must be true or false", key)
-        return value
+        """So many finite numbers, `default` if the key is absent. (length,)"""
+        given = None if default is None else list(default)
+        return np.array(self.bounded(key, vector(length), given))
 
     def text(self, key: str, default: str = "") -> str:
-        """Return a word or a sentence, `default` if the key is absent, or complain."""
-        value = self.values.get(key, default)
-        if not isinstance(value, str):
-            self.refuse(f"{key} is {shown(value)}; it must be text in quotes", key)
-        return value
-
-    def texts(self, key: str) -> tuple[str, ...]:
-        """Return the sentences of a list, or of one sentence without it; empty ones left out."""
-        value = self.values.get(key, ())
-        sentences = [value] if isinstance(value, str) else value
-        if not isinstance(sentences, list | tuple) or not all(
-            isinstance(sentence, str) for sentence in sentences
-        ):
-            self.refuse(f"{key} is {shown(value)}; it must be text in quotes, or a list of it", key)
-        return tuple(sentence for sentence in sentences if sentence)
+        """A word or a sentence, `default` if the key is absent."""
+        return str(self.value(key, TEXT, default))
 
     def choice(self, key: str, known: Iterable[str], default: str | None = None) -> str:
-        """Return one of the words that are known, or complain and list them."""
-        value, there = self.values.get(key, default), list(known)
-        if not isinstance(value, str) or value not in there:
-            said = f"is {shown(value)}; it is" if key in self.values else "is missing; it is"
-            self.refuse(f"{key} {said} one of {', '.join(there)}", key)
-        return value
+        """One of the words that are known, `default` if the key is absent."""
+        return str(self.value(key, word_of(known), default))
 
     def tables(self, key: str) -> tuple[Mapping[str, Any], ...]:
-        """Return the ``[[key]]`` tables, none if there are none, or complain about their line."""
-        value = self.values.get(key, [])
-        if not isinstance(value, list) or not all(isinstance(table, dict) for table in value):
-            self.refuse(f"{key} is {shown(value)}; it must be tables, each headed [[{key}]]", key)
-        return tuple(value)
+        """The ``[[key]]`` tables, none if there are none."""
+        return tuple(self.value(key, tables(key), ()))
 
     def section(self, name: str) -> "Section":
-        """Return the section of a name, empty if there is none, or complain about its line."""
-        values = self.values.get(name, {})
-        if not isinstance(values, dict):
-            self.refuse(f"{name} must be a section [{name}]", name)
-        return Section(self.file, values, name)
+        """The section of a name in this one, empty if there is none."""
+        values = self.value(name, TABLE, {})
+        table = f"{self.table}.{name}" if self.table else name
+        return Section(self.file, values, table, self.joint)
 
     def named_sections(self, *keys: str) -> dict[str, "Section"]:
-        """Return each table in this one by its name, itself under "" if it has one of `keys`."""
+        """Each table in this one by its name, itself under "" if it has one of `keys`."""
         found = {
-            name: Section(self.file, table, f"{self.table}.{name}")
+            name: self.section(name)
             for name, table in self.values.items()
             if isinstance(table, dict)
         }
         return {**found, "": self} if any(key in self.values for key in keys) else found
-
-
-def is_finite(value: object) -> bool:
-    """Whether a value of TOML is a finite number; true and false are none."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer beyond the largest float
-        return False
 
 
 def joint_label(document: Mapping[str, Any], index: int) -> str:
@@ -192,16 +142,17 @@ def joint_label(document: Mapping[str, Any], index: int) -> str:
     return str(tables[index].get("name", ""))
 
 
-def robot_text(path: Path) -> str:
-    """The text of a robot file, whatever its format."""
+def robot_text(path: Path, what: str = "robot file") -> str:
+    """The text of a robot file, whatever its format, or of what is kept in a part of one."""
     try:
-        if not path.is_file():
-            raise RobotError(f"{path}: no such robot file")
+        # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read twice.
+        if not (path.is_file() or (path.is_fifo() and not path.suffix)):
+            raise RobotError(f"{path}: no such {what}")
         if (size := path.stat().st_size) > LARGEST:
             raise RobotError(
-                f"{path}: has {size >> 20} MiB; a robot file has at most {LARGEST >> 20} MiB"
+                f"{path}: has {size >> 20} MiB; a {what} has at most {LARGEST >> 20} MiB"
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text"
-        raise RobotError(f"{path}: cannot be read as a robot file ({reason})") from None
+        raise RobotError(f"{path}: cannot be read as a {what} ({reason})") from None

@@ -1,18 +1,28 @@
 """Tables of a scenario file turned into dataclasses, every complaint with the key that is wrong."""
 
-import difflib
 import types
 from collections.abc import Iterable, Mapping
-from dataclasses import MISSING, fields, is_dataclass
+from contextlib import suppress
+from dataclasses import MISSING, fields
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import shown
+from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.schema import LIST, SWITCH, TABLE, TEXT, WHOLE, Kind, is_finite
 
 Section = TypeVar("Section")
 
-#: Largest number of a scenario in any of its units; a clock that counts from 1970 starts below.
+#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below it.
 LARGEST = 1e10
+#: Type of a field → its kind.
+KINDS = {
+    bool: SWITCH,
+    float: Kind(
+        f"a finite number, {LARGEST:g} at most", lambda v: is_finite(v) and abs(v) <= LARGEST
+    ),
+    int: WHOLE,
+    str: TEXT,
+}
 
 
 def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
@@ -42,63 +52,35 @@ def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML va
         return convert_union(value, get_args(hint), where)
     if get_origin(hint) is tuple:
         return convert_tuple(value, get_args(hint), where)
-    if is_dataclass(hint) and isinstance(hint, type):
-        if not isinstance(value, Mapping):
-            raise ParameterError(f"{where} is {shown(value)}; it must be a section")
-        return section_from(hint, value, where)
-    if hint is float and isinstance(value, int | float) and not isinstance(value, bool):
-        if not abs(value) <= LARGEST:  # neither is what is not a number
-            raise ParameterError(
-                f"{where} is {shown(value)}; it must be a finite number, {LARGEST:g} at most"
-            )
-        return float(value)
-    if (
-        isinstance(hint, type)
-        and isinstance(value, hint)
-        and (hint is bool or not isinstance(value, bool))
-    ):
-        return value
-    names = {float: "a number", int: "a whole number", bool: "true or false", str: "a word"}
-    raise ParameterError(f"{where} is {shown(value)}; it must be {names.get(hint, str(hint))}")
+    KINDS.get(hint, TABLE).check(where, value)
+    if hint in KINDS:
+        return float(value) if hint is float else value
+    return section_from(hint, value, where)
 
 
 def convert_union(value: Any, options: tuple[Any, ...], where: str) -> Any:  # noqa: ANN401
-    """Return `value` as the first of several types that takes it."""
+    """Return `value` as the first type that takes it, a table as the section its `kind` names."""
     if tagged := {o.KIND: o for o in options if hasattr(o, "KIND")}:
-        return convert_tagged(value, tagged, where)
-    complaint: ParameterError | None = None
-    for option in options:
-        if option is type(None):
-            continue
-        try:
+        TABLE.check(where, value)
+        kind = str(value.get("kind", ""))
+        if kind not in tagged:
+            raise ParameterError(unknown_name(f"{where}.kind {kind!r}", kind, tagged))
+        return section_from(tagged[kind], {k: v for k, v in value.items() if k != "kind"}, where)
+    *others, last = (option for option in options if option is not type(None))
+    for option in others:
+        with suppress(ParameterError):
             return convert(value, option, where)
-        except ParameterError as error:
-            complaint = error
-    if complaint is None:
-        raise ParameterError(f"{where} cannot be {shown(value)}")
-    raise complaint
-
-
-def convert_tagged(value: Any, options: Mapping[str, Any], where: str) -> Any:  # noqa: ANN401
-    """Return a table as the section its `kind` names."""
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{where} is {shown(value)}; it must be a section with a kind")
-    kind = str(value.get("kind", ""))
-    if kind not in options:
-        raise ParameterError(unknown_name(f"{where}.kind {kind!r}", kind, options))
-    return section_from(options[kind], {k: v for k, v in value.items() if k != "kind"}, where)
+    return convert(value, last, where)
 
 
 def convert_tuple(value: Any, items: tuple[Any, ...], where: str) -> tuple[Any, ...]:  # noqa: ANN401
     """Return a TOML array as a tuple of the declared length and type."""
-    if not isinstance(value, list | tuple):
-        raise ParameterError(f"{where} is {shown(value)}; it must be a list")
-    if items[-1] is Ellipsis:
-        return tuple(convert(v, items[0], f"{where}[{i}]") for i, v in enumerate(value))
+    LIST.check(where, value)
+    items = items[:1] * len(value) if items[-1] is Ellipsis else items
     if len(value) != len(items):
         raise ParameterError(f"{where} has {len(value)} entries; it must have {len(items)}")
-    pairs = zip(value, items, strict=True)
-    return tuple(convert(v, item, f"{where}[{i}]") for i, (v, item) in enumerate(pairs))
+    pairs = enumerate(zip(value, items, strict=True))
+    return tuple(convert(v, item, f"{where}[{i}]") for i, (v, item) in pairs)
 
 
 def key_path(where: str, key: str) -> str:
@@ -109,6 +91,4 @@ def key_path(where: str, key: str) -> str:
 def unknown_name(what: str, name: str, known: Iterable[str]) -> str:
     """Return the complaint about an unknown name: the nearest one, and all there are."""
     there = list(known)
-    close = difflib.get_close_matches(name, there, n=1, cutoff=0.5)
-    hint = f" Did you mean {close[0]}?" if close else ""
-    return f"no {what}.{hint} There is {', '.join(there)}."
+    return f"no {what}.{did_you_mean(name, there)} There is {', '.join(there)}."
