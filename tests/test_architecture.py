@@ -58,6 +58,7 @@ FILES = (
     "outputs/",
     "readers/",
     "observers/settings.py",  # gains in a file of their own
+    "reproduction/paper.py",  # what a paper prints
     "robots/robot.py",
     "robots/robot_file.py",
     "robots/writing.py",
