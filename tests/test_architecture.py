@@ -59,6 +59,7 @@ FILES = (
     "batch/datasets/",
     "outputs/",
     "readers/",
+    "reproduction/paper.py",  # what a paper prints
     "robots/robot.py",
     "robots/robot_file.py",
     "robots/writing.py",

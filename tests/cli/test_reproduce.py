@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
-from vftcli.reproduction import jobs, papers
+from vftcli.reproduction import jobs, paper
 from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
 from vftcli.signals.errors import ParameterError
 
@@ -45,15 +45,16 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
     )
     drawn = PaperItem(label="Fig. 1", title="t", why="w.", verdict="a picture")
     items = {"table1": item, "fig1": drawn}
-    paper = Paper(
+    declared = Paper(
         name="p",
         title="t",
         doi="d",
-        experiments={"e": Experiment("the experiment", fail, (1,))},
+        experiments={"e": Experiment(title="the experiment", run="fail", seeds=(1,))},
         items=items,
         setting=(),
     )
-    monkeypatch.setitem(papers.PAPERS, "p", paper)
+    monkeypatch.setitem(paper.PAPERS, "p", declared)
+    monkeypatch.setitem(jobs.RUNS, "fail", fail)
     monkeypatch.setattr(jobs, "MOST_WORKERS", 1)
     result = invoke("reproduce", "p", "-o", tmp_path / "out")
     assert result.exit_code == 1

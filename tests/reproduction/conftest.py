@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.reproduction import papers
+from vftcli.reproduction import jobs, paper
 from vftcli.reproduction.paper import (
     AS_PRINTED,
     CORRECTED,
@@ -21,13 +21,13 @@ from vftcli.signals.errors import ParameterError
 def measure(seed: int) -> RunResult:
     t = np.linspace(0.0, 1.0, 50)
     line = ChartLine("ours", np.column_stack([np.sin(t), np.cos(t)]))
-    chart = Chart("fig1", "Two panels", ("N", "N"), ("x", "y"), t, (line,))
+    chart = Chart("any", "", ("N", "N"), ("x", "y"), t, (line,))
     known = {AS_PRINTED: 3.0, CORRECTED: 2.0 + seed, FLOOR: 0.5}
     return RunResult({"a": known, "b": {CORRECTED: None if seed > 1 else -1.0}}, {"fig1": chart})
 
 
-def fail(seed: int) -> RunResult:
-    raise ParameterError(f"nothing moved with {seed}")
+def fail(seed: int, *, what: str) -> RunResult:
+    raise ParameterError(f"{what} moved with {seed}")
 
 
 PAPER = Paper(
@@ -35,9 +35,11 @@ PAPER = Paper(
     title="A paper",
     doi="10.1/1",
     experiments={
-        "works": Experiment("what works", measure, (1, 2, 3)),
-        "fails": Experiment("what fails", fail, (1, 2)),
-        "timed": Experiment("what takes the time", measure, (0,), alone=True),
+        "works": Experiment(title="what works", run="measure", seeds=(1, 2, 3)),
+        "fails": Experiment(
+            title="what fails", run="fail", given={"what": "nothing"}, seeds=(1, 2)
+        ),
+        "timed": Experiment(title="what takes the time", run="measure", seeds=(0,), alone=True),
     },
     items={
         "fig1": PaperItem(
@@ -47,7 +49,7 @@ PAPER = Paper(
             verdict="in size",
             experiments=("works",),
             lines=(PrintedLine("a", "alpha", "N", "2"), PrintedLine("b", "beta", "", "-1")),
-            drawn=True,
+            traces="Two panels",
         ),
         "fig2": PaperItem(label="Fig. 2", title="Another", why="A sketch.", verdict="a picture"),
         "fig3": PaperItem(
@@ -66,5 +68,7 @@ PAPER = Paper(
 @pytest.fixture
 def cheap(monkeypatch: pytest.MonkeyPatch) -> Paper:
     """That paper, among those there are."""
-    monkeypatch.setitem(papers.PAPERS, PAPER.name, PAPER)
+    monkeypatch.setitem(paper.PAPERS, PAPER.name, PAPER)
+    monkeypatch.setitem(jobs.RUNS, "measure", measure)
+    monkeypatch.setitem(jobs.RUNS, "fail", fail)
     return PAPER

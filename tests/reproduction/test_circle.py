@@ -5,10 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.reproduction.huang2025 import HUANG2025, ITEMS
 from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
 from vftcli.reproduction.page import item_grid, spread
+from vftcli.reproduction.paper import PAPERS
 
+HUANG = PAPERS["huang2025"]
 DOCUMENT = Path(__file__).parents[2] / "docs" / "reproduction.md"
 
 TIMED = re.compile(r"time\b|KFO-ZOH over")
@@ -17,14 +18,14 @@ TIMED = re.compile(r"time\b|KFO-ZOH over")
 
 def documented(name: str) -> dict[str, list[str]]:
     """Label of a line → what the document's table of an item has of ours."""
-    text = DOCUMENT.read_text("utf-8").split(f"## {ITEMS[name].label}: ")[1].split("\n## ")[0]
+    text = DOCUMENT.read_text("utf-8").split(f"## {HUANG.items[name].label}: ")[1].split("\n## ")[0]
     rows = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("| ")]
     return {row[0].replace("\\", ""): row[3:] for row in rows[2:]}
 
 
 def computed(names: tuple[str, ...], *, fast: bool):
-    jobs = jobs_of(HUANG2025, names, fast)
-    return gather(HUANG2025, names, run_jobs(jobs, lambda *_: None, workers=2))
+    jobs = jobs_of(HUANG, names, fast)
+    return gather(HUANG, names, run_jobs(jobs, lambda *_: None, workers=2))
 
 
 def ends(text: str) -> tuple[float, float]:
@@ -55,7 +56,7 @@ def test_table_one_of_the_first_seed_lies_in_the_documents_range() -> None:
 def test_the_whole_document_is_what_the_code_gives() -> None:
     """Same seeds, same code: the printed digits, but for what tells the machine's speed."""
     fast = "--fast" in DOCUMENT.read_text("utf-8").split("\n## ")[0]  # as the command that made it
-    for name, shown in computed(tuple(HUANG2025.items), fast=fast).items():
+    for name, shown in computed(tuple(HUANG.items), fast=fast).items():
         if not shown.item.lines:
             continue
         document = documented(name)

@@ -1,7 +1,12 @@
 """The declared paper is whole: every table and figure, every experiment, every printed number."""
 
+import inspect
+
 from vftcli.evaluation.print_table import TABLE_1
-from vftcli.reproduction.huang2025 import EXPERIMENTS, ITEMS
+from vftcli.reproduction.jobs import RUNS
+from vftcli.reproduction.paper import PAPERS
+
+EXPERIMENTS, ITEMS = PAPERS["huang2025"].experiments, PAPERS["huang2025"].items
 
 
 def test_no_table_and_no_figure_is_missing() -> None:
@@ -18,6 +23,12 @@ def test_no_table_and_no_figure_is_missing() -> None:
 def test_every_experiment_is_shown_and_every_item_has_its_own() -> None:
     shown = {name for item in ITEMS.values() for name in item.experiments}
     assert shown == set(EXPERIMENTS)
+
+
+def test_every_experiment_gives_its_function_what_that_asks_for() -> None:
+    for experiment in EXPERIMENTS.values():
+        inspect.signature(RUNS[experiment.run]).bind(experiment.seeds[0], **experiment.given)
+    assert {experiment.run for experiment in EXPERIMENTS.values()} == set(RUNS)
 
 
 def test_table_one_prints_what_the_published_table_does() -> None:
@@ -41,6 +52,21 @@ def test_what_is_printed_from_detection_on_stands_beside_what_is_timed_so() -> N
         assert printed == dict(
             zip(("reaction/1", "reaction/2", "stop/1", "stop/2"), numbers, strict=True)
         )
+
+
+def test_a_row_of_several_is_a_line_for_each_with_its_own_print() -> None:
+    """Table II prints 10.869 s to 58.363 s; Fig. 7 one advance of 0.64 s for both phases."""
+    times = [line for line in ITEMS["table2"].lines if line.key.startswith("seconds/")]
+    assert [line.label for line in times] == [
+        f"{name}: time" for name in ("FDO", "GMO", "KFO-FE", "KFO-ZOH")
+    ]
+    assert [line.number for line in times] == [10.869, 10.541, 17.578, 58.363]
+    assert not any(line.compared for line in times)
+    turns = [line for line in ITEMS["fig7"].lines if line.key.startswith("turn/1.9/")]
+    assert [(line.label.split(", ")[-1], line.printed) for line in turns] == [
+        ("phase I", "0.64"),
+        ("phase II", "0.64"),
+    ]
 
 
 def test_keys_stand_once_in_an_item() -> None:

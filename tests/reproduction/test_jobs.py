@@ -3,8 +3,7 @@
 import pytest
 
 from vftcli.reproduction.jobs import Job, gather, jobs_of, run_jobs
-from vftcli.reproduction.paper import CORRECTED, RunResult
-from vftcli.reproduction.papers import PAPERS
+from vftcli.reproduction.paper import CORRECTED, PAPERS, RunResult
 
 HUANG = PAPERS["huang2025"]
 

@@ -2,8 +2,7 @@
 
 import pytest
 
-from vftcli.reproduction.paper import PrintedLine
-from vftcli.reproduction.papers import PAPERS, paper_of
+from vftcli.reproduction.paper import PAPERS, PrintedLine, paper_of
 from vftcli.signals.errors import ParameterError
 
 HUANG = PAPERS["huang2025"]

@@ -117,6 +117,7 @@ def test_a_share_of_the_coulomb_torque_gives_before_it_slides():
         (FrictionSpec(presliding=1.2), "friction.presliding is 1.2; it is a share, 0 to 1"),
         (FrictionSpec(presliding=-0.1), "friction.presliding is -0.1"),
         (FrictionSpec(presliding_length=0.0), "friction.presliding_length is 0 rad"),
+        (FrictionSpec(stribeck_velocity=1e-300), "friction.stribeck_velocity is 1e-300 rad/s"),
     ],
 )
 def test_what_no_joint_has_is_refused(spec, words):

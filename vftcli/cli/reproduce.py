@@ -45,7 +45,7 @@ def reproduce(
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
     from vftcli.reproduction.page import files_of, short_overview, write_reproduction
-    from vftcli.reproduction.papers import paper_of
+    from vftcli.reproduction.paper import paper_of
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli reproduce")

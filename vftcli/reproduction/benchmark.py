@@ -18,6 +18,7 @@ from vftcli.observers import BEST, PAPER
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.reproduction.paper import PAPERS
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.recording import Recording
@@ -30,8 +31,8 @@ FREE_SECONDS = 8.0
 TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
 SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
 LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
-#: The paper's total times over 30 060 samples on its laptop. [s]
-PAPER_TABLE_2 = {"fdo": 10.869, "gmo": 10.541, "kfo-fe": 17.578, "kfo-zoh": 58.363}
+#: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
+PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 
 
 @dataclass
@@ -107,7 +108,7 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
         "samples": samples,
         "rounds": rounds,
         "observers": [
-            {"name": name, **timings.row(name, samples), "paper_s": PAPER_TABLE_2.get(name)}
+            {"name": name, **timings.row(name, samples), "paper_s": PRINTED[f"seconds/{name}"]}
             for name in PAPER
         ],
         "complete_log": [

@@ -1,6 +1,9 @@
 """Table I and Fig. 3: the tapped circle, judged by the difference to its free cycle."""
 
+from typing import Any
+
 import numpy as np
+import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
@@ -11,69 +14,67 @@ from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_run import Models
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
 from vftcli.simulation import load_scenario, simulate
 
-SCENARIO = "ur5-table1"
-
-EQUAL = "at 1.59 Hz"  #: Every observer moved to FDO's bandwidth, 10 rad/s.
-#: Variant → its observers.
-VARIANTS = {
-    AS_PRINTED: ObserverChoice(names=PAPER, as_printed=True),
-    CORRECTED: ObserverChoice(names=PAPER),
-    DENSITY: ObserverChoice.parsed(observer=PAPER, assignments=["kfo.noise_convention=density"]),
-    EQUAL: ObserverChoice.parsed(observer=PAPER, match="bandwidth=1.59"),
+#: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10 rad/s.
+VARIANTS: dict[str, dict[str, Any]] = {
+    AS_PRINTED: {"as_printed": True},
+    CORRECTED: {},
+    DENSITY: {"assignments": ["kfo.noise_convention=density"]},
+    "at 1.59 Hz": {"match": "bandwidth=1.59"},
 }
-#: The paper's difference: cycle by cycle, neither corrected nor filtered.
-PRINTED_REFERENCE = FreeChoice(period=4.0, alignment="period", low_pass=None)
-FREE = 4.0  #: Length of the free cycle, and from when on its estimates are judged. [s]
 
 
-def tapped_circle(seed: int) -> RunResult:
-    """Errors joint by joint, lags, what the free cycle reads, and the guidelines' facts."""
-    recording = simulate(load_scenario(SCENARIO, ()), seed).recording
-    robot, models = load_robot("ur5"), Models()
-    values: Values = {}
-    charts = {}
-    for variant, observers in VARIANTS.items():
+def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
+    """Errors joint by joint, lags, rms of the free cycle, and the guidelines' facts.
+
+    Args:
+        seed: Of the simulation.
+        scenario: Its name.
+        period: Length of a cycle, the first of which nobody touches. [s]
+    """
+    recording = simulate(load_scenario(scenario, ()), seed).recording
+    robot, models, result = load_robot("ur5"), Models(), RunResult()
+    # The paper's difference: cycle by cycle, neither corrected nor filtered.
+    free = FreeChoice(period=period, alignment="period", low_pass=None)
+    for variant, chosen in VARIANTS.items():
         choice = AnalysisChoice(
-            observers=observers,
-            free=PRINTED_REFERENCE,
+            observers=ObserverChoice.parsed(observer=PAPER, **chosen),
+            free=free,
             contacts=False,
             reference=ReferenceChoice(name="two-cycle"),
         )
         made = analyse(recording, robot, choice, models)
-        add_errors(values, variant, made)
-        add_facts(values, variant, made)
+        put_errors(result, variant, made, period)
+        put_facts(result, variant, made)
         if variant == CORRECTED:
             chart = torque_chart(made)
             # Four bands would hide one another.
             lines = (line._replace(shown=True, leads=False, half=None) for line in chart.series)
-            title = "External torque: observers and reference"
-            charts["fig3"] = chart._replace(key="fig3", title=title, series=tuple(lines))
-    return RunResult(values, charts)
+            result.charts["fig3"] = chart._replace(series=tuple(lines))
+    return result
 
 
-def add_errors(values: Values, variant: str, made: Analysis) -> None:
+def put_errors(result: RunResult, variant: str, made: Analysis, period: float) -> None:
     """RMSE and floor by joint, lag and free rms as means of joints 1 to 3."""
     assert made.errors is not None, "a reference was asked for"
-    lags: dict[str, list[float]] = {}
-    for row in made.errors.filter(made.errors["joint"].is_not_null()).iter_rows(named=True):
-        line = values.setdefault(f"{row['observer']}/{row['joint']}", {})
-        line[variant] = row["rmse_Nm"]
-        line[FLOOR] = row["reference_floor_Nm"]
-        if row["joint"] <= 3 and row["lag_s"] is not None:
-            lags.setdefault(row["observer"], []).append(row["lag_s"])
+    rows = made.errors.filter(pl.col("joint").is_not_null())
+    for row in rows.iter_rows(named=True):
+        key = f"{row['observer']}/{row['joint']}"
+        result.put(variant, {key: row["rmse_Nm"]})
+        result.put(FLOOR, {key: row["reference_floor_Nm"]})
     for estimate in made.estimates:
-        free = (estimate.t > 1.0) & (estimate.t < FREE)
+        free = (estimate.t > 1.0) & (estimate.t < period)
         rms = float(np.sqrt(np.mean(estimate.tau[free, :3] ** 2)))
-        values.setdefault(f"free/{estimate.name}", {})[variant] = rms
-        if found := lags.get(estimate.name):
-            values.setdefault(f"lag/{estimate.name}", {})[variant] = float(np.mean(found))
+        result.put(variant, {f"free/{estimate.name}": rms})
+        own = rows.filter((pl.col("observer") == estimate.name) & (pl.col("joint") <= 3))
+        if lags := own["lag_s"].drop_nulls().to_list():
+            result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
 
 
-def add_facts(values: Values, variant: str, made: Analysis) -> None:
+def put_facts(result: RunResult, variant: str, made: Analysis) -> None:
     """What the guidelines go by."""
     for fact in facts(made.observers, made.tunings, made.motion.log, made.errors):
         found = {
@@ -83,5 +84,4 @@ def add_facts(values: Values, variant: str, made: Analysis) -> None:
             "rmse": fact.rmse,
             "numbers": float(fact.parameter_count),
         }
-        for key, value in found.items():
-            values.setdefault(f"{key}/{fact.name}", {})[variant] = value
+        result.put(variant, {f"{key}/{fact.name}": value for key, value in found.items()})

@@ -14,11 +14,27 @@ from dataclasses import replace
 from itertools import chain
 from typing import NamedTuple
 
-from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem
-from vftcli.reproduction.papers import paper_of
+from vftcli.reproduction.circle import tapped_circle
+from vftcli.reproduction.control import closed_loop, latest_turns, released
+from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem, paper_of
+from vftcli.reproduction.sensor import assembled_bearing, dragged_sensor
+from vftcli.reproduction.timing import computing_time
 from vftcli.signals.errors import VftError
 
 MOST_WORKERS = 2  #: Processes beside one another: what a full run was measured with.
+#: Name of an experiment's `run` → what it gives of a seed and the experiment's own arguments.
+RUNS: dict[str, Callable[..., RunResult]] = {
+    run.__name__: run
+    for run in (
+        assembled_bearing,
+        closed_loop,
+        computing_time,
+        dragged_sensor,
+        latest_turns,
+        released,
+        tapped_circle,
+    )
+}
 
 
 class Job(NamedTuple):
@@ -29,8 +45,8 @@ class Job(NamedTuple):
     seed: int  #: Of everything drawn.
 
 
-#: Told how many jobs are done, how many there are, and which one ended.
-Told = Callable[[int, int, str], None]
+#: Hears how many jobs are done, how many there are, and which one ended.
+Hearer = Callable[[int, int, str], None]
 Result = RunResult | str  #: What a job gave, or the one line on why it failed.
 
 
@@ -52,18 +68,11 @@ def perform(job: Job) -> Result:
     """Run a job; what it cannot do is one line."""
     experiment = paper_of(job.paper).experiments[job.experiment]
     try:
-        made = experiment.work(job.seed)
+        made = RUNS[experiment.run](job.seed, **experiment.given)
     except (VftError, ArithmeticError) as error:
         return f"{experiment.title}, seed {job.seed}: {error}"
     # Traces are those of the first seed: the others' would only be carried about.
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
-
-
-def cores() -> int:
-    """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def end_with_terminal() -> None:
@@ -71,11 +80,12 @@ def end_with_terminal() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def run_jobs(jobs: Sequence[Job], tell: Told, workers: int | None = None) -> dict[Job, Result]:
+def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> dict[Job, Result]:
     """Run jobs, those that take the time last and by themselves."""
     alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
     beside = [job for job in jobs if job not in alone]
-    count = min(workers or min(cores(), MOST_WORKERS), len(beside))
+    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    count = min(workers or min(own or 1, MOST_WORKERS), len(beside))
     found: dict[Job, Result] = {}
     for job, result in chain(pooled(beside, count), ((job, perform(job)) for job in alone)):
         found[job] = result
@@ -114,13 +124,13 @@ def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> di
 def shown(name: str, item: PaperItem, results: dict[Job, Result]) -> ShownItem:
     """One item with its values, a list over the seeds for each."""
     values: dict[str, dict[str, list[float | None]]] = {}
-    own = {job: r for job, r in results.items() if job.experiment in item.experiments}
-    made = [r for r in own.values() if isinstance(r, RunResult)]
-    keys = {line.key for line in item.lines}
+    own = [result for job, result in results.items() if job.experiment in item.experiments]
+    made = [result for result in own if isinstance(result, RunResult)]
     for one in made:
-        for key in keys & one.values.keys():
-            for variant, value in one.values[key].items():
-                values.setdefault(key, {}).setdefault(variant, []).append(value)
+        for line in item.lines:
+            for variant, value in one.values.get(line.key, {}).items():
+                values.setdefault(line.key, {}).setdefault(variant, []).append(value)
     charts = [one.charts[name] for one in made if name in one.charts]
-    failures = tuple(r for r in own.values() if isinstance(r, str))
-    return ShownItem(item, values, charts[0] if charts else None, failures)
+    chart = charts[0]._replace(key=name, title=item.traces) if charts else None
+    failures = tuple(result for result in own if isinstance(result, str))
+    return ShownItem(item, values, chart, failures)

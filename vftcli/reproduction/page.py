@@ -1,6 +1,7 @@
 """How a reproduction is shown: one page and one Markdown of the same tables, and figures."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from html import escape
 
@@ -27,7 +28,7 @@ RATIOS = (
 
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
     """Every file that a folder of these items may hold; `form` is what figures are written as."""
-    drawn = [name for name in names if paper.items[name].drawn]
+    drawn = [name for name in names if paper.items[name].traces]
     return [PAGE, TEXT, SEAL, *figure_files(form, drawn)]
 
 
@@ -83,25 +84,9 @@ def beside_print(shown: ShownItem) -> str:
     return text if low == high else f"{text} ({low} … {high})"
 
 
-def short_overview(found: Mapping[str, ShownItem]) -> Grid:
-    """Every item in a row that fits a terminal: ours over the print, and what came of it."""
-    columns = Column("item", words=True), Column("ours / print"), Column("reproduced", words=True)
-    rows = [
-        (shown.item.label, beside_print(shown), "; ".join(shown.failures) or shown.item.verdict)
-        for shown in found.values()
-    ]
-    return Grid(columns=columns, rows=tuple(rows))
-
-
 def overview(found: Mapping[str, ShownItem]) -> Grid:
     """Every item in a row: what it shows, ours over the print, and what came of it."""
-    columns = (
-        Column("item", words=True),
-        Column("what it shows", words=True),
-        Column("ours / print"),
-        Column("ours", words=True),
-        Column("reproduced", words=True),
-    )
+    heads = "item", "what it shows", "ours / print", "ours", "reproduced"
     rows = [
         (
             GridCell(shown.item.label, html=f'<a href="#{name}">{escape(shown.item.label)}</a>'),
@@ -112,7 +97,14 @@ def overview(found: Mapping[str, ShownItem]) -> Grid:
         )
         for name, shown in found.items()
     ]
+    columns = tuple(Column(head, words=head != "ours / print") for head in heads)
     return Grid(columns=columns, rows=tuple(rows))
+
+
+def short_overview(found: Mapping[str, ShownItem]) -> Grid:
+    """The same in rows that fit a terminal: item, ours over the print, what came of it."""
+    grid = overview(found)
+    return replace(grid, columns=grid.columns[::2], rows=tuple(row[::2] for row in grid.rows))
 
 
 def wrapped(text: str) -> GridCell:
@@ -134,19 +126,16 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
 
 def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
-    charts = [shown.chart for shown in found.values() if shown.chart is not None]
+    about = lead(f"{paper.title}.") + lead(*paper.setting)
     parts = [
-        top(
-            (paper.name, f"doi {paper.doi}"),
-            "The paper, run again",
-            lead(f"{paper.title}.") + lead(*paper.setting),
-        ),
+        top((paper.name, f"doi {paper.doi}"), "The paper, run again", about),
         html(overview(found)),
         soft(RATIOS),
         *(item_section(name, shown) for name, shown in found.items()),
         "<h2>What was run</h2>",
         bullets(seeds_line(jobs, paper)),
     ]
+    charts = [shown.chart for shown in found.values() if shown.chart is not None]
     return document(f"{paper.name}, reproduced", "".join(parts), charts)
 
 
@@ -155,18 +144,13 @@ def item_section(name: str, shown: ShownItem) -> str:
     item = shown.item
     parts = [f'<h2 id="{name}">{escape(item.label)}: {escape(item.title)}</h2>']
     parts += [f'<p class="alarm">{escape(line)}</p>' for line in shown.failures]
-    parts.append(f"<p><strong>{escape(capital(item.verdict))}.</strong> {escape(item.why)}</p>")
+    parts.append(f"<p><strong>{escape(item.answer)}</strong> {escape(item.why)}</p>")
     if item.lines:
         parts.append(html(item_grid(shown)))
     if shown.chart is not None:
         drawn = multiples(shown.chart) + large(shown.chart)
         parts.append(section("Traces", drawn, shown.chart.title, opened=True))
     return "".join(parts)
-
-
-def capital(text: str) -> str:
-    """A sentence's first letter made large."""
-    return text[:1].upper() + text[1:]
 
 
 def render_markdown(
@@ -185,7 +169,7 @@ def render_markdown(
         item = shown.item
         parts.append(f"## {item.label}: {item.title}\n")
         parts += [f"**Failed:** {line}\n" for line in shown.failures]
-        parts.append(f"**{capital(item.verdict)}.** {item.why}\n")
+        parts.append(f"**{item.answer}** {item.why}\n")
         if item.lines:
             parts.append(markdown(item_grid(shown)))
     parts.append("## What was run\n")

@@ -1,13 +1,16 @@
 """What a paper is here: its tables and figures, what they print, and what measures the same.
 
-A paper is a file that declares one `Paper`; how its experiments run, and how they are shown, is
-the same for all.
+A paper is a file of TOML beside this one; how its experiments run, and how they are shown, is the
+same for all.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from vftcli.evaluation.print_table import TABLES, Published
 from vftcli.outputs.page.charts import Chart
 from vftcli.signals.errors import ParameterError
 
@@ -22,17 +25,23 @@ Values = dict[str, dict[str, float | None]]
 class RunResult:
     """What one run of an experiment gave."""
 
-    values: Values  #: Its numbers.
-    charts: Mapping[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.
+    values: Values = field(default_factory=dict)  #: Its numbers.
+    charts: dict[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.
+
+    def put(self, variant: str, found: Mapping[str, float | None]) -> None:
+        """Add one variant's values by the key of their line."""
+        for key, value in found.items():
+            self.values.setdefault(key, {})[variant] = value
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Experiment:
     """One experiment, which several tables and figures may show."""
 
     title: str  #: What it is, with its scenario.
-    work: Callable[[int], RunResult]  #: Seed → what came out.
-    seeds: tuple[int, ...] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
+    run: str  #: Name of the function that runs it.
+    given: Mapping[str, Any] = field(default_factory=dict)  #: Its arguments beside the seed.
+    seeds: Sequence[int] = (1, 2, 3, 4, 5)  #: Those of a full run; ``--fast`` takes the first.
     alone: bool = False  #: Whether nothing may run beside it, because it takes the time.
 
 
@@ -43,9 +52,7 @@ class PrintedLine(NamedTuple):
     label: str  #: What it is.
     unit: str = ""  #: Its unit, "" for none.
     printed: str = ""  #: What the paper prints, "" for nothing.
-    #: Whether ours over the print says anything: not where it is another machine's time or another
-    #: arm's error.
-    compared: bool = True
+    compared: bool = True  #: Whether ours over the print says anything.
 
     @property
     def number(self) -> float | None:
@@ -64,12 +71,17 @@ class PaperItem:
     title: str  #: What it shows.
     why: str  #: Why ours differs, or why nothing can be compared, in a sentence.
     verdict: str  #: Whether it is reproduced, in a few words.
-    experiments: tuple[str, ...] = ()  #: Those that it shows; none for a picture.
-    lines: tuple[PrintedLine, ...] = ()  #: Its table.
+    experiments: Sequence[str] = ()  #: Those that it shows; none for a picture.
+    lines: Sequence[PrintedLine] = ()  #: Its table.
     #: Columns of ours between the print and the floor.
-    variants: tuple[str, ...] = (AS_PRINTED, CORRECTED)
+    variants: Sequence[str] = (AS_PRINTED, CORRECTED)
     nearest: str = CORRECTED  #: The column of ours that is set beside the print in the overview.
-    drawn: bool = False  #: Whether it has traces.
+    traces: str = ""  #: What its chart shows, "" if it has none.
+
+    @property
+    def answer(self) -> str:
+        """The verdict as a sentence."""
+        return f"{self.verdict[:1].upper()}{self.verdict[1:]}."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,7 +93,7 @@ class Paper:
     doi: str  #: Its identifier.
     experiments: Mapping[str, Experiment]  #: Name → experiment.
     items: Mapping[str, PaperItem]  #: Name → table or figure, in the paper's order.
-    setting: tuple[str, ...]  #: How it is run, in sentences.
+    setting: Sequence[str]  #: How it is run, in sentences.
 
     def chosen(self, only: str | None) -> tuple[str, ...]:
         """The names of these items, all if none are named."""
@@ -103,4 +115,56 @@ class ShownItem:
     #: Key of a line → variant → one value a seed.
     values: Mapping[str, Mapping[str, Sequence[float | None]]]
     chart: Chart | None  #: Its traces, of the first seed.
-    failures: tuple[str, ...]  #: One line for each run that failed.
+    failures: Sequence[str]  #: One line for each run that failed.
+
+
+def load_paper(name: str) -> Paper:
+    """The paper that a file beside this one declares, which explains its entries."""
+    text = Path(__file__).with_name(f"{name}.toml").read_text(encoding="utf-8")
+    declared = tomllib.loads(text)
+    each, items = declared.pop("each"), {}
+    for key, entry in declared.pop("items").items():
+        lines = [line for row in entry.pop("lines", ()) for line in lines_of(row, each)]
+        if published := entry.pop("published", None):
+            lines += published_lines(TABLES[published], each["observer"])
+        items[key] = PaperItem(**entry, lines=lines)
+    experiments = {key: Experiment(**entry) for key, entry in declared.pop("experiments").items()}
+    return Paper(name=name, experiments=experiments, items=items, **declared)
+
+
+def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[PrintedLine]:
+    """The lines that a row means: one, or one for each key of the name in its braces."""
+    line = PrintedLine(*row)
+    name = next((name for name in each if f"{{{name}}}" in line.key), None)
+    if name is None:
+        return [line]
+    one = isinstance(line.printed, str)
+    numbers = [line.printed] * len(each[name]) if one else line.printed
+    return [
+        line._replace(
+            key=line.key.format(**{name: key}),
+            label=line.label.format(**{name: word}),
+            printed=number,
+        )
+        for (key, word), number in zip(each[name].items(), numbers, strict=True)
+    ]
+
+
+def published_lines(table: Published, names: Mapping[str, str]) -> list[PrintedLine]:
+    """A line for each observer and joint of a printed table."""
+    return [
+        PrintedLine(f"{observer}/{j}", f"{names[observer]}, J{j}", "N·m", f"{number:.4f}")
+        for observer, numbers in table.rmse.items()
+        for j, number in enumerate(numbers, start=1)
+    ]
+
+
+#: Name at the command line → the paper: another one is one more file and one more name here.
+PAPERS = {name: load_paper(name) for name in ("huang2025",)}
+
+
+def paper_of(name: str) -> Paper:
+    """The paper of this name."""
+    if name not in PAPERS:
+        raise ParameterError(f"no paper {name!r}; there is {', '.join(PAPERS)}")
+    return PAPERS[name]

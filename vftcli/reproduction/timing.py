@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.observers import PAPER, KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.reproduction.benchmark import SAMPLES, Timings, circle, one_core
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, RunResult, Values
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, RunResult
 from vftcli.robots import load_robot
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.terms import dynamics_terms
@@ -17,24 +17,22 @@ from vftcli.signals.arrays import Array
 #: Samples the paper's way runs over, one after another; its time is scaled to all samples.
 SCRIPT_SAMPLES = 1_500
 ROUNDS = 3  #: Interleaved repetitions; the median counts.
-#: Observer → key of how much more the zero-order hold costs.
-RATIOS = {"fdo": "zoh/fdo", "kfo-fe": "zoh/kfo-fe"}
 
 
 def computing_time(_seed: int) -> RunResult:
     """Seconds for the paper's samples by observer, dynamics in each, and the printed ratios."""
     with one_core():
         timings = timed()
-    values: Values = {}
+    result = RunResult()
     for variant in (AS_PRINTED, CORRECTED):
         dynamics = timings.median(f"{variant} dynamics")
         cost = {name: dynamics + timings.median(f"{variant} {name}") for name in PAPER}
-        for name in PAPER:
-            values.setdefault(f"seconds/{name}", {})[variant] = cost[name]
-            values.setdefault(f"cost/{name}", {})[variant] = 1e6 * cost[name] / SAMPLES
-        for name, key in RATIOS.items():
-            values.setdefault(key, {})[variant] = cost["kfo-zoh"] / cost[name]
-    return RunResult(values)
+        for name, seconds in cost.items():
+            result.put(variant, {f"seconds/{name}": seconds})
+            result.put(variant, {f"cost/{name}": 1e6 * seconds / SAMPLES})
+        for name in ("fdo", "kfo-fe"):
+            result.put(variant, {f"zoh/{name}": cost["kfo-zoh"] / cost[name]})
+    return result
 
 
 def timed() -> Timings:
@@ -54,17 +52,17 @@ def timed() -> Timings:
     # Both first-order observers run in one loop: each is half of it.
     both = partial(first_order_loops, short.p, short.mu, step)
     scripts: dict[str, tuple[Callable[[], object], float]] = {
-        f"{AS_PRINTED} dynamics": (partial(literal_momentum_terms, robot.model, q, dq), 1.0),
-        f"{AS_PRINTED} fdo": (both, 0.5),
-        f"{AS_PRINTED} gmo": (both, 0.5),
-        f"{AS_PRINTED} kfo-fe": (dense, 1.0),
-        f"{AS_PRINTED} kfo-zoh": (partial(dense, rebuild=True), 1.0),
+        "dynamics": (partial(literal_momentum_terms, robot.model, q, dq), 1.0),
+        "fdo": (both, 0.5),
+        "gmo": (both, 0.5),
+        "kfo-fe": (dense, 1.0),
+        "kfo-zoh": (partial(dense, rebuild=True), 1.0),
     }
     for _ in range(ROUNDS):
         for name, call in work.items():
             timings.measure(name, call)
         for name, (script, share) in scripts.items():
-            timings.measure(name, script, share * SAMPLES / len(q))
+            timings.measure(f"{AS_PRINTED} {name}", script, share * SAMPLES / len(q))
     return timings
 
 

@@ -136,8 +136,9 @@ def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:
     """
     if not 0.0 <= spec.presliding <= 1.0:
         raise ParameterError(f"friction.presliding is {spec.presliding:g}; it is a share, 0 to 1")
-    if why := out_of_bounds("presliding_length", [spec.presliding_length]):
-        raise ParameterError(f"friction.{why}")
+    for name in ("presliding_length", "stribeck_velocity"):
+        if why := out_of_bounds(name, [getattr(spec, name)]):
+            raise ParameterError(f"friction.{why}")
     n = robot.joints
     table = {name: np.zeros(n) for name in SHAPES}
     table |= stated_friction(robot, spec)
