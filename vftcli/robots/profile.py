@@ -27,7 +27,7 @@ from vftcli.signals.schema import (
     TABLE,
     TEXT,
     TEXTS,
-    Kind,
+    ValueKind,
     several,
 )
 
@@ -276,7 +276,7 @@ ADMITTANCE = {
     "position": TABLE,
     "rotation": TABLE,
     "source": TEXT,
-    "start": Kind("one number a joint", several(1).fits),
+    "start": ValueKind("one number a joint", several(1).fits),
     "threshold_mode": TEXT,
 }
 

@@ -11,7 +11,7 @@ from vftcli.robots.bounds import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
 from vftcli.signals.parsing import toml_tables
-from vftcli.signals.schema import NUMBER, TABLE, TEXT, Kind, tables, vector, word_of
+from vftcli.signals.schema import NUMBER, TABLE, TEXT, ValueKind, tables, vector, word_of
 
 #: Endings of robot descriptions; what they are their content decides.
 DESCRIPTIONS = (".urdf", ".xml", ".xacro", ".mjcf", ".sdf")
@@ -78,7 +78,7 @@ class Section(NamedTuple):
             whose = f"joint {self.joint + 1}{f' ({label})' if label else ''}: "
         raise RobotError(f"{where}: {whose}{message}")
 
-    def value(self, key: str, kind: Kind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
+    def value(self, key: str, kind: ValueKind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
         """The value of a key, `default` if it is absent, or a complaint about its line."""
         if key in self.values:
             if why := kind.broken(key, self.values[key]):
@@ -87,7 +87,9 @@ class Section(NamedTuple):
             self.refuse(f"{key} is missing; it must be {kind.words}", key)
         return self.values.get(key, default)
 
-    def bounded(self, key: str, kind: Kind, default: Sequence[float] | None = None) -> list[float]:
+    def bounded(
+        self, key: str, kind: ValueKind, default: Sequence[float] | None = None
+    ) -> list[float]:
         """The numbers of a key, each of them such as robots have."""
         value = self.value(key, kind, default)
         found = [float(item) for item in (value if isinstance(value, list) else [value])]

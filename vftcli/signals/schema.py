@@ -11,7 +11,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers, shown
 
 
-class Kind(NamedTuple):
+class ValueKind(NamedTuple):
     """One kind of value."""
 
     words: str  #: What such a value is, as it ends "it must be …".
@@ -37,46 +37,46 @@ def is_finite(value: object) -> bool:
         return False
 
 
-def several(least: int) -> Kind:
+def several(least: int) -> ValueKind:
     """The kind of a list of so many numbers or more."""
     words = f"a list of at least {least} finite numbers"
-    return Kind(words, lambda v: LIST.fits(v) and len(v) >= least and all(map(is_finite, v)))
+    return ValueKind(words, lambda v: LIST.fits(v) and len(v) >= least and all(map(is_finite, v)))
 
 
-def vector(length: int) -> Kind:
+def vector(length: int) -> ValueKind:
     """The kind of a list of so many numbers."""
     words = f"{length} finite numbers"
-    return Kind(words, lambda v: several(length).fits(v) and len(v) == length)
+    return ValueKind(words, lambda v: several(length).fits(v) and len(v) == length)
 
 
-def word_of(known: Iterable[str]) -> Kind:
+def word_of(known: Iterable[str]) -> ValueKind:
     """The kind of a word of a list."""
     there = list(known)
-    return Kind(f"one of {', '.join(there)}", lambda v: v in there)
+    return ValueKind(f"one of {', '.join(there)}", lambda v: v in there)
 
 
-def tables(key: str) -> Kind:
+def tables(key: str) -> ValueKind:
     """The kind of the ``[[key]]`` tables."""
     words = f"tables, each headed [[{key}]]"
-    return Kind(words, lambda v: LIST.fits(v) and all(map(TABLE.fits, v)))
+    return ValueKind(words, lambda v: LIST.fits(v) and all(map(TABLE.fits, v)))
 
 
-def one_each(of: str, fits: Callable[[Any], bool]) -> Kind:
+def one_each(of: str, fits: Callable[[Any], bool]) -> ValueKind:
     """The kind of a number, or a list with one for each."""
     words = f"a number or one {of}"
-    return Kind(words, lambda v: v != [] and all(map(fits, v if LIST.fits(v) else [v])))
+    return ValueKind(words, lambda v: v != [] and all(map(fits, v if LIST.fits(v) else [v])))
 
 
-NUMBER = Kind("a finite number", is_finite)
-WHOLE = Kind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool))
-SWITCH = Kind("true or false", lambda v: isinstance(v, bool))
-TEXT = Kind("text in quotes", lambda v: isinstance(v, str))
-LIST = Kind("a list", lambda v: isinstance(v, list | tuple))
-TEXTS = Kind(
+NUMBER = ValueKind("a finite number", is_finite)
+WHOLE = ValueKind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool))
+SWITCH = ValueKind("true or false", lambda v: isinstance(v, bool))
+TEXT = ValueKind("text in quotes", lambda v: isinstance(v, str))
+LIST = ValueKind("a list", lambda v: isinstance(v, list | tuple))
+TEXTS = ValueKind(
     "text in quotes, or a list of it",
     lambda v: TEXT.fits(v) or (LIST.fits(v) and all(map(TEXT.fits, v))),
 )
-TABLE = Kind("a section", lambda v: isinstance(v, Mapping))
+TABLE = ValueKind("a section", lambda v: isinstance(v, Mapping))
 PER_JOINT = one_each("a joint", is_finite)
 PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
 

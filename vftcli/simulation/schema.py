@@ -8,7 +8,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.schema import LIST, SWITCH, TABLE, TEXT, WHOLE, Kind, is_finite
+from vftcli.signals.schema import LIST, SWITCH, TABLE, TEXT, WHOLE, ValueKind, is_finite
 
 Section = TypeVar("Section")
 
@@ -17,7 +17,7 @@ LARGEST = 1e10
 #: Type of a field → its kind.
 KINDS = {
     bool: SWITCH,
-    float: Kind(
+    float: ValueKind(
         f"a finite number, {LARGEST:g} at most", lambda v: is_finite(v) and abs(v) <= LARGEST
     ),
     int: WHOLE,
