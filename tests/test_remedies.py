@@ -485,8 +485,6 @@ REFUSALS = [
     Row("no joint positions (q)", lambda f: renamed(sound(), "q", "zz", f), "columns",
         "q=zz{i},dq=dzz{i}"),
     Row("no repetition found", of(lambda t: t.between(4.5, 9.0), *TWO_CYCLE), "free", free_log),
-    Row("needs a free part", of(lambda t: t.between(4.5, 9.0), *PUSHED, "--remove-bias", "model"),
-        "free", free_log),
     Row("there is no Jacobian for it", of(
         lambda t: t.between(0.0, 4.0), *PUSHED, "--frame", "tool"), "tool", "0,0,0.1"),
     Row("a release needs an arm", lambda _: ["admit", "--release", "x=0.3"], "robot", "ur5"),

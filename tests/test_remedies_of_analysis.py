@@ -269,11 +269,10 @@ DEARER = [
 
 WITHOUT_ROW: dict[str, tuple[str, ...]] = {
     "names only the option that is wrong, or the words it takes": (
-        "no such admittance parameter. Sections", "is not a number or a list",
-        "--release … is not …", "rad; it must be less than π", "holds no sample of the log",
+        "no such admittance parameter. Sections", "--release … is not …",
+        "rad; it must be less than π", "holds no sample of the log",
         "is not a positive number of false alarms per hour", "--method …; there is …",
-        "is not delay=S (seconds) or bandwidth=HZ", "--set … is not …", "--figures … is not",
-        "--rrd-detail … is none of", "is not rmse, delay=S, bandwidth=HZ",
+        "--set … is not …", "--figures … is not", "--rrd-detail … is none of",
         "is not a positive number or one a joint [N·m]", "values; give one, or one for each of",
         "is not a positive time in seconds", "is not a positive cutoff in Hz",
         "is not a list of cycle numbers such as", "names no cycle; they count from 1",

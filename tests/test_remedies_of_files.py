@@ -321,7 +321,7 @@ WITHOUT_ROW = {
         "--columns: … has no unit", "has no field", "is neither a number, as in 0, nor all",
         "--columns turns the sign of the clock", "names a column of … twice",
         "is no address, as tcp", "--tip …: ", "--reference-columns names no tau_ext",
-        "is for a xacro, which this is not",
+        "is for a xacro, which this is not", "is not a number or a list",
     ),
     NOTHING: (
         "and none ran", "is what an MJCF gives its joints", "the xacro cannot be expanded",
