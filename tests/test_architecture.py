@@ -270,7 +270,7 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 64_497,
+    "lines of Python": 64_496,
     "files": 451,
     "functions": 3459,
     "functions over 60 lines": 12,

@@ -73,6 +73,8 @@ def test_which_assignments_are_ours() -> None:
         ("threshold_mode=medium", "there is hard, soft"),
         ("position.weight=3", "no such admittance parameter"),
         ("sideways.mass=3", "no such admittance parameter"),
+        ("position.period=0.01", "no such admittance parameter"),
+        ("start=1", "no such admittance parameter"),
     ],
 )
 def test_wrong_parameters_are_one_clear_line(assignment: str, words: str) -> None:

@@ -101,7 +101,7 @@ class Admittance:
 
     def with_alpha(self, alpha: float) -> "Admittance":
         """The same with one α for all axes."""
-        return replace(self, alpha=np.full(6, float(alpha)))
+        return replace(self, alpha=np.full(6, alpha))
 
 
 PER_AXIS = {key.name: key for key in fields(Admittance) if key.metadata}
@@ -175,12 +175,11 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     """
     settings: dict[str, dict[str, Any]] = {}
     for text in assignments:
-        form = "SECTION.PARAMETER=VALUE, as position.stiffness=12"
-        left, value = assignment(text, "--set", form)
-        section, dot, name = left.rpartition(".")
-        section = section if dot else "admittance"
+        left, value = assignment(text, "--set", "SECTION.PARAMETER=VALUE, as position.stiffness=12")
+        section, _, name = (left if "." in left else f"admittance.{left}").rpartition(".")
         name = LETTERS.get(name.lower(), name)
-        if section not in GROUPS or name not in (*PER_AXIS, *PLAIN):
+        whole = ("period", "threshold_mode", "source") if section == "admittance" else ()
+        if section not in GROUPS or name not in (*PER_AXIS, *whole):
             raise ParameterError(
                 f"--set {text!r}: no such admittance parameter. Sections: {', '.join(GROUPS)}; "
                 f"parameters: {', '.join((*PER_AXIS, 'period'))}"
@@ -206,10 +205,10 @@ def release_deviation(assignments: Sequence[str]) -> Array:
     for part in ",".join(assignments).split(","):
         axis, text = assignment(part, "--release", form)
         value = numbers(text)
-        if axis not in AXES or value is None or not np.isfinite(value[0]):
+        if axis not in AXES or not value or not np.isfinite(value[0]):
             raise ParameterError(f"--release {part!r} is not {form}")
         x[AXES.index(axis)] = value[0]
-    if np.any(np.linalg.norm(x[3:]) >= np.pi):
+    if np.linalg.norm(x[3:]) >= np.pi:
         raise ParameterError(
             f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; it must be less than π"
         )
