@@ -282,10 +282,19 @@ MOST = {
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""
 
 
+def words_of(text: str) -> int:
+    """How many names, operators and numbers code has, those inside of f-strings left out."""
+    code, depth, count = {tokenize.NAME, tokenize.OP, tokenize.NUMBER}, 0, 0
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        kind = tokenize.tok_name[token.type]
+        depth += (kind == "FSTRING_START") - (kind == "FSTRING_END")
+        count += token.type in code and not depth
+    return count
+
+
 @pytest.mark.slow
 def test_the_package_does_not_grow() -> None:
     texts = {file: (PACKAGE / file).read_text("utf-8") for file in modules()}
-    code = {tokenize.NAME, tokenize.OP, tokenize.NUMBER}
     filled = [line for text in texts.values() for line in text.split("\n") if line.strip()]
     every = [f for tree in modules().values() for f in ast.walk(tree) if isinstance(f, FUNCTION)]
     data = [p for p in PACKAGE.rglob("*") if p.suffix in {".toml", ".js", ".css", ".html"}]
@@ -294,11 +303,7 @@ def test_the_package_does_not_grow() -> None:
         "files": len(texts),
         "functions": len(every),
         "functions over 60 lines": sum(f.end_lineno - f.lineno >= 60 for f in every),
-        "names, operators, numbers": sum(
-            token.type in code
-            for text in texts.values()
-            for token in tokenize.generate_tokens(io.StringIO(text).readline)
-        ),
+        "names, operators, numbers": sum(map(words_of, texts.values())),
         "characters a line that is not blank": sum(map(len, filled)) / len(filled),
         "noqa": sum(text.count("# noqa") for text in texts.values()),
         "lines of TOML, JavaScript, CSS": sum(p.read_text("utf-8").count("\n") for p in data),
