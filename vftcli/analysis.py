@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Samples
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.print_table import Comparison
-    from vftcli.refinement.baseline import Baseline
+    from vftcli.refinement.baseline import Baselines
     from vftcli.refinement.refine import Refinement
     from vftcli.repetition.free_motion import FreeMotion
-    from vftcli.repetition.free_run import ModelledRun
+    from vftcli.robots.run import Run
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.sensor_reading import SensorReading
-    from vftcli.virtual_sensor.smoother.observer_wrench import SmootherInput
+    from vftcli.virtual_sensor.smoother.observer_wrench import FreeLog
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -114,20 +114,24 @@ class Analysis(Shown):
             return self.virtual_sensor.wrenches
         return (*self.virtual_sensor.wrenches, replace(reference, name="reference"))
 
-    def terms_of(self, name: str, run: "ModelledRun") -> DynamicsTerms:
-        """P and μ of the log or of one of its free runs, as the observer of this name has them."""
+    def run_of(self, name: str, run: "Run") -> "Run":
+        """The log or one of its free runs, as the observer of this name has it."""
         found = self.refinement
-        return terms_of(found.baseline if found is not None else None, name, run)
+        return run_of(found.baselines if found is not None else None, name, run)
 
-    def smoother_input(self, name: str) -> "SmootherInput":
-        """What the wrench of the observer of this name is smoothed from."""
-        from vftcli.virtual_sensor.smoother.observer_wrench import corrected_input, plain_input
+    def free_log(self, name: str | None = None) -> "FreeLog":
+        """The log with what nobody touched, as an observer has it; for None as the model does."""
+        from vftcli.repetition.free_load import without_load
+        from vftcli.virtual_sensor.smoother.observer_wrench import FreeLog, as_modelled
 
         if self.refinement is None:
-            return plain_input(self.motion)
-        found = self.refinement.baseline
+            return as_modelled(self.motion)
+        found = self.refinement.baselines.plain
         load = found.load if found.untouched else None
-        return corrected_input(self.motion, found.untouched, load, self.terms_of, name)
+        pieces = ((self.run_of(name, run) if name else run, at) for run, at in found.untouched)
+        free = tuple(Samples(without_load(run, load), inside) for run, inside in pieces)
+        log = self.motion.log
+        return FreeLog(self.run_of(name, log) if name else log, free, load)
 
     @property
     def t(self) -> Array:
@@ -135,6 +139,6 @@ class Analysis(Shown):
         return self.recording.t
 
 
-def terms_of(baseline: "Baseline | None", name: str, run: "ModelledRun") -> DynamicsTerms:
-    """P and μ of a recording as one observer of its log has them."""
-    return run.terms if baseline is None else baseline.under(name).terms_of(run)
+def run_of(baselines: "Baselines | None", name: str, run: "Run") -> "Run":
+    """A recording as one observer of its log has it."""
+    return run if baselines is None else baselines.of(name).of(run)

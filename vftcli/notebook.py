@@ -14,9 +14,9 @@ from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import ModelledRun, Models
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, Runs
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
@@ -138,7 +138,7 @@ def thresholds(
     logs = [free] if isinstance(free, Log) else list(free)
     if not logs:
         raise ParameterError("no log is given; thresholds are learned from motion nobody touches")
-    models, runs = Models(), []
+    models, runs = Runs(), []
     for log in logs:
         choice = log_choice(log, robot, (), None, columns, interval)
         runs.append(modelled(*laid(log, robot, choice), choice, models))
@@ -205,12 +205,10 @@ def laid(log: Log, robot: NamedRobot, choice: AnalysisChoice) -> tuple[Recording
 
 def answered(log: Log, robot: NamedRobot, choice: AnalysisChoice, work: Analyser) -> "Analysis":
     """What is asked of one log."""
-    return work(*laid(log, robot, choice), choice, Models())
+    return work(*laid(log, robot, choice), choice, Runs())
 
 
-def modelled(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
-) -> ModelledRun:
+def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:
     """A log laid on its robot, examined.
 
     Raises:
@@ -221,7 +219,7 @@ def modelled(
     return run
 
 
-def touched(run: ModelledRun, *, anyway: bool = False) -> tuple[Remark, ...]:
+def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
     """A remark where a log that is to be free shows contact.
 
     Raises:
@@ -231,11 +229,11 @@ def touched(run: ModelledRun, *, anyway: bool = False) -> tuple[Remark, ...]:
     from vftcli.evaluation.touches import PLAIN, touches
 
     known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
-    found = [touch for touch in known if touch.stop > run.recording.t[0] + SETTLING]
+    found = [touch for touch in known if touch.stop > run.t[0] + SETTLING]
     if not found:
         return ()
     worst = max(found, key=lambda touch: touch.excess)
-    where = Where(run.recording.name, (worst.joint + 1,), (worst.start, worst.stop))
+    where = Where(run.name, (worst.joint + 1,), (worst.start, worst.stop))
     sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
     remark = caution("free-log-touched", where, count=len(found), **sizes)
     if worst.excess > PLAIN and not anyway:

@@ -16,9 +16,10 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun, Models
+from vftcli.repetition.free_run import FreeRun
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
+from vftcli.robots.run import Runs
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.progress import no_stage
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.refinement.baseline import Baseline
+    from vftcli.refinement.baseline import Baselines
     from vftcli.virtual_sensor.choice import WrenchChoice
     from vftcli.virtual_sensor.detection import ToldContacts
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
@@ -91,7 +92,7 @@ class AnalysisChoice:
 
 
 #: What is done with each log of a command.
-Analyser = Callable[[Recording, Robot, AnalysisChoice, Models], "Analysis"]
+Analyser = Callable[[Recording, Robot, AnalysisChoice, Runs], "Analysis"]
 Failed = Callable[[Path, VftError], None]  #: Who is told which log could not be analysed, and why.
 
 
@@ -118,7 +119,7 @@ def analyse_logs(
         ParameterError: If two of them are the same run.
         VftError: If one cannot be analysed and nobody is told.
     """
-    models, work, tell = Models(), work or analyse, failed or raise_error
+    models, work, tell = Runs(), work or analyse, failed or raise_error
     recordings: list[tuple[Path, Recording]] = []
     for path in logs:
         choice.progress(f"reading {path.name}", 0.0, 0.05)
@@ -139,7 +140,7 @@ def analyse_logs(
 
 
 def list_touches(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
 ) -> "Analysis":
     """What touched the arm along a log, without any observer's estimate.
 
@@ -188,7 +189,7 @@ def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
 
 
 def analyse(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models | None = None
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs | None = None
 ) -> "Analysis":
     """Go from a recording to estimates and, if a reference is asked for, their errors.
 
@@ -200,19 +201,19 @@ def analyse(
     """
     tell, name = choice.progress, recording.name
     tell(f"{name}: examining", 0.05, 0.15)
-    motion = read(recording, robot, choice, models or Models())
+    motion = read(recording, robot, choice, models or Runs())
     examinations = examine(motion, choice)
     tell(f"{name}: running observers", 0.15, 0.3)
-    baseline = model(motion, choice)
-    analysis = replace(observe(motion, baseline, choice), examinations=examinations)
-    analysis = refine(analysis, baseline, choice)
+    baselines = model(motion, choice)
+    analysis = replace(observe(motion, baselines, choice), examinations=examinations)
+    analysis = refine(analysis, baselines, choice)
     analysis = sense(find_contacts(analysis, choice), choice)
     tell(f"{name}: comparing", 0.5, WRITING)
     motion.log.spare()
     return judge(analysis, choice)
 
 
-def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models) -> FreeMotion:
+def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> FreeMotion:
     """Read the log's free runs, each once."""
     literal = choice.observers.as_printed
     log = models.of(recording, robot, literal=literal)
@@ -237,44 +238,48 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
     return tuple(dict.fromkeys(found))
 
 
-def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baseline | None":
+def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baselines | None":
     """The log's free part, spectra and bias, None where nothing asks for them."""
     if not choice.looks_back:
         return None
-    from vftcli.refinement.correction import baseline_for
+    from vftcli.refinement.correction import find_baselines
 
-    return baseline_for(motion, choice.refinement, best=BEST in choice.observers.names)
+    return find_baselines(motion, choice.refinement, best=BEST in choice.observers.names)
 
 
-def observe(motion: FreeMotion, baseline: "Baseline | None", choice: AnalysisChoice) -> "Analysis":
+def observe(
+    motion: FreeMotion, baselines: "Baselines | None", choice: AnalysisChoice
+) -> "Analysis":
     """Run the observers along the log."""
-    from vftcli.analysis import Analysis, terms_of
+    from vftcli.analysis import Analysis, run_of
     from vftcli.signals.remarks import caution
 
     log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     own = choice.observers.gains_of_log
-    shown = NOT_SHOWN if baseline is None else baseline.shown(gains=own)
+    shown = NOT_SHOWN if baselines is None else baselines.spectra(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
     whole = observers if log.recording.long is None else ()  # of a long log, block by block
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(run(o, terms_of(baseline, o.name, log)) for o in whole),
+        estimates=tuple(run(o, run_of(baselines, o.name, log).terms) for o in whole),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )
 
 
-def refine(analysis: "Analysis", baseline: "Baseline | None", choice: AnalysisChoice) -> "Analysis":
+def refine(
+    analysis: "Analysis", baselines: "Baselines | None", choice: AnalysisChoice
+) -> "Analysis":
     """Give the estimates what only the complete log allows: their bands."""
-    if baseline is None:
+    if baselines is None:
         return analysis
     from vftcli.refinement import refine as room
 
     bias, of_file = choice.refinement.remove_bias, choice.observers.of_robot_file
     made = room.refine(
-        baseline, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
+        baselines, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
     )
     remarks = (*analysis.remarks, *made.remarks)
     return replace(analysis, estimates=made.estimates, refinement=made, remarks=remarks)
@@ -290,7 +295,7 @@ def find_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     choice.progress(f"{analysis.recording.name}: listing contacts", 0.3, 0.5)
     try:
         motion, made = unloaded_motion(analysis.motion, choice), analysis.refinement
-        bias = None if made is None else made.baseline.under(BEST).correction
+        bias = None if made is None else made.baselines.best.correction
         found = list_contacts(motion, bias, referenced=choice.reference is not None)
         health = analysis.examinations[0]
         return replace(analysis, contacts=found.weighed(health.load, health.distrusts))
@@ -321,7 +326,8 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
         observers,
         estimates,
         asked or WrenchChoice(),
-        analysis.smoother_input,
+        analysis.free_log(),
+        {name: analysis.free_log(name) for name in names},
         gate_of(analysis, asked),
     )
     return replace(analysis, virtual_sensor=found)
@@ -359,7 +365,7 @@ def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts
     others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]
     own = [o for o in analysis.observers if o.name not in listed]
     sensor = None if sensed is None else sensed.sensor
-    beside = read_in_free_runs(others, own, analysis.terms_of, sensor)
+    beside = read_in_free_runs(others, own, analysis.run_of, sensor)
     return ToldContacts(untouched=part.own, beside=beside, listed=listed)
 
 

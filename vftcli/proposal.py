@@ -14,9 +14,9 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import Models
 from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Runs
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.letters import printable
@@ -74,7 +74,7 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
     if refused:
         yield from (ProposedOption(f"MEANINGLESS unless mended: {in_words(f)}") for f in refused)
         return
-    models = Models()
+    models = Runs()
     free = []
     for log in logs[1:]:
         option = free_log(log, choice, models)
@@ -133,7 +133,7 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
     return ProposedOption(told, "effort", called, taken=False)
 
 
-def free_log(log: Path, choice: AnalysisChoice, models: Models) -> ProposedOption:
+def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
     """Whether nothing touches the arm along a further log, as a remark that holds or not."""
     label = choice.library.label(log)
     try:
@@ -149,7 +149,7 @@ def free_log(log: Path, choice: AnalysisChoice, models: Models) -> ProposedOptio
 
 
 def free_part(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
 ) -> Iterator[ProposedOption]:
     """What is known to be free of contact, if anything is."""
     try:
@@ -168,7 +168,7 @@ ONE_CYCLE = (
 
 
 def references(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Models
+    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
 ) -> Iterator[ProposedOption]:
     """What estimates can be compared with: each is tried, and the first that does is taken."""
     plain = replace(choice, observers=ObserverChoice(names=("gmo",)), contacts=False)

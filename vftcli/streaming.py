@@ -10,8 +10,8 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.observers.block_run import block_run, runs_in_blocks
 from vftcli.pipeline import AnalysisChoice
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -73,7 +73,7 @@ class BlockAnalysis:
     def _block(self, recording: Recording, estimates: Sequence[ExternalTorque]) -> Analysis:
         """The analysis of one block."""
         made, sensed = self.made, self.made.virtual_sensor
-        log = ModelledRun(recording=recording, robot=made.robot)
+        log = Run(recording=recording, robot=made.robot)
         if sensed is not None:
             chain = made.robot.chain
             wrenches = sensed.sensor.wrenches(estimates, recording.q, chain)

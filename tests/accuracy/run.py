@@ -36,7 +36,7 @@ from vftcli.observers.auto_tuning import (  # noqa: E402
 from vftcli.observers.choice import ObserverChoice  # noqa: E402
 from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
 from vftcli.repetition.free_motion import FreeMotion  # noqa: E402
-from vftcli.repetition.free_run import ModelledRun  # noqa: E402
+from vftcli.robots.run import Run, Samples  # noqa: E402
 from vftcli.signals.rest import standing  # noqa: E402
 
 GROUPS = ("planted", "pieces", "steady", *scenarios.SIMULATED, "bullet")
@@ -102,22 +102,21 @@ def uncapped():
         spectra.SLOW = slow
 
 
-def tuned(terms, free):
-    """The smoother tuned on the spectra of the free part and the rest."""
-    part = spectra.Part(terms, free)
-    return tune_to_spectra("rts-auto", spectra.spectra_of(spectra.Part(terms, ~free), [part]))
+def tuned(run, free):
+    """The estimate of the smoother tuned on the spectra of the free part and the rest. (T, n)"""
+    found = spectra.spectra_of(Samples(run, ~free), [Samples(run, free)])
+    return tune_to_spectra("rts-auto", found).estimate(run.terms).tau
 
 
 def tuned_line(case, chosen) -> dict[str, object]:
     """What the tuned smoothers reach on one log."""
-    run = ModelledRun(recording=case.recording, robot=case.robot)
+    run = Run(recording=case.recording, robot=case.robot)
     free = FreeMotion(log=run, choice=case.free).part.own
     with uncapped():
-        today = rmse(tuned(run.terms, free).estimate(run.terms).tau, case.truth)
-    capped = rmse(tuned(run.terms, free).estimate(run.terms).tau, case.truth)
+        today = rmse(tuned(run, free), case.truth)
+    capped = rmse(tuned(run, free), case.truth)
     bias = whole_log_bias(run)
-    terms = bias.corrected(run.terms)
-    whole = rmse(tuned(terms, free).estimate(terms).tau, case.truth)
+    whole = rmse(tuned(bias.corrected(run), free), case.truth)
     line = {name: float(x.mean()) for name, x in
             (("today", today), ("capped", capped), ("whole", whole))}  # fmt: skip
     line["whole/today"] = line["whole"] / line["today"]
@@ -160,7 +159,7 @@ def best_line(case) -> dict[str, object]:
 
 def steady_line(case) -> dict[str, object]:
     """Slope of the estimate on the truth and RMSE, with the correction and without it."""
-    run = ModelledRun(recording=case.recording, robot=case.robot)
+    run = Run(recording=case.recording, robot=case.robot)
     bias = whole_log_bias(run)
     setup = Setup(gains=case.robot.gains, settings={}, joints=case.robot.joints,
                   step=case.recording.median_step, as_printed=False)  # fmt: skip

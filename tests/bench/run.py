@@ -26,7 +26,7 @@ from vftcli.doctor import Examiner, examine
 from vftcli.observers import BEST, PAPER, KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers import read
 from vftcli.reproduction.benchmark import (
@@ -42,6 +42,7 @@ from vftcli.reproduction.benchmark import (
 from vftcli.reproduction.timing import SCRIPT_SAMPLES, dense_kalman_loop, first_order_loops
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
+from vftcli.robots.run import Run, Samples
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.names import EFFORTS, EXAMINED
@@ -132,7 +133,8 @@ def core_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
     free = recording.t < FREE_SECONDS
 
     def spectra(terms: DynamicsTerms) -> Spectra:
-        return spectra_of(Part(terms, ~free), [Part(terms, free)])
+        run = Run(recording=recording, robot=robot).holding(terms=terms)
+        return spectra_of(Samples(run, ~free), [Samples(run, free)])
 
     def complete() -> None:
         terms = core()

@@ -7,8 +7,9 @@ import polars as pl
 
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.free_run import FreeRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
@@ -23,10 +24,10 @@ def motion(
 ) -> FreeMotion:
     """A log with what is known of its free motion: a span of its own, or another log."""
     arm = load_robot(robot)
-    log = ModelledRun(recording=recording, robot=arm)
+    log = Run(recording=recording, robot=arm)
     runs = ()
     if run is not None:
-        runs = (FreeRun(run=ModelledRun(recording=run, robot=arm), log=log),)
+        runs = (FreeRun(run=Run(recording=run, robot=arm), log=log),)
     return FreeMotion(log=log, choice=FreeChoice.parsed(free_part=free), runs=runs)
 
 

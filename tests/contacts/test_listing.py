@@ -15,8 +15,8 @@ from vftcli.contacts.listing import adjoining, list_contacts
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.simulation import load_scenario, simulate
@@ -234,7 +234,7 @@ def short_arm(joints: int) -> Robot:
     )  # fmt: skip
 
 
-def moving_arm(joints: int, friction: float = 0.0) -> tuple[Robot, ModelledRun]:
+def moving_arm(joints: int, friction: float = 0.0) -> tuple[Robot, Run]:
     """Ten seconds of inverse dynamics by Pinocchio, with dry friction that no model knows."""
     import pinocchio as pin
 
@@ -248,7 +248,7 @@ def moving_arm(joints: int, friction: float = 0.0) -> tuple[Robot, ModelledRun]:
     torque += 0.2 * np.random.default_rng(10).standard_normal(torque.shape)
     torque += friction * np.tanh(dq / 0.02)
     recording = Recording(t=t, q=q, dq=dq, torque=torque)
-    return robot, ModelledRun(recording=recording, robot=robot)
+    return robot, Run(recording=recording, robot=robot)
 
 
 def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
@@ -259,7 +259,7 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
     assert torque is not None
     pushed = torque.copy()
     pushed[(t > 6.0) & (t < 7.0), 1] -= 12.0
-    log = ModelledRun(recording=replace(recording, torque=pushed), robot=robot)
+    log = Run(recording=replace(recording, torque=pushed), robot=robot)
     motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0:5"))
     found = list_contacts(motion)
     (row,) = found.contacts
@@ -280,7 +280,7 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     """
     scenario = replace(load_scenario("panda-bearing", ["sensing.rate=250"]), duration=9.0)
     made = simulate(scenario)
-    log = ModelledRun(recording=made.recording, robot=load_robot("panda"))
+    log = Run(recording=made.recording, robot=load_robot("panda"))
     motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0.3:3.9"))
     (row,) = list_contacts(motion).contacts
     assert row.start == pytest.approx(4.2, abs=0.3)

@@ -20,9 +20,9 @@ from vftcli.contacts.rows import (
     with_drives,
 )
 from vftcli.readers import read
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
 
@@ -42,12 +42,12 @@ def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
     np.testing.assert_allclose(variance[:, 0], exact, rtol=1e-7)
 
 
-def still(**signals: object) -> ModelledRun:
+def still(**signals: object) -> Run:
     """A UR5 that holds a pose for a second, with further signals."""
     t = 0.01 * np.arange(100)
     q = np.tile([0.3, -1.2, 1.6, -1.9, -1.4, 0.5], (100, 1))
     recording = Recording(t=t, q=q, dq=np.zeros_like(q), torque=np.zeros_like(q), **signals)  # type: ignore[arg-type]
-    return ModelledRun(recording=recording, robot=load_robot("ur5"))
+    return Run(recording=recording, robot=load_robot("ur5"))
 
 
 def test_the_vendors_torque_is_a_force_at_the_flange() -> None:

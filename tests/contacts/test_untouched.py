@@ -21,9 +21,9 @@ from vftcli.contacts.untouched import (
 )
 from vftcli.readers import read
 from vftcli.repetition.free_load import FreeLoad
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
+from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
@@ -116,9 +116,7 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     """2.8 kg that the model lacks, in every sample: said, and off the noise and the log alike."""
     plain = motion(LOG, "ur5", "0.3:4")
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
-    run = plain.log.with_terms(
-        replace(plain.log.terms, mu=plain.log.terms.mu - load.torque(plain.log))
-    )
+    run = plain.log.less(-load.torque(plain.log))
     heavy = untouched_motion(replace(plain, log=run), BLOCK)
     light = untouched_motion(plain, BLOCK)
     assert heavy is not None
@@ -139,15 +137,15 @@ def test_free_cycles_with_a_contact_in_every_one_are_not_believed() -> None:
     rest = np.array([0.0, -1.35, 1.9, -2.1, -1.57, 0.0])
     q = rest + 0.2 * np.column_stack([np.sin(phase + k) for k in range(6)])
     dq = 0.2 * (2.0 * np.pi / 4.0) * np.column_stack([np.cos(phase + k) for k in range(6)])
-    still = ModelledRun(recording=Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q)), robot=robot)
+    still = Run(recording=Recording(t=t, q=q, dq=dq, torque=np.zeros_like(q)), robot=robot)
     rng = np.random.default_rng(5)
     torque = 0.2 * rng.standard_normal(q.shape)
     torque[(t % 4.0) > 2.0] += 20.0
     # d = torque exactly, less friction: the log is told by its terms alone.
     p = np.cumsum(0.008 * torque, axis=0)
-    log = still.with_terms(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
+    log = still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)))
     own = (t >= 4.5) & (t < 8.0)
     assert is_touched(log, own)
     quiet = torque * ~((t % 4.0 > 2.0) & own)[:, None]
     p = np.cumsum(0.008 * quiet, axis=0)
-    assert not is_touched(still.with_terms(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))), own)
+    assert not is_touched(still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))), own)

@@ -22,8 +22,8 @@ from vftcli.contacts.compared_signals import ComparedSignals, compared_signals
 from vftcli.contacts.tail import BLOCK, SETTLING
 from vftcli.contacts.thresholds import CountedAlarms, counted_alarms, find_thresholds
 from vftcli.readers import read
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
 RATES = (60.0, 12.0, 1.0)
@@ -44,7 +44,7 @@ def counts(path: Path, robot: str) -> dict[float, CountedAlarms]:
     """What the second half counts at the thresholds of the first, by the rate of one joint."""
     # As RTDE has it, without an estimate of the robot's own: the momentum observer stands for it.
     recording = replace(read(path), tau_ext=None)
-    run = ModelledRun(recording=recording, robot=load_robot(robot))
+    run = Run(recording=recording, robot=load_robot(robot))
     signals = compared_signals(run)
     t0, middle = float(signals.t[0]), 0.5 * float(signals.t[0] + signals.t[-1])
     learn = part(signals, t0, middle)

@@ -16,9 +16,9 @@ from vftcli.evaluation.reference_choice import (
 )
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -28,7 +28,7 @@ T = 0.01 * np.arange(300)
 RNG = np.random.default_rng(3)
 Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, RNG.uniform(0.3, 1, 6)))
 RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
-SOURCE = ReferenceSource(motion=FreeMotion(log=ModelledRun(recording=RECORDING, robot=ROBOT)))
+SOURCE = ReferenceSource(motion=FreeMotion(log=Run(recording=RECORDING, robot=ROBOT)))
 WRENCH = 5.0 * RNG.standard_normal((300, 6))
 
 

@@ -13,8 +13,8 @@ from vftcli.evaluation.selection import (
     step_response,
 )
 from vftcli.observers import KalmanObserver, MomentumObserver
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.recording import Recording
 
@@ -27,10 +27,10 @@ def terms(sigma: float = 0.3) -> DynamicsTerms:
     return DynamicsTerms(t=t, p=np.zeros((4000, 2)), mu=sigma * rng.standard_normal((4000, 2)))
 
 
-def run_of(terms: DynamicsTerms) -> ModelledRun:
+def run_of(terms: DynamicsTerms) -> Run:
     """A recording whose terms these are."""
     recording = Recording(t=terms.t, q=np.zeros_like(terms.p))
-    return ModelledRun(recording=recording, robot=load_robot("ur5")).with_terms(terms)
+    return Run(recording=recording, robot=load_robot("ur5")).holding(terms=terms)
 
 
 @pytest.mark.parametrize("gain", [5.0, 20.0])

@@ -8,8 +8,8 @@ import pytest
 from vftcli import readers
 from vftcli.evaluation.reference import zero_reference
 from vftcli.evaluation.touches import touched_remarks, touches
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.remarks import sentence
 
 ROOT = Path(__file__).parent.parent.parent
@@ -20,29 +20,29 @@ REAL = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 
 def test_a_simulated_push_is_found_where_it_was() -> None:
     """The scenario holds 30 N and more from 4 s on; its first cycle of 4 s is free."""
-    found = touches(ModelledRun(recording=FIXTURE, robot=UR5))
+    found = touches(Run(recording=FIXTURE, robot=UR5))
     assert found
     assert min(touch.start for touch in found) > 4.0
-    remarks = touched_remarks(ModelledRun(recording=FIXTURE, robot=UR5))
+    remarks = touched_remarks(Run(recording=FIXTURE, robot=UR5))
     (warned,) = remarks
     assert (warned.code, warned.level) == ("reference-zero-touched", "warning")
     assert "--interval 0.0:" in sentence(warned)
-    free = ModelledRun(recording=FIXTURE.between(0.0, 4.0), robot=UR5)
+    free = Run(recording=FIXTURE.between(0.0, 4.0), robot=UR5)
     assert touches(free) == ()
     assert touched_remarks(free) == ()
 
 
 def test_the_span_that_is_offered_is_free() -> None:
-    (warned,) = touched_remarks(ModelledRun(recording=FIXTURE, robot=UR5))
+    (warned,) = touched_remarks(Run(recording=FIXTURE, robot=UR5))
     span = (float(warned.values[name]) for name in ("begin_s", "end_s"))  # type: ignore[arg-type]
-    assert touches(ModelledRun(recording=FIXTURE.between(*span), robot=UR5)) == ()
+    assert touches(Run(recording=FIXTURE.between(*span), robot=UR5)) == ()
 
 
 def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -> None:
     """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
     path = logs / "salerno_ur10" / "ur10_exciting.db3"
     recording = readers.read(path, columns="tau=effort")
-    made = zero_reference(ModelledRun(recording=recording, robot=load_robot("ur10")))
+    made = zero_reference(Run(recording=recording, robot=load_robot("ur10")))
     assert not made.torque.tau.any()
     assert [remark.code for remark in made.torque.remarks] == [
         "reference-zero",
@@ -51,12 +51,12 @@ def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -
 
 
 def test_without_friction_a_current_tells_no_contact() -> None:
-    bare = ModelledRun(recording=FIXTURE, robot=UR5.without_friction())
+    bare = Run(recording=FIXTURE, robot=UR5.without_friction())
     assert touches(bare) == ()
 
 
 def test_a_log_without_a_quiet_level_is_not_judged() -> None:
-    assert touches(ModelledRun(recording=FIXTURE.between(5.0, 6.9), robot=UR5)) == ()
+    assert touches(Run(recording=FIXTURE.between(5.0, 6.9), robot=UR5)) == ()
 
 
 @pytest.mark.parametrize(
@@ -74,6 +74,6 @@ def test_hands_are_found_in_real_logs_and_in_those_alone(
     name: str, columns: str, touched: bool, logs: Path
 ) -> None:
     recording = readers.read(logs / name, columns=columns)
-    found = touches(ModelledRun(recording=recording, robot=load_robot("ur10e")))
+    found = touches(Run(recording=recording, robot=load_robot("ur10e")))
     assert bool(found) == touched
     assert np.all([touch.torque > touch.quiet for touch in found])

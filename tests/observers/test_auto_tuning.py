@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from made_runs import samples_of
 
 from vftcli.observers import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.observers.auto_tuning import (
@@ -16,13 +17,14 @@ from vftcli.observers.auto_tuning import (
     noise_level,
     tune_to_spectra,
 )
-from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.robots.run import Samples
 from vftcli.robots.terms import DynamicsTerms
 
 STEP = 0.008
 
 TermsOf = Callable[..., DynamicsTerms]
-Pushed = Callable[..., tuple[Part, Part]]
+Pushed = Callable[..., tuple[Samples, Samples]]
 
 
 def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
@@ -44,13 +46,13 @@ def pushed(terms_of: TermsOf) -> Pushed:
 
 def half_pushed(
     terms_of: TermsOf, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
-) -> tuple[Part, Part]:
+) -> tuple[Samples, Samples]:
     """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
     t = STEP * np.arange(samples)
     free = np.arange(samples) < samples // 2
     torque = scale * low_passed_noise(samples, 6.0, 1) * ~free[:, None]
     terms = terms_of(t, torque, noise)
-    return Part(terms, ~free), Part(terms, free)
+    return samples_of(terms, ~free), samples_of(terms, free)
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -59,7 +61,7 @@ def test_the_expected_error_is_the_measured_one(name: str, pushed: Pushed) -> No
     loaded, free = pushed()
     observer = tune_to_spectra(name, spectra_of(loaded, [free]))
     assert observer.curve is not None
-    tau = observer.estimate(loaded.terms).tau
+    tau = observer.estimate(loaded.run.terms).tau
     truth = 5.0 * low_passed_noise(8000, 6.0, 1) * loaded.inside[:, None]
     inner = loaded.inside.copy()
     inner[:4200] = False
@@ -95,7 +97,7 @@ def test_the_noise_level_gives_innovations_their_expected_variance(pushed: Pushe
     omega_n = np.array([20.0, 40.0])
     observer = kalman_filter(omega_n, noise_level(omega_n, spectra))
     settled, model = observer.steady(STEP, 2), observer.model(STEP, 2)
-    tau = observer.estimate(loaded.terms).tau
+    tau = observer.estimate(loaded.run.terms).tau
     nu = innovations(tau, settled.gains.l2, model.a22)[4200:]
     nis = np.mean(nu**2, axis=0) / (settled.prior.p11 + model.r)
     # variance of the same samples, windowed and not: the rest is the spectrum's own scatter
@@ -109,7 +111,7 @@ def test_without_spectra_auto_falls_back_and_says_so(pushed: Pushed) -> None:
     assert [r.where.about for r in untuned] == ["kfo-auto", "rts-auto"]
     assert str(untuned[0]).startswith("kfo-auto: no free part to tune on")
     loaded, _ = pushed(samples=400)
-    filtered, smoothed, by_hand, rts = (o.estimate(loaded.terms) for o in observers)
+    filtered, smoothed, by_hand, rts = (o.estimate(loaded.run.terms) for o in observers)
     assert filtered.name == "kfo-auto"
     np.testing.assert_array_equal(filtered.tau, by_hand.tau)
     np.testing.assert_array_equal(smoothed.tau, rts.tau)
@@ -159,7 +161,7 @@ def test_a_bound_is_never_reached_in_silence() -> None:
 def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:
     """Tuned on noise alone it keeps what 1/(1 + (ω/9)⁴) leaves of a half sine of .6 s."""
     _, free = pushed()
-    t = free.terms.t
+    t = free.run.terms.t
     begin = t[len(t) // 2]
     inside = (t >= begin) & (t < begin + 0.6)
     push = np.where(inside, np.sin(np.pi * (t - begin) / 0.6), 0.0)

@@ -5,15 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_runs import samples_of
 
-from vftcli.observers.spectra import (
-    Part,
-    Spectra,
-    around_impacts,
-    looks_free,
-    neighbour_mean,
-    spectra_of,
-)
+from vftcli.observers.spectra import Spectra, around_impacts, looks_free, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
@@ -36,7 +30,7 @@ def test_spectra_hold_the_mean_square_and_the_mean(terms_of: TermsOf) -> None:
     torque = 2.0 + np.random.default_rng(5).normal(0.0, 0.5, (4000, 2))
     terms = terms_of(t, torque)
     half = np.arange(4000) < 2000
-    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
     power = found.free.sum(axis=0) * found.width
     d = raw_disturbance(terms)[: 2000 - 1]
     # the window weighs samples unevenly: 8 segments of noise of variance 0.12 on a mean of 2
@@ -51,7 +45,7 @@ def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
     p = np.cumsum(STEP * d, axis=0)
     terms = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
     half = np.arange(len(t)) < len(t) // 2
-    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
     # about 80 half-overlapping segments: each bin to 15 %, their mean over 240 bins to 1 %
     assert np.mean(found.free[2:-2]) == pytest.approx(2 * 0.16 * STEP, rel=0.02)
     # free and loaded are alike, so hardly anything is external
@@ -64,7 +58,7 @@ def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: TermsOf) 
     torque = 3.0 * np.sin(2 * np.pi * 2.0 * t)[:, None]
     terms = terms_of(t, torque)
     half = np.arange(len(t)) < 3000
-    found = spectra_of(Part(terms, ~half), [Part(terms, half)])
+    found = spectra_of(samples_of(terms, ~half), [samples_of(terms, half)])
     peak = found.frequency[np.argmax(found.loaded[:, 0])]
     assert peak == pytest.approx(2.0, abs=found.width)
     # 4.5 by Parseval; the resampling averages over a step, sinc²(2 Hz · 8 ms) = 0.999
@@ -75,7 +69,7 @@ def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: TermsOf) -> None:
     terms = terms_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
     with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 99"):
-        spectra_of(Part(terms, ~few), [Part(terms, few)])
+        spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
 def test_no_segment_reaches_across_a_gap(terms_of: TermsOf) -> None:
@@ -84,7 +78,7 @@ def test_no_segment_reaches_across_a_gap(terms_of: TermsOf) -> None:
     terms = terms_of(t, np.ones((85, 1)))
     few = np.arange(85) >= 60
     with pytest.raises(ParameterError, match=r"free part 2[34]"):
-        spectra_of(Part(terms, ~few), [Part(terms, few)])
+        spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
 def test_the_spectra_predict_the_error_of_a_perfect_and_of_a_dead_observer() -> None:
@@ -211,7 +205,7 @@ def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts() -> None:
     tau += 0.1 * np.random.default_rng(2).standard_normal(len(t))
     gained = np.cumsum(np.concatenate([[0.0], 0.5 * (tau[1:] + tau[:-1]) * step]))
     terms = DynamicsTerms(t=t, p=gained[:, None], mu=np.zeros((len(t), 1)))
-    found = spectra_of(Part(terms, tap), [Part(terms, t < 10.0)])
+    found = spectra_of(samples_of(terms, tap), [samples_of(terms, t < 10.0)])
     power = float(np.sum(found.loaded - found.free) * found.width)
     assert power == pytest.approx(np.mean(tau[tap] ** 2), rel=0.25)
     assert np.array_equal(around_impacts(t, t > 10.0), t > 10.0)  # lasts, so stays as it is

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.refinement.model_error import ModelError, expected_error
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.presliding import play
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Limits, SensorNoise
+from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
 STEP = 0.01
@@ -69,7 +69,7 @@ def wrong_run(robot, error=None, external=None, seconds=30.0, noise=0.0, seed=1)
     if external is not None:
         torque = torque - external(t, q)
     torque = torque + np.random.default_rng(5).normal(0.0, noise, q.shape)
-    return ModelledRun(recording=Recording(t=t, q=q, dq=dq, torque=torque), robot=robot)
+    return Run(recording=Recording(t=t, q=q, dq=dq, torque=torque), robot=robot)
 
 
 def drawn_error(robot, seed=2, size=1.0):

@@ -14,8 +14,8 @@ from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 GMO = MomentumObserver(gain=np.full(6, 20.0))
@@ -23,13 +23,13 @@ GMO = MomentumObserver(gain=np.full(6, 20.0))
 
 @pytest.fixture(scope="module")
 def found() -> Baseline:
-    log = ModelledRun(recording=read(FIXTURE), robot=load_robot("ur5"))
+    log = Run(recording=read(FIXTURE), robot=load_robot("ur5"))
     return baseline_of(FreeMotion(log=log, choice=FreeChoice(cycles=(1,))))
 
 
 def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Baseline:
     """The baseline with a correction off that changes nothing but says this of the log."""
-    shape = found.terms.p.shape
+    shape = found.log.terms.p.shape
     off = WholeLogBias(
         weight=np.zeros(6),
         bias=np.zeros(shape),
@@ -42,7 +42,7 @@ def corrected(found: Baseline, free, sd: float = 0.0, load: float = 0.0) -> Base
 
 
 def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     known = found.part.own
     plain, wider = (with_band(corrected(found, known, sd), reading).error_sd for sd in (0.0, 0.7))
     np.testing.assert_allclose(wider, np.hypot(plain, 0.7), rtol=1e-12)
@@ -50,7 +50,7 @@ def test_a_correction_adds_its_own_variance(found: Baseline) -> None:
 
 def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
     """Every sample of a joint has one of two values, by whether it rests."""
-    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     sd, rests = with_band(found, reading).error_sd, found.motion.log.rests
     for j in range(6):
         for where in (rests[:, j], ~rests[:, j]):
@@ -59,7 +59,7 @@ def test_rest_and_motion_have_bands_of_their_own(found: Baseline) -> None:
 
 
 def test_without_spectra_or_free_samples_there_is_none(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     assert with_band(replace(found, spectra=None), reading).error_sd is None
     nothing = reading._replace(samples=reading.samples[:0], resting=reading.resting[:0])
     assert with_band(found, nothing).error_sd is None
@@ -75,8 +75,8 @@ def test_the_resting_joint_is_named(found: Baseline) -> None:
 
 
 def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.terms))
-    quiet = np.arange(found.terms.samples) % 7 == 0
+    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
+    quiet = np.arange(found.log.terms.samples) % 7 == 0
     rests = found.motion.log.rests
     tau = reading.estimate.tau[quiet]
     fitted = with_band(found, reading._replace(samples=tau, resting=rests[quiet])).error_sd
@@ -87,12 +87,12 @@ def test_the_larger_of_what_is_stated_and_what_a_fit_calls_free_counts(found: Ba
     alone = with_band(replace(corrected(found, quiet), by_fit=True), reading).error_sd
     np.testing.assert_array_equal(alone, fitted)
     # too few to speak for anything
-    few = np.arange(found.terms.samples) < 20
+    few = np.arange(found.log.terms.samples) < 20
     np.testing.assert_array_equal(with_band(corrected(found, few), reading).error_sd, stated)
 
 
 def test_a_slow_load_that_the_fit_believes_in_is_no_error(found: Baseline) -> None:
-    reading = free_reading(found, GMO, GMO.estimate(found.terms))
+    reading = free_reading(found, GMO, GMO.estimate(found.log.terms))
     pushed = reading._replace(estimate=replace(reading.estimate, tau=reading.estimate.tau + 5.0))
     known, alone = found.part.own, replace(found, by_fit=True)
     np.testing.assert_allclose(
@@ -112,11 +112,11 @@ def test_the_band_holds_on_a_real_arm_with_planted_pushes(
     columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
     robot = load_robot("ur10e")
     pushed = planted(read(logs / "ur10e" / "free_12harm_40s.csv.gz", columns=columns), robot, 1)
-    run = ModelledRun(recording=pushed.recording, robot=robot)
+    run = Run(recording=pushed.recording, robot=robot)
     base = baseline_of(FreeMotion(log=run, choice=FreeChoice(spans=((0.0, 8.0),))))
     assert base.load is None
     observer = tune_to_spectra("rts-auto", base.spectra)
-    estimate = with_band(base, free_reading(base, observer, observer.estimate(base.terms)))
+    estimate = with_band(base, free_reading(base, observer, observer.estimate(base.log.terms)))
     error, half = estimate.tau - pushed.torque, 1.96 * estimate.error_sd
     assert np.all(np.mean(np.abs(error) <= half, axis=0) >= 0.88)
     assert half.mean() <= 2.6 * np.sqrt(np.mean(error**2, axis=0)).mean()

@@ -11,8 +11,9 @@ from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.free_run import FreeRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -33,8 +34,8 @@ def circle() -> Recording:
 
 
 def baseline(log: Recording, *free: Recording) -> Baseline:
-    own = ModelledRun(recording=log, robot=ROBOT)
-    runs = [FreeRun(run=ModelledRun(recording=run, robot=ROBOT), log=own) for run in free]
+    own = Run(recording=log, robot=ROBOT)
+    runs = [FreeRun(run=Run(recording=run, robot=ROBOT), log=own) for run in free]
     choice = FreeChoice(logs=tuple(Path(str(k)) for k in range(len(free))))
     return baseline_of(FreeMotion(log=own, choice=choice, runs=tuple(runs)))
 
@@ -42,7 +43,7 @@ def baseline(log: Recording, *free: Recording) -> Baseline:
 def test_what_an_observer_reads_in_the_free_pieces(circle: Recording) -> None:
     log, free = part(circle, 4.0, 10.0), part(circle, 0.0, 4.0)
     found = baseline(log, free)
-    estimate = GMO.estimate(found.terms)
+    estimate = GMO.estimate(found.log.terms)
     reading = free_reading(found, GMO, estimate)
     own = GMO.estimate(found.pieces[0].run.terms).tau
     np.testing.assert_array_equal(reading.samples, own)
@@ -50,7 +51,7 @@ def test_what_an_observer_reads_in_the_free_pieces(circle: Recording) -> None:
 
 
 def test_a_log_without_a_free_part_says_why(circle: Recording) -> None:
-    own = ModelledRun(recording=part(circle, 4.5, 6.0), robot=ROBOT)
+    own = Run(recording=part(circle, 4.5, 6.0), robot=ROBOT)
     found = baseline_of(FreeMotion(log=own))
     assert (found.part, found.spectra, found.pieces) == (None, None, ())
     assert found.missing.code == "no-free-part"

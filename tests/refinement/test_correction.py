@@ -58,20 +58,19 @@ def codes(analysis: Analysis) -> list[str]:
 def test_the_bias_is_off_for_the_best_alone(automatic: Analysis) -> None:
     """Measured .27 and .60 N·m, seed 1: .46; a prototype had .37 of it in the mean of four."""
     assert automatic.refinement is not None
-    found = automatic.refinement.baseline
-    best = found.under("best")
+    found = automatic.refinement.baselines
+    best = found.of("best")
     assert best.correction is not None
-    assert found.correction is None
-    assert found.under("gmo") is found
-    plain, off = automatic.motion.log.terms, best.terms
-    assert best.terms_of(automatic.motion.log) is off  # made once
+    assert found.of("gmo").correction is None
+    plain, off = automatic.motion.log.terms, best.log.terms
+    assert best.of(automatic.motion.log) is best.log  # made once
     np.testing.assert_allclose(plain.mu - off.mu, best.correction.bias, atol=1e-9)
     np.testing.assert_array_equal(plain.p, off.p)
     assert rmse(automatic, "best") < 0.6 * rmse(automatic, "rts-auto")
     # Each is what its own observer makes of its own terms.
     for observer, estimate in zip(automatic.observers, automatic.estimates, strict=True):
-        terms = automatic.terms_of(observer.name, automatic.motion.log)
-        np.testing.assert_array_equal(estimate.tau, observer.estimate(terms).tau)
+        run = automatic.run_of(observer.name, automatic.motion.log)
+        np.testing.assert_array_equal(estimate.tau, observer.estimate(run.terms).tau)
 
 
 @pytest.mark.slow
@@ -98,7 +97,7 @@ def test_whole_log_is_off_for_everyone_and_none_for_no_one(
 @pytest.mark.slow
 def test_the_band_of_the_best_holds_what_the_correction_may_err_by(automatic: Analysis) -> None:
     assert automatic.refinement is not None
-    best = automatic.refinement.baseline.under("best")
+    best = automatic.refinement.baselines.best
     assert best.correction is not None
     band = automatic.estimates[0].error_sd
     assert band is not None
@@ -115,8 +114,8 @@ def test_a_log_without_a_free_part_leans_on_what_the_fit_takes_for_free(
     assert "free-by-the-fit" in codes(analysis)
     assert "free-part-not-quiet" not in codes(analysis)
     assert analysis.refinement is not None
-    assert analysis.refinement.baseline.by_fit
-    assert analysis.refinement.baseline.untouched == ()
+    assert analysis.refinement.baselines.plain.by_fit
+    assert analysis.refinement.baselines.plain.untouched == ()
     assert all(estimate.error_sd is not None for estimate in analysis.estimates)
     by_hand = BY_DENSITY
     smoothed = analyse_log(FIXTURE, replace(pushed, observers=by_hand))

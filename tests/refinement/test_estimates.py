@@ -46,7 +46,7 @@ def test_the_free_cycle_is_found_and_the_resting_joint_named(worked_up: Analysis
     assert found is not None
     assert found.remarks[0].code == "free-cycle-found"
     assert (found.remarks[0].values["cycles"], found.remarks[0].values["whole"]) == ([1], 5)
-    inside = worked_up.t[found.baseline.part.own]
+    inside = worked_up.t[found.baselines.plain.part.own]
     assert inside[0] == pytest.approx(0.0, abs=0.05)
     assert inside[-1] == pytest.approx(4.0, abs=0.05)
     band = next(r for r in found.remarks if r.code == "band-of-a-standing-joint")
@@ -88,13 +88,13 @@ def test_the_band_covers_the_truth_on_moving_joints(worked_up: Analysis) -> None
 def test_the_band_is_what_the_equation_says(worked_up: Analysis) -> None:
     found = worked_up.refinement
     assert found is not None
-    spectra = found.baseline.spectra
+    spectra = found.baselines.plain.spectra
     assert spectra is not None
     for observer, estimate in zip(worked_up.observers, worked_up.estimates, strict=True):
         response = observer.frequency_response(spectra.frequency, spectra.step, 6)
         lag = np.sum(np.abs(1 - response) ** 2 * spectra.external, axis=0) * spectra.width
-        own = found.baseline.part.own
-        rests = found.baseline.motion.log.rests
+        own = found.baselines.plain.part.own
+        rests = found.baselines.plain.motion.log.rests
         friction = dry_friction(worked_up.robot.friction, 6)
         j, moves = MOVING - 1, ~rests & own[:, None]
         free = np.array([np.mean(estimate.tau[moves[:, k], k] ** 2) for k in j])
@@ -120,7 +120,7 @@ def test_what_limits_the_log_is_said_joint_by_joint(worked_up: Analysis) -> None
         assert size == budget.parts[cause][j]
     assert all(np.all(part >= 0.0) for part in budget.parts.values())
     # its parts but bandwidth are the free rms, cause by cause
-    read = np.mean(worked_up.estimates[-1].tau[found.baseline.part.own] ** 2, axis=0)
+    read = np.mean(worked_up.estimates[-1].tau[found.baselines.plain.part.own] ** 2, axis=0)
     parts = sum(budget.parts[cause] ** 2 for cause in ("noise", "friction", "model"))
     np.testing.assert_allclose(parts, read, rtol=1e-9)
 

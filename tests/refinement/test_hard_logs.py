@@ -16,11 +16,11 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.refinement import refine
-from vftcli.refinement.baseline import baseline_of
+from vftcli.refinement.baseline import Baselines, baseline_of
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 
@@ -137,10 +137,11 @@ class Numberless:
 
 
 def test_a_joint_without_a_number_is_the_momentum_observers_and_named(slow, panda):
-    run = ModelledRun(recording=slow, robot=panda)
+    run = Run(recording=slow, robot=panda)
     found = baseline_of(FreeMotion(log=run, choice=FreeChoice.parsed(free_part="0:6")))
     observer = Numberless()
-    made = refine.refine(found, [observer], [observer.estimate(run.terms)])
+    both = Baselines(plain=found, best=found)
+    made = refine.refine(both, [observer], [observer.estimate(run.terms)])
     (estimate,) = made.estimates
     (gmo,), _ = ObserverChoice(names=("gmo",)).build(panda, slow.median_step)
     np.testing.assert_array_equal(estimate.tau[:, 2], gmo.estimate(run.terms).tau[:, 2])

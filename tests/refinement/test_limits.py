@@ -117,7 +117,7 @@ def test_other_gains_in_the_run_do_not_change_what_the_paper_s_cost(analysis: An
 @pytest.mark.slow
 def test_nothing_is_said_where_a_side_is_not_known(analysis: Analysis) -> None:
     assert analysis.refinement is not None
-    found, estimates = analysis.refinement.baseline, analysis.estimates
+    found, estimates = analysis.refinement.baselines.plain, analysis.estimates
     assert expected_gap(found, estimates[1:], gains_of_file=True) is None
     bare = [replace(estimates[0], error_sd=None), *estimates[1:]]
     assert expected_gap(found, bare, gains_of_file=True) is None

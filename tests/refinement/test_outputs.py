@@ -41,8 +41,8 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     assert found is not None
     curve = tuning_chart(found.curves, observer_lines(worked_up.estimates))
     assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
-    assert found.baseline.spectra is not None
-    assert len(spectra_chart(found.baseline.spectra).series) == 2
+    assert found.baselines.plain.spectra is not None
+    assert len(spectra_chart(found.baselines.plain.spectra).series) == 2
     page = render(worked_up)
     assert page.count("<title>Spectrum of the disturbance") == 6
     assert page.count("<title>Expected error against") == 6

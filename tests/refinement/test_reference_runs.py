@@ -16,8 +16,8 @@ from vftcli.pipeline import AnalysisChoice, analyse_log, model, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.refine import refine
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import Models
 from vftcli.robots.choice import RobotChoice
+from vftcli.robots.run import Runs
 from vftcli.signals.remarks import Remark
 from vftcli.simulation import load_scenario, simulate
 
@@ -40,18 +40,18 @@ def one_run(style: str, seed: int) -> tuple[list[float], list[float]]:
             settings={"kfo": {"noise_convention": "density"}},
         ),
     )
-    motion = read(log, robot, asked, Models())
+    motion = read(log, robot, asked, Runs())
     terms, found = motion.log.terms, model(motion, asked)
     assert found is not None
-    observers, _ = asked.observers.build(robot, log.median_step, found.shown(gains=False))
+    observers, _ = asked.observers.build(robot, log.median_step, found.spectra(gains=False))
     estimates = [observer.estimate(terms) for observer in observers]
     discrete = replace(asked.observers, settings={"kfo": {"noise_convention": "discrete"}})
     quick = [
         o.estimate(terms)
-        for o in discrete.build(robot, log.median_step, found.shown(gains=False))[0][:2]
+        for o in discrete.build(robot, log.median_step, found.spectra(gains=False))[0][:2]
     ]
     banded = refine(found, observers, estimates).estimates
-    moving = ~found.stuck
+    moving = ~found.plain.stuck
 
     def error(tau: np.ndarray) -> float:
         return float(np.sqrt(np.mean((tau - truth) ** 2, axis=0))[moving].mean())

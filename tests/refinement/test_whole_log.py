@@ -10,10 +10,10 @@ from known_errors import STEP, drawn_error, motion, shortened, ur10e, wrong_run
 
 from vftcli.refinement.model_error import smooth_motion, usual_friction
 from vftcli.refinement.whole_log import stride_of, whole_log_bias
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 
 sys.path.append(str(Path(__file__).parents[1] / "accuracy"))
@@ -49,13 +49,13 @@ def test_a_planted_error_is_found_and_the_pushes_stay(run, found):
     # the prior's width in thirty seconds of motion, and friction's turns, which are filtered
     assert np.all(left < 0.35 * rms(error)[found.applied])
     np.testing.assert_array_equal(found.bias[:, ~found.applied], 0.0)
-    corrected = raw_disturbance(found.corrected(run.terms))
+    corrected = raw_disturbance(found.corrected(run).terms)
     truth = pushes(run.recording.t, run.recording.q)[1:]
     assert np.all(rms(corrected - truth) <= 1.01 * rms(raw_disturbance(run.terms) - truth))
 
 
 def test_mu_loses_the_bias_and_nothing_else_changes(run, found):
-    terms = found.corrected(run.terms)
+    terms = found.corrected(run).terms
     np.testing.assert_allclose(terms.mu, run.terms.mu - found.bias)
     np.testing.assert_array_equal(terms.p, run.terms.p)
 
@@ -80,11 +80,11 @@ def test_free_samples_are_free(run, found):
 def test_another_run_of_the_arm_loses_the_same_error(found):
     robot = ur10e()
     other = wrong_run(robot, drawn_error(robot), seconds=15.0, noise=0.3, seed=9)
-    before, after = (rms(raw_disturbance(x)) for x in (other.terms, found.of(other)))
+    before, after = (rms(raw_disturbance(x.terms)) for x in (other, found.of(other)))
     # unseen motion, not a fold of the same one
     assert np.mean(after[found.applied]) < 0.7 * np.mean(before[found.applied])
     np.testing.assert_array_equal(
-        found.of(other).mu[:, ~found.applied], other.terms.mu[:, ~found.applied]
+        found.of(other).terms.mu[:, ~found.applied], other.terms.mu[:, ~found.applied]
     )
 
 
@@ -110,7 +110,7 @@ def test_a_push_that_lasts_is_left_in():
 
     run = wrong_run(ur10e(), None, steady, noise=0.3)
     found = whole_log_bias(run)
-    d = raw_disturbance(found.corrected(run.terms))
+    d = raw_disturbance(found.corrected(run).terms)
     truth = steady(None, run.recording.q)[1:]
     # slope of what is read on what is there
     assert np.sum(d * truth) / np.sum(truth**2) == pytest.approx(1.0, abs=0.05)
@@ -151,8 +151,8 @@ def test_a_short_log_is_refused():
     assert found.free.all()
     for nothing in (found.applied, found.bias, found.sd):
         assert not nothing.any()
-    assert found.corrected(run.terms) is run.terms
-    assert found.of(run) is run.terms
+    assert found.corrected(run) is run
+    assert found.of(run) is run
 
 
 def by_friction(robot, seconds, external=None):
@@ -197,7 +197,7 @@ def held(seconds, moving):
     dq = dq * on
     q = np.cumsum(STEP * dq, axis=0)
     recording = Recording(t=t, q=q, dq=dq, torque=np.ones_like(q))
-    return ModelledRun(recording=recording, robot=robot)
+    return Run(recording=recording, robot=robot)
 
 
 def test_a_held_pose_is_refused():
@@ -225,7 +225,7 @@ def test_what_no_arm_does_is_refused():
     run = wrong_run(shortened(ur10e(), 3), seconds=12.0)
     dq = run.recording.dq.copy()
     dq[100:900] = 1e150
-    wild = ModelledRun(recording=replace(run.recording, dq=dq), robot=run.robot)
+    wild = Run(recording=replace(run.recording, dq=dq), robot=run.robot)
     found = whole_log_bias(wild)
     assert [r.code for r in found.remarks] == ["whole-log-without-solution"]
     assert not found.bias.any()
@@ -245,19 +245,20 @@ def test_real_pushes_come_out_better(logs):
     from planted_pushes import planted
 
     from vftcli.observers.auto_tuning import tune_to_spectra
-    from vftcli.observers.spectra import Part, spectra_of
+    from vftcli.observers.spectra import spectra_of
     from vftcli.readers.library import Library
     from vftcli.readers.reader import ReadChoice
+    from vftcli.robots.run import Samples
 
     path = logs / "ur10e" / "free_12harm.csv"
     columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
     made = planted(Library([path]).open(path, ReadChoice.parsed(columns=columns)), ur10e(), 1)
-    run = ModelledRun(recording=made.recording, robot=ur10e())
+    run = Run(recording=made.recording, robot=ur10e())
     free = run.recording.t <= 8.0
     errors = []
-    for terms in (run.terms, whole_log_bias(run).corrected(run.terms)):
-        parts = Part(terms, ~free), [Part(terms, free)]
-        tau = tune_to_spectra("rts-auto", spectra_of(*parts)).estimate(terms).tau
+    for each in (run, whole_log_bias(run).corrected(run)):
+        parts = Samples(each, ~free), [Samples(each, free)]
+        tau = tune_to_spectra("rts-auto", spectra_of(*parts)).estimate(each.terms).tau
         errors.append(rms(tau - made.torque).mean())
     # another library of linear algebra moves the last digits alone
     assert errors[1] < 0.6 * errors[0]

@@ -9,7 +9,8 @@ import polars as pl
 import pytest
 
 from vftcli.readers import read
-from vftcli.repetition.drive_run import DriveRun
+from vftcli.robots import load_robot
+from vftcli.robots.run import SERIES, Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 
@@ -70,14 +71,14 @@ def repeated() -> Callable[..., Recording]:
 
 
 @pytest.fixture(scope="session")
-def drive_of() -> Callable[..., DriveRun]:
-    """A drive run of some signals; those that are not given are zero."""
+def drive_of() -> Callable[..., Run]:
+    """A run of some signals; those that are not given are zero."""
 
-    def make(t: Array, q: Array, dq: Array, **signals: Array) -> DriveRun:
+    def make(t: Array, q: Array, dq: Array, **signals: Array) -> Run:
         still = np.zeros_like(q)
-        names = ("torque", "model", "momentum", "standstill_s")
-        given = {name: signals.get(name, still) for name in names}
-        return DriveRun(name="log", t=t, q=q, dq=dq, coulomb=still[0], standing=still > 0, **given)
+        given = {name: signals.get(name, still) for name in SERIES}
+        log = Run(recording=Recording(t=t, q=q, dq=dq), robot=load_robot("ur5"))
+        return log.holding(dry_friction=still[0], **given | {"standing": still > 0})
 
     return make
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from vftcli.repetition.drive_run import band
 from vftcli.repetition.error_model import (
     ErrorModel,
     less_noise,
@@ -15,6 +14,7 @@ from vftcli.repetition.error_model import (
     slope_noise,
     white,
 )
+from vftcli.robots.run import band
 from vftcli.signals.filters import low_pass
 
 STEP = 0.008

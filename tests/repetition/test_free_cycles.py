@@ -1,14 +1,13 @@
 """Which cycles are taken to be free: the one with the least residual, and those like it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
 T = 0.01 * np.arange(1200)
@@ -16,19 +15,19 @@ T = 0.01 * np.arange(1200)
 CYCLES = Cycles(period=4.0, begin=0.0, end=12.0)
 """Three whole ones."""
 
-Make = Callable[..., DriveRun]
+Make = Callable[..., Run]
 
 
 @pytest.fixture
-def pushed(drive_of: Make) -> Callable[..., DriveRun]:
+def pushed(drive_of: Make) -> Callable[..., Run]:
     """Two joints that swing every 4 s with 0.1 N·m of noise, pushed by 5 N·m at some instants."""
 
-    def make(*instants: float) -> DriveRun:
+    def make(*instants: float, t: np.ndarray = T) -> Run:
         phase = 0.5 * np.pi * T[:, None] + np.array([0.0, 1.0])
         torque = 0.1 * np.random.default_rng(2).standard_normal((len(T), 2))
         for instant in instants:
             torque -= 5.0 * np.exp(-(((T - instant) / 0.3) ** 2))[:, None]
-        return drive_of(T, np.sin(phase), 0.5 * np.pi * np.cos(phase), torque=torque)
+        return drive_of(t, np.sin(phase), 0.5 * np.pi * np.cos(phase), drive_torque=torque)
 
     return make
 
@@ -44,7 +43,7 @@ def pushed(drive_of: Make) -> Callable[..., DriveRun]:
     ],
 )
 def test_all_cycles_without_a_push_are_free(
-    pushed: Callable[..., DriveRun], instants: tuple[float, ...], free: tuple[int, ...]
+    pushed: Callable[..., Run], instants: tuple[float, ...], free: tuple[int, ...]
 ) -> None:
     found = find_free_cycles(pushed(*instants), CYCLES)
     assert found.numbers == free
@@ -54,7 +53,7 @@ def test_all_cycles_without_a_push_are_free(
 
 
 def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
-    pushed: Callable[..., DriveRun],
+    pushed: Callable[..., Run],
 ) -> None:
     found = find_free_cycles(pushed(), CYCLES)
     assert found.numbers == (0, 1)
@@ -63,16 +62,15 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
     assert found.remark(CYCLES.whole).code == "free-cycles-found"
 
 
-def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., DriveRun]) -> None:
+def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., Run]) -> None:
     with pytest.raises(ReferenceTorqueError, match=r"no whole cycle of 13 s.*--free"):
         find_free_cycles(pushed(), Cycles(period=13.0, begin=0.0, end=12.0))
 
 
 def test_a_cycle_in_a_gap_is_not_free_and_the_others_are_judged(
-    pushed: Callable[..., DriveRun],
+    pushed: Callable[..., Run],
 ) -> None:
-    motion = pushed()
-    with_gap = replace(motion, t=motion.t + 40.0 * (motion.t >= 6.0))
+    with_gap = pushed(t=T + 40.0 * (T >= 6.0))
     found = find_free_cycles(with_gap, Cycles(period=4.0, begin=0.0, end=52.0))
     assert found.residuals is not None
     assert set(np.flatnonzero(np.isfinite(found.residuals))) == {0, 1, 11, 12}

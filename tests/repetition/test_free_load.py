@@ -11,12 +11,12 @@ from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_load import FreeLoad, columns, free_load, weigh
-from vftcli.repetition.free_motion import FreeMotion, FreePiece
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.regressor import load_regressor
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -37,7 +37,7 @@ def carrying(log: Recording) -> Recording:
 
 
 def baseline(log: Recording) -> Baseline:
-    run = ModelledRun(recording=log, robot=ROBOT)
+    run = Run(recording=log, robot=ROBOT)
     return baseline_of(FreeMotion(log=run, choice=FreeChoice(cycles=(1,))))
 
 
@@ -56,7 +56,7 @@ def test_its_wrench_is_what_its_torque_comes_from(log: Recording) -> None:
     load = FreeLoad(
         mass=2.8, moment=PAYLOAD[1:], sd=0.1, moment_sd=np.array([0.01, 0.02, 0.03]), share=0.5
     )
-    run, q = ModelledRun(recording=log, robot=ROBOT), log.q
+    run, q = Run(recording=log, robot=ROBOT), log.q
     wrench, covariance = load.wrench(ROBOT.chain, q)
     J = flange_jacobian(ROBOT.chain, q)
     np.testing.assert_allclose(np.einsum("tij,ti->tj", J, wrench), load.torque(run), atol=1e-10)
@@ -84,8 +84,8 @@ def test_a_simulation_without_noise_or_torque_carries_nothing(log: Recording) ->
     """No joint has anything left over then, and nothing is divided by it."""
     still = replace(log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current)
     weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
-    run = ModelledRun(recording=still, robot=weightless)
-    assert free_load((FreePiece(run, log.t > 1.0),)) is None
+    run = Run(recording=still, robot=weightless)
+    assert free_load((Samples(run, log.t > 1.0),)) is None
 
 
 def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
@@ -96,7 +96,7 @@ def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
     rms, weight = {}, load_regressor(ROBOT.chain, log.q) @ PAYLOAD
     for name, found in (("plain", plain), ("loaded", loaded), ("blind", blind)):
         observer = tune_to_spectra("rts-auto", found.spectra)
-        reading = free_reading(found, observer, observer.estimate(found.terms))
+        reading = free_reading(found, observer, observer.estimate(found.log.terms))
         rms[name] = reading.rms[moving]
         if found is loaded:
             # what the arm carries is in the estimate, free part and all
@@ -122,7 +122,7 @@ def test_what_lies_far_from_a_piece_is_not_heard(
     log: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
-    piece = FreePiece(ModelledRun(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
+    piece = Samples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
     near = columns(piece)
     monkeypatch.setattr("vftcli.repetition.free_load.HEARD", 100.0)
     whole = columns(piece)

@@ -10,9 +10,10 @@ import pytest
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.free_run import FreeRun
 from vftcli.repetition.two_cycle import partners_in_log, partners_in_logs
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -22,13 +23,13 @@ Make = Callable[[Recording, float, float], Recording]
 
 
 @pytest.fixture(scope="module")
-def circle() -> ModelledRun:
+def circle() -> Run:
     """Five circles of 4 s; nothing touches the arm in the first."""
-    return ModelledRun(recording=read(FIXTURE), robot=ROBOT)
+    return Run(recording=read(FIXTURE), robot=ROBOT)
 
 
-def motion_of(log: ModelledRun, *free: Recording, choice: FreeChoice) -> FreeMotion:
-    runs = [FreeRun(run=ModelledRun(recording=x, robot=ROBOT), log=log) for x in free]
+def motion_of(log: Run, *free: Recording, choice: FreeChoice) -> FreeMotion:
+    runs = [FreeRun(run=Run(recording=x, robot=ROBOT), log=log) for x in free]
     return FreeMotion(log=log, choice=choice, runs=tuple(runs))
 
 
@@ -36,7 +37,7 @@ def codes(remarks: Sequence[object]) -> list[str]:
     return [getattr(remark, "code", "") for remark in remarks]
 
 
-def test_the_cycle_that_is_named_is_the_one_taken(circle: ModelledRun) -> None:
+def test_the_cycle_that_is_named_is_the_one_taken(circle: Run) -> None:
     """``--free-cycles 2`` is the second cycle, from 4 to 8 s, and no other."""
     motion = motion_of(circle, choice=FreeChoice(cycles=(2,)))
     partners = partners_in_log(motion)
@@ -51,13 +52,13 @@ def test_the_cycle_that_is_named_is_the_one_taken(circle: ModelledRun) -> None:
 
 
 @pytest.mark.parametrize("cycle", [0, 6])
-def test_cycles_that_are_not_there(circle: ModelledRun, cycle: int) -> None:
+def test_cycles_that_are_not_there(circle: Run, cycle: int) -> None:
     assert motion_of(circle, choice=FreeChoice(cycles=(1, 5))).cycles_given == (0, 4)
     with pytest.raises(ReferenceTorqueError, match=f"no cycle {cycle}; the log holds 5 whole"):
         _ = motion_of(circle, choice=FreeChoice(cycles=(1, cycle))).cycles_given
 
 
-def test_a_cycle_inside_a_free_span_is_free(circle: ModelledRun) -> None:
+def test_a_cycle_inside_a_free_span_is_free(circle: Run) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((3.9, 8.1), (19.0, 19.5))))
     assert motion.free_cycles.numbers == (1,)
     own = circle.recording.t[motion.part.own]
@@ -66,12 +67,12 @@ def test_a_cycle_inside_a_free_span_is_free(circle: ModelledRun) -> None:
     assert codes(motion.part.remarks) == ["free-span", "free-span"]
 
 
-def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle: ModelledRun) -> None:
+def test_a_span_without_a_whole_cycle_leaves_the_cycles_to_be_found(circle: Run) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((0.5, 2.0),)))
     assert motion.free_cycles.numbers == (0,)  # as found: the first is the free one
 
 
-def test_spans_and_cycles_add_up(circle: ModelledRun) -> None:
+def test_spans_and_cycles_add_up(circle: Run) -> None:
     motion = motion_of(circle, choice=FreeChoice(spans=((0.0, 4.05),), cycles=(3,)))
     assert motion.free_cycles.numbers == (0, 2)
     own = circle.recording.t[motion.part.own]
@@ -80,20 +81,20 @@ def test_spans_and_cycles_add_up(circle: ModelledRun) -> None:
 
 @pytest.mark.parametrize("spans", [((40.0, 50.0),), ((-1.0, 30.0),)])
 def test_a_span_that_is_no_part_of_the_log_is_refused(
-    circle: ModelledRun, spans: tuple[tuple[float, float], ...]
+    circle: Run, spans: tuple[tuple[float, float], ...]
 ) -> None:
     with pytest.raises(ParameterError, match="it must be a part of the log"):
         _ = motion_of(circle, choice=FreeChoice(spans=spans)).part
 
 
-def test_a_cycle_that_is_not_there_is_refused(circle: ModelledRun) -> None:
+def test_a_cycle_that_is_not_there_is_refused(circle: Run) -> None:
     with pytest.raises(ReferenceTorqueError, match="no cycle 7; the log holds 5"):
         _ = motion_of(circle, choice=FreeChoice(cycles=(7,))).part
 
 
 @pytest.mark.slow
-def test_each_run_is_a_piece(part_of: Make, circle: ModelledRun) -> None:
-    log = ModelledRun(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
+def test_each_run_is_a_piece(part_of: Make, circle: Run) -> None:
+    log = Run(recording=part_of(circle.recording, 8.0, 14.0), robot=ROBOT)
     same, more = part_of(circle.recording, 0.0, 4.0), part_of(circle.recording, 4.0, 8.0)
     other = replace(same, q=same.q[:, ::-1] + 0.5, source=replace(same.source, t0=99.0))
     paths = tuple(Path(name) for name in "abc")
@@ -105,9 +106,9 @@ def test_each_run_is_a_piece(part_of: Make, circle: ModelledRun) -> None:
     assert all(piece.inside.all() for piece in found.pieces)
 
 
-def test_the_covered_time_is_in_seconds(part_of: Make, circle: ModelledRun) -> None:
+def test_the_covered_time_is_in_seconds(part_of: Make, circle: Run) -> None:
     """4 s of free run under 6 s of log cover 4 s of it, whatever the sample time."""
-    log = ModelledRun(recording=part_of(circle.recording, 4.0, 10.0), robot=ROBOT)
+    log = Run(recording=part_of(circle.recording, 4.0, 10.0), robot=ROBOT)
     free = part_of(circle.recording, 0.0, 4.0)
     motion = motion_of(log, free, choice=FreeChoice(logs=(Path("a"),)))
     (remark,) = partners_in_logs(motion).remarks
@@ -115,7 +116,7 @@ def test_the_covered_time_is_in_seconds(part_of: Make, circle: ModelledRun) -> N
     assert remark.values["deviation_mrad"] < 3.0  # the arm gives way where it is pushed
 
 
-def test_the_log_itself_is_no_free_run(circle: ModelledRun) -> None:
-    run = FreeRun(run=ModelledRun(recording=circle.recording, robot=ROBOT), log=circle)
+def test_the_log_itself_is_no_free_run(circle: Run) -> None:
+    run = FreeRun(run=Run(recording=circle.recording, robot=ROBOT), log=circle)
     with pytest.raises(ReferenceTorqueError, match="is the log itself"):
         FreeMotion(log=circle, runs=(run,))

@@ -9,8 +9,9 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition import alignment as room
-from vftcli.repetition.free_run import FreeRun, ModelledRun, Models
+from vftcli.repetition.free_run import FreeRun
 from vftcli.robots import load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 
@@ -24,17 +25,6 @@ def circle() -> Recording:
     return read(FIXTURE)
 
 
-def test_a_model_is_made_once_for_a_recording_and_a_robot(circle: Recording) -> None:
-    models = Models()
-    first = models.of(circle, ROBOT)
-    assert models.of(circle, ROBOT) is first
-    assert first.terms is first.terms
-    assert first.drive is first.drive
-    assert models.of(circle, ROBOT, literal=True) is not first
-    assert models.of(circle, replace(ROBOT)) is not first
-    assert models.of(replace(circle), ROBOT) is not first
-
-
 def test_alignment_and_pairing_are_made_once(
     part_of: Make, circle: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -42,9 +32,7 @@ def test_alignment_and_pairing_are_made_once(
     whole = room.align
     monkeypatch.setattr(room, "align", lambda *logs: made.append(logs) or whole(*logs))
     log, free = part_of(circle, 5.0, 11.0), part_of(circle, 0.0, 4.0)
-    run = FreeRun(
-        run=ModelledRun(recording=free, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)
-    )
+    run = FreeRun(run=Run(recording=free, robot=ROBOT), log=Run(recording=log, robot=ROBOT))
     assert run.is_same_motion
     assert run.pairing is run.pairing
     assert run.alignment.overlap.any()
@@ -60,9 +48,7 @@ def test_another_motion_has_no_pairing_and_says_so_each_time(
 ) -> None:
     log = part_of(circle, 4.0, 8.0)
     other = replace(log, q=log.q[:, ::-1] + 0.5, source=replace(log.source, t0=99.0))
-    run = FreeRun(
-        run=ModelledRun(recording=other, robot=ROBOT), log=ModelledRun(recording=log, robot=ROBOT)
-    )
+    run = FreeRun(run=Run(recording=other, robot=ROBOT), log=Run(recording=log, robot=ROBOT))
     assert not run.is_same_motion
     for _ in range(2):
         with pytest.raises(ReferenceTorqueError, match="not a free run of the trajectory"):

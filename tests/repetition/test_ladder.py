@@ -1,29 +1,28 @@
 """The alignment ladder: what a difference is on each rung, and which one is taken."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import ErrorModel
 from vftcli.repetition.ladder import WORTH, Difference, difference, differences, most_certain
 from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import pair_with_run
+from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
 T = 0.008 * np.arange(1500)
 
 
-Make = Callable[..., DriveRun]
+Make = Callable[..., Run]
 
 
 @pytest.fixture
 def drive(drive_of: Make) -> Make:
     """One joint that swings, with torques of its own."""
     q, dq = np.sin(T)[:, None], np.cos(T)[:, None]
-    return lambda torque, model: drive_of(T, q, dq, torque=torque, model=model)
+    return lambda torque, model: drive_of(T, q, dq, drive_torque=torque, model_torque=model)
 
 
 RNG = np.random.default_rng(4)
@@ -85,8 +84,3 @@ def replace_standing(made: Difference, joint: int) -> Difference:
     standing = made.error.standing.copy()
     standing[:, joint] = True
     return made._replace(error=made.error._replace(standing=standing))
-
-
-def test_a_drive_run_knows_its_step(drive: Make) -> None:
-    assert drive(MODEL, MODEL).step == pytest.approx(0.008)
-    assert replace(drive(MODEL, MODEL), t=2.0 * T).step == pytest.approx(0.016)

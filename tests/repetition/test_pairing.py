@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import (
     Pairing,
     by_phase,
@@ -15,18 +14,19 @@ from vftcli.repetition.pairing import (
     pair_with_cycle,
     pair_with_run,
 )
+from vftcli.robots.run import Run
 
 T = 0.01 * np.arange(1200)
 
 
-Make = Callable[..., DriveRun]
+Make = Callable[..., Run]
 
 
 @pytest.fixture
 def drive(drive_of: Make) -> Make:
     """Two joints going round every 4 s, `late` seconds behind."""
 
-    def make(t: np.ndarray = T, late: float = 0.0) -> DriveRun:
+    def make(t: np.ndarray = T, late: float = 0.0) -> Run:
         phase = 2.0 * np.pi * (t[:, None] - late) / 4.0
         q = np.hstack([np.sin(phase), 0.5 * np.cos(phase)])
         return drive_of(t, q, np.gradient(q, t, axis=0))
@@ -97,7 +97,7 @@ def test_phase_follows_slow_motion_by_steps_whichever_way_the_joint_turns(drive_
     Each of the four steps leaves d/(v² + d) of the shift, d being a hundredth of the mean v².
     """
 
-    def turn(late: float) -> DriveRun:
+    def turn(late: float) -> Run:
         s = (T - late)[:, None]
         return drive_of(T, -np.where(s < 6.0, s, 6.0 + 0.05 * (s - 6.0)), -speed)
 

@@ -10,10 +10,10 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.ladder import RUNGS
 from vftcli.repetition.two_cycle import friction_change, two_cycle_difference
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
@@ -212,7 +212,7 @@ def test_a_payload_is_seen(logs: Path) -> None:
 
 
 @pytest.fixture
-def swing(drive_of: Callable[..., DriveRun]) -> DriveRun:
+def swing(drive_of: Callable[..., Run]) -> Run:
     """Two joints swinging at 0.4 and 0.7 Hz for 20 s."""
     t = 0.008 * np.arange(2500)
     dq = np.sin(2.0 * np.pi * t[:, None] * np.array([0.4, 0.7]))
@@ -220,7 +220,7 @@ def swing(drive_of: Callable[..., DriveRun]) -> DriveRun:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_a_change_is_found(swing: DriveRun, seed: int) -> None:
+def test_a_change_is_found(swing: Run, seed: int) -> None:
     """0.4 N·m of friction under 0.3 N·m of noise: 2500 samples tell it to 0.006 N·m."""
     motion, rng = swing, np.random.default_rng(seed)
     tau = 0.4 * np.sign(motion.dq) * [1.0, 0.0] + 0.3 * rng.standard_normal(motion.dq.shape)
@@ -230,7 +230,7 @@ def test_a_change_is_found(swing: DriveRun, seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_pushes_are_not_taken_for_it(swing: DriveRun, seed: int) -> None:
+def test_pushes_are_not_taken_for_it(swing: Run, seed: int) -> None:
     """Pushes of 10 N·m, a second each, at random times and either way."""
     motion, rng = swing, np.random.default_rng(seed)
     tau = 0.3 * rng.standard_normal(motion.dq.shape)

@@ -4,14 +4,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_runs import run_of
 
 from vftcli.observers import MomentumObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction
+from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -66,10 +67,10 @@ def test_where_nothing_is_known_there_is_no_band() -> None:
     assert [r.code for r in found.remarks] == ["no-wrench-band"]
 
 
-def log_run(dq: np.ndarray) -> ModelledRun:
+def log_run(dq: np.ndarray) -> Run:
     """A UR5 log whose joints move as given."""
     recording = Recording(t=T, q=np.cumsum(dq, axis=0) * 0.01, dq=dq, current=np.zeros((len(T), 6)))
-    return ModelledRun(recording=recording, robot=load_robot("ur5"))
+    return Run(recording=recording, robot=load_robot("ur5"))
 
 
 @pytest.mark.parametrize("moves", [True, False])
@@ -119,7 +120,7 @@ def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
     p = np.concatenate([np.zeros((1, 1)), np.cumsum(gained, axis=0)])
     terms = DynamicsTerms(t=T, p=p, mu=np.zeros_like(p))
     observers = (MomentumObserver(gain=5.0),)
-    lag = np.sqrt(missed_torque(terms, observers, T < 20.0)["gmo"])
+    lag = np.sqrt(missed_torque(run_of(terms), observers, T < 20.0)["gmo"])
     omega = 2 * np.pi * 0.5
     expected = 8.0 / np.sqrt(2) * omega / np.hypot(omega, 5.0)
     # windows of a few seconds spread the line over ± .5 Hz, where |1 − H| bends
@@ -128,4 +129,4 @@ def test_the_lag_adds_what_it_leaves_out_of_the_contacts() -> None:
 
 def test_a_part_too_short_for_a_spectrum_is_no_part() -> None:
     terms = DynamicsTerms(t=T, p=np.zeros((len(T), 1)), mu=np.zeros((len(T), 1)))
-    assert missed_torque(terms, (MomentumObserver(gain=5.0),), T < 0.05) is None
+    assert missed_torque(run_of(terms), (MomentumObserver(gain=5.0),), T < 0.05) is None

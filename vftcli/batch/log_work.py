@@ -12,7 +12,7 @@ from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
-from vftcli.repetition.free_run import Models
+from vftcli.robots.run import Runs
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import check_known
 
@@ -76,7 +76,7 @@ def analysed(task: LogTask) -> Analysis:
     recording = replace(recording, source=source)
     begin("analysing")
     work: Analyser = list_touches if task.job.do == "contacts" else analyse
-    return work(*prepared(recording, choice), choice, Models())
+    return work(*prepared(recording, choice), choice, Runs())
 
 
 def write_estimates(folder: Path, analysis: Analysis, task: LogTask) -> None:

@@ -11,7 +11,7 @@ from vftcli.cli.log_options import ReadOptions, RobotOptions
 
 if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.repetition.free_run import ModelledRun
+    from vftcli.robots.run import Run
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
     from vftcli.signals.wrench import Wrench
@@ -60,7 +60,7 @@ def contact_thresholds(
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.pipeline import AnalysisChoice, prepared
     from vftcli.readers.library import Library
-    from vftcli.repetition.free_run import Models
+    from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 
     asked = reference.choice()
@@ -73,7 +73,7 @@ def contact_thresholds(
         library=library,
         examiner=health_of(library, anyway=anyway.anyway),
     )
-    models = Models()
+    models = Runs()
     opened = library.open_logs(logs, choice.read)
     free = [modelled(*prepared(log, choice), choice, models) for log in opened]
     shown = [remark for run in free for remark in touched(run, anyway=anyway.anyway)]
@@ -90,7 +90,7 @@ def contact_thresholds(
     remarks = (*thresholds.remarks, *shown)
     if json:
         record = thresholds_record(thresholds, counted, checked)
-        record |= {"logs": [run.recording.name for run in free], "remarks": list(remarks)}
+        record |= {"logs": [run.name for run in free], "remarks": list(remarks)}
         say_json({**record, "examination": health_record(choice.examiner.examinations)})
         return
     for run in free:
@@ -102,7 +102,7 @@ def contact_thresholds(
 
 
 def truth_of(
-    run: "ModelledRun", asked: "ReferenceChoice | None"
+    run: "Run", asked: "ReferenceChoice | None"
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
     """The torque and the wrench that are taken for true along a log, None where nothing says."""
     from vftcli.evaluation.reference_choice import ReferenceSource, make_reference

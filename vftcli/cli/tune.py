@@ -61,7 +61,7 @@ def tune_gains(
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.readers.library import Library
     from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
-    from vftcli.repetition.free_run import Models
+    from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
@@ -78,17 +78,18 @@ def tune_gains(
         examiner=health_of(library, anyway=anyway.anyway),
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
-    motion = read(recording, arm, choice, Models())
+    motion = read(recording, arm, choice, Runs())
     examinations = examine(motion, choice)
     found = model(motion, choice)
-    if found is None or found.spectra is None:
-        raise ParameterError(f"nothing to tune on: {found.missing if found else 'no free part'}")
-    tuned = tune_all(found.spectra, wanted)
-    reached = bounds_reached(tuned, found.spectra, wanted)
+    if found is None or (spectra := found.plain.spectra) is None:
+        why = found.plain.missing if found else "no free part"
+        raise ParameterError(f"nothing to tune on: {why}")
+    tuned = tune_all(spectra, wanted)
+    reached = bounds_reached(tuned, spectra, wanted)
     notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
-    write_tuned(output, heading, found.spectra, tuned, force=made.force, form=form)
+    write_tuned(output, heading, spectra, tuned, force=made.force, form=form)
     if made.json:
         rows = [jsonable(line.record) for line in tuned]
         health = jsonable(health_record(examinations))

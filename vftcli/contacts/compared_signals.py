@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.observers.momentum import MomentumObserver
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.drive import check_joints
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -50,7 +50,7 @@ class ComparedSignals:
         return size[:, : self.wrench.shape[1]]
 
 
-def compared_signals(run: ModelledRun) -> ComparedSignals:
+def compared_signals(run: Run) -> ComparedSignals:
     """What a robot would compare along a log.
 
     The wrench is the log's own where the robot made it; one in sensor axes is an instrument's,

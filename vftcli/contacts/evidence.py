@@ -14,9 +14,9 @@ from vftcli.contacts.model_error import ErrorCourse, error_model, innovations
 from vftcli.contacts.places import ContactPlace
 from vftcli.contacts.windows import (
     BlockLog,
+    BlockSpan,
     ContactPrior,
     Lane,
-    Run,
     assembled,
     batches,
     gate_of,
@@ -42,7 +42,7 @@ LASTING, STEADY_TIME = 1.5, 100.0
 
 
 def evidence(
-    log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[Run], prior: ContactPrior
+    log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[BlockSpan], prior: ContactPrior
 ) -> Array:
     """Evidence ln p(d | contact there) − ln p(d | nothing) of the best size. (C, places) [nats]"""
     count = len(log.blocks.t)

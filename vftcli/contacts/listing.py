@@ -28,13 +28,13 @@ from vftcli.contacts.untouched import (
     observed,
     untouched_motion,
 )
-from vftcli.contacts.windows import BlockLog, Run, gate_of
+from vftcli.contacts.windows import BlockLog, BlockSpan, gate_of
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.disturbance import disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -62,7 +62,7 @@ def list_contacts(
     """What touched the arm along a log."""
     check_finite(motion.log)
     check_length(motion.log.recording)
-    seconds = block_length(motion.log.recording.t)
+    seconds = block_length(motion.log.t)
     free = untouched_motion(motion, seconds)
     if free is None:
         free = inferred_motion(motion.log, bias or whole_log_bias(motion.log), seconds)
@@ -75,12 +75,12 @@ def list_contacts(
     return made if has_wrench(motion.log) else without_forces(made)
 
 
-def check_finite(run: ModelledRun) -> None:
+def check_finite(run: Run) -> None:
     """Raise unless momentum and torque are known at every sample."""
     known: Mask = np.asarray(np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1))
     if not known.all():
         raise ParameterError(
-            f"{run.recording.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
+            f"{run.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
             "finite; leave them out with --interval"
         )
 
@@ -101,7 +101,7 @@ def check_length(recording: Recording) -> None:
         )
 
 
-def has_wrench(run: ModelledRun) -> bool:
+def has_wrench(run: Run) -> bool:
     """Whether the arm has joints enough to tell the six components of a wrench."""
     return run.robot.joints >= 6
 
@@ -139,7 +139,7 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     if not np.isfinite(smallest) and not named and has_wrench(run):
         smallest = felt_by(run, free.level)
     return ContactList(
-        recording=run.recording.name,
+        recording=run.name,
         duration=run.recording.duration,
         contacts=numbered(told),
         candidates=numbered(sorted((replace(row, inferred=True) for row in weak), key=start_of)),
@@ -162,9 +162,9 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     )
 
 
-def carried(load: FreeLoad, run: ModelledRun) -> CarriedLoad:
+def carried(load: FreeLoad, run: Run) -> CarriedLoad:
     """A load that the arm carries, with the payload of the robot's file that weighs as much."""
-    t, dq = run.recording.t, run.recording.require("dq")
+    t, dq = run.t, run.dq
     moves = t[faster(dq).any(axis=1)]
     span = (float(moves[0]), float(moves[-1])) if len(moves) else (float(t[0]), float(t[-1]))
     apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
@@ -178,7 +178,7 @@ def start_of(row: Contact) -> float:
     return row.start
 
 
-def adjoining(runs: Sequence[Run], rows: Sequence[Contact]) -> list[list[int]]:
+def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:
     """Numbers of the rows, those together of which one has no size of its own beside the other."""
     groups: list[list[int]] = []
     sized = [(row.peak_force or 0.0) > (row.place_band or 0.0) for row in rows]
@@ -198,13 +198,13 @@ def measured_rows(free: Untouched, measurer: Measurer) -> list[Contact]:
     return [rows[k] for k in sorted(rows)]
 
 
-def at_end(found: Found, span: Run) -> bool:
+def at_end(found: Found, span: BlockSpan) -> bool:
     """Whether a candidate lies wholly within `AT_ENDS` of either end of the log."""
     t = found.log.blocks.t
     return bool(t[span[1] - 1] < t[0] + AT_ENDS or t[span[0]] > t[-1] - AT_ENDS)
 
 
-def rests_around(recording: Recording, found: Found, span: Run) -> bool:
+def rests_around(recording: Recording, found: Found, span: BlockSpan) -> bool:
     """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
     first, last = np.searchsorted(recording.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
@@ -217,7 +217,7 @@ def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:
     return tuple(row.numbered(k) for k, row in enumerate(rows, start=1))
 
 
-def lasts(found: Found, span: Run) -> float:
+def lasts(found: Found, span: BlockSpan) -> float:
     """How long a contact lasts. [s]"""
     return float(found.log.blocks.length[slice(*span)].sum())
 
@@ -251,13 +251,13 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
     return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(sites), strict=True))
 
 
-def in_free_part(run: ModelledRun, found: Found, span: tuple[int, int], free: Untouched) -> bool:
+def in_free_part(run: Run, found: Found, span: tuple[int, int], free: Untouched) -> bool:
     """Whether a candidate lies in the log's own free part."""
     middle = float(np.mean(found.log.blocks.t[slice(*span)]))
-    return bool(free.own[np.searchsorted(run.recording.t, middle)])
+    return bool(free.own[np.searchsorted(run.t, middle)])
 
 
-def is_stop(run: ModelledRun, found: Found, number: int, seconds: float) -> bool:
+def is_stop(run: Run, found: Found, number: int, seconds: float) -> bool:
     """Whether a candidate follows an abrupt stop of the arm."""
     first, last = found.runs[number]
     t, half = found.log.blocks.t, 0.5 * found.log.blocks.length
@@ -276,9 +276,7 @@ def false_rows(free: Untouched, seconds: float) -> int:
     return count
 
 
-def limits(
-    run: ModelledRun, free: Untouched, stops: tuple[float, ...], smallest: float
-) -> list[Remark]:
+def limits(run: Run, free: Untouched, stops: tuple[float, ...], smallest: float) -> list[Remark]:
     """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     if free.basis != "free motion":
@@ -293,23 +291,23 @@ def limits(
     return found
 
 
-def felt_by(run: ModelledRun, torque: Array) -> float:
+def felt_by(run: Run, torque: Array) -> float:
     """Median over the log of the force along its best axis that turns no joint further. [N]
 
     Args:
         run: The log.
         torque: What each joint may hide: 1.96 standard deviations of it. (n,) [N·m]
     """
-    J = np.abs(flange_jacobian(run.robot.loaded_chain, run.recording.q)[:, :3])
+    J = np.abs(flange_jacobian(run.robot.loaded_chain, run.q)[:, :3])
     each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)
     return float(np.median(each.min(axis=1)))
 
 
-def without_list(run: ModelledRun) -> ContactList:
+def without_list(run: Run) -> ContactList:
     """A list without rows: nothing tells a contact from an error of the model."""
     unknown = np.full(run.robot.joints, np.nan)
     return ContactList(
-        recording=run.recording.name,
+        recording=run.name,
         duration=run.recording.duration,
         contacts=(),
         candidates=(),
@@ -327,9 +325,9 @@ def without_list(run: ModelledRun) -> ContactList:
     )
 
 
-def largest_torque(run: ModelledRun) -> Unexplained:
+def largest_torque(run: Run) -> Unexplained:
     """The largest torque that the momentum observer reads along a log."""
-    t = run.recording.t
+    t = run.t
     torque = np.abs(observed(run))
     torque[t < t[0] + SETTLED] = 0.0
     k, j = np.unravel_index(np.argmax(torque), torque.shape)

@@ -11,7 +11,6 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import REST, faster
-from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import DRIVES, SmoothedWrench, smooth_wrench
 
 #: Share of the time since the first motion that contacts must fill together to be a load.
@@ -47,17 +46,10 @@ def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
     return len(contacts) == 1 or together > ALIKE * float(sizes)
 
 
-def free_terms(motion: FreeMotion) -> list[FreeTerms]:
-    """The free part as the wrench smoother takes it."""
-    part = free_part(motion)
-    pieces = () if part is None else part.pieces
-    return [FreeTerms(p.run.terms, p.run.recording.q, p.inside) for p in pieces]
-
-
 def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
     """One row for contacts that are a load: the mean of the ungated wrench, with its band."""
-    run = motion.log
-    wrench = smooth_wrench(run.terms, run.recording.q, run.robot, free_terms(motion))
+    part = free_part(motion)
+    wrench = smooth_wrench(motion.log, () if part is None else part.pieces)
     start, stop = contacts[0].start, contacts[-1].stop
     mean, sd = mean_and_spread(wrench, start, stop)
     size = float(np.linalg.norm(mean[:3]))

@@ -23,7 +23,7 @@ from vftcli.contacts.search import Found
 from vftcli.contacts.sizes import learn_prior, smooth_contacts
 from vftcli.contacts.untouched import SelfTest, Untouched, self_test
 from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
@@ -55,7 +55,7 @@ POINT_MOMENT = 1e-3  #: Standard deviation of the moment about the point of a po
 class Measurer:
     """Measures the contacts of one log."""
 
-    run: ModelledRun  #: The log with its robot's model.
+    run: Run  #: The log with its robot's model.
     found: Found  #: The contacts that were kept.
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
     prior: ContactPrior  #: How the wrench of the contacts moves.
@@ -67,7 +67,7 @@ class Measurer:
 
     @classmethod
     def of(
-        cls, run: ModelledRun, found: Found, free: Untouched, like: "Measurer | None" = None
+        cls, run: Run, found: Found, free: Untouched, like: "Measurer | None" = None
     ) -> "Measurer":
         """Learn what the contacts' wrench is like, and how well free motion lets it be told."""
         blocks, J = found.log.blocks, found.places[0].jacobian
@@ -171,7 +171,7 @@ class Measurer:
         on_wrist = named == "wrist" and lead >= SURE_NATS
         remarks = () if on_wrist else site.limits(size, anywhere)
         spread = 0.0 if on_wrist else site.spread(size)
-        rate = 1.0 / median_step(self.run.recording.t)
+        rate = 1.0 / median_step(self.run.t)
         if length.sum() < SHORT and rate < SLOW:
             remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
         start = float(blocks.t[run[0]] - 0.5 * blocks.length[run[0]])
@@ -313,21 +313,21 @@ def with_drives(force: Array, covariance: Array) -> Array:
     return found
 
 
-def vendor_force(run: ModelledRun, J: Array, peak: int, t: Array) -> float | None:
+def vendor_force(run: Run, J: Array, peak: int, t: Array) -> float | None:
     """|F| at the flange of the log's own torque estimate at the peak, None without one. [N]"""
     own = run.recording.tau_ext
     if own is None or J.shape[1] < 6:
         return None
-    torque = np.array([np.interp(t[peak], run.recording.t, column) for column in own.T])
+    torque = np.array([np.interp(t[peak], run.t, column) for column in own.T])
     found = float(np.linalg.norm(np.linalg.lstsq(J.T, torque, rcond=None)[0][:3]))
     return found if np.isfinite(found) else None
 
 
-def sensor_force(run: ModelledRun, at: float) -> float | None:
+def sensor_force(run: Run, at: float) -> float | None:
     """|F| of the log's own wrench at a time, None without one or where it is all zeros. [N]"""
     own = run.recording.wrench
     if own is None or not own.any():
         return None
-    force = [np.interp(at, run.recording.t, column) for column in own[:, :3].T]
+    force = [np.interp(at, run.t, column) for column in own[:, :3].T]
     found = float(np.linalg.norm(force))
     return found if np.isfinite(found) else None

@@ -11,9 +11,9 @@ from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, spike
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
-from vftcli.contacts.windows import BlockLog, ContactPrior, Run
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.contacts.windows import BlockLog, BlockSpan, ContactPrior
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
 
@@ -27,7 +27,7 @@ class Found(NamedTuple):
 
     log: BlockLog  #: The log in blocks, b strict.
     places: list[ContactPlace]  #: Where a contact may be.
-    runs: list[Run]  #: Blocks of every candidate, in the order of time.
+    runs: list[BlockSpan]  #: Blocks of every candidate, in the order of time.
     evidence: Array  #: Of every candidate at every place. (C, places) [nats]
     #: Of every candidate whether a joint's torque is beyond its threshold in it.
     beyond: list[bool]
@@ -56,7 +56,7 @@ class Found(NamedTuple):
         )
 
 
-def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) -> Found:
+def search(run: Run, noise: ErrorNoise, level: Array, seconds: float) -> Found:
     """Look for contacts along a log.
 
     Args:
@@ -65,7 +65,7 @@ def search(run: ModelledRun, noise: ErrorNoise, level: Array, seconds: float) ->
         level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
         seconds: Length of a block. [s]
     """
-    blocks = disturbance_blocks(run.terms, run.recording.q, seconds)
+    blocks = disturbance_blocks(run.terms, run.q, seconds)
     there = places(run.robot.loaded_chain, blocks.q)
     J = there[0].jacobian
     ahead, back = error_course(noise, blocks), error_course(noise, turned_round(blocks))
@@ -103,7 +103,7 @@ def turned_round(blocks: Blocks) -> Blocks:
     )
 
 
-def lasting_beside(blocks: Blocks, taken: Mask, beyond: Sequence[Run]) -> list[slice]:
+def lasting_beside(blocks: Blocks, taken: Mask, beyond: Sequence[BlockSpan]) -> list[slice]:
     """Where a torque beyond the threshold goes on, before, between or behind blocks that are taken.
 
     The two-state filter takes a load that hangs on for many seconds for an error of the model, and
@@ -119,9 +119,9 @@ def lasting_beside(blocks: Blocks, taken: Mask, beyond: Sequence[Run]) -> list[s
     return found
 
 
-def beyond_threshold(run: ModelledRun, level: Array, blocks: Blocks) -> list[Run]:
+def beyond_threshold(run: Run, level: Array, blocks: Blocks) -> list[BlockSpan]:
     """Runs of blocks in which a joint's torque is beyond its threshold."""
-    t = run.recording.t
+    t = run.t
     above = threshold_contacts(t, observed(run), expected_torque(run, level))
     above &= t >= t[0] + SETTLED
     found = []

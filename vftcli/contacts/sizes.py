@@ -12,9 +12,9 @@ import numpy as np
 from vftcli.contacts.windows import (
     MARGIN,
     BlockLog,
+    BlockSpan,
     ContactPrior,
     Lane,
-    Run,
     WindowWrench,
     gate_of,
     likelihoods,
@@ -39,7 +39,7 @@ HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
 def smooth_contacts(
     log: BlockLog,
     jacobians: Sequence[Array],
-    runs: Sequence[Run],
+    runs: Sequence[BlockSpan],
     priors: Sequence[ContactPrior],
 ) -> list[WindowWrench]:
     """The wrench in the window of every contact.
@@ -56,7 +56,7 @@ def smooth_contacts(
 def contact_lanes(
     log: BlockLog,
     jacobians: Sequence[Array],
-    runs: Sequence[Run],
+    runs: Sequence[BlockSpan],
     priors: Sequence[ContactPrior],
     margin: float = MARGIN,
 ) -> list[Lane]:
@@ -79,7 +79,7 @@ def contact_lanes(
 
 
 def learn_prior(
-    log: BlockLog, jacobian: Array, runs: Sequence[Run], prior: ContactPrior, rounds: int
+    log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: ContactPrior, rounds: int
 ) -> ContactPrior:
     """The prior by expectation and maximisation: τ_w by likelihood, then σ_f and σ_m by the mean.
 
@@ -110,7 +110,7 @@ def learn_prior(
     return prior
 
 
-def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list[Run]:
+def split_run(t: Array, course: WindowWrench, run: BlockSpan, jacobian: Array) -> list[BlockSpan]:
     """A contact's blocks, split where force and joint torque are gone for a while between peaks.
 
     Args:
@@ -138,7 +138,7 @@ def split_run(t: Array, course: WindowWrench, run: Run, jacobian: Array) -> list
     ]
 
 
-def split_at_turns(t: Array, force: Array, torque: Array, piece: Run) -> list[Run]:
+def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
     """A stretch of a contact, split at valleys of force and torque between different directions.
 
     Args:

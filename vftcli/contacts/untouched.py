@@ -25,14 +25,14 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.observers import MomentumObserver
-from vftcli.observers.spectra import Part, looks_free, spectra_of
+from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.refinement.whole_log import WholeLogBias
-from vftcli.repetition.free_load import FreeLoad, free_load
-from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.repetition.free_load import FreeLoad, free_load, without_load
+from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.intervals import near, runs_of
@@ -67,9 +67,9 @@ class Untouched:
     own: Mask  #: Samples of the log itself that are known to be free. (T,)
     #: The log, less a load that the free part carries; less the model error of the whole log where
     #: the basis is that.
-    log: ModelledRun
-    runs: tuple[ModelledRun, ...]  #: Free runs in other logs, less a load that they carry.
-    free: tuple[FreePiece, ...]  #: Every free piece, less a load that it carries.
+    log: Run
+    runs: tuple[Run, ...]  #: Free runs in other logs, less a load that they carry.
+    free: tuple[Samples, ...]  #: Every free piece, less a load that it carries.
     pieces: tuple[Blocks, ...]  #: The same in blocks.
     #: A load that the arm carries in this log and its model lacks, None where none shows.
     load: FreeLoad | None
@@ -103,7 +103,7 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
         return None
     load = free_load(part.pieces)
     # A load nobody told of is no noise: contacts are told beside it.
-    pieces = tuple(p._replace(run=unloaded(p.run, load)) for p in part.pieces)
+    pieces = tuple(p._replace(run=without_load(p.run, load)) for p in part.pieces)
     found = noise_of(pieces, seconds)
     if found is None:
         return None
@@ -111,7 +111,7 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
         noise=found[0],
         level=torque_level(pieces),
         own=part.own,
-        log=unloaded(motion.log, load),
+        log=without_load(motion.log, load),
         runs=tuple(p.run for p in pieces if p.run.recording is not motion.log.recording),
         free=pieces,
         pieces=found[1],
@@ -120,7 +120,7 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     )
 
 
-def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Untouched | None:
+def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched | None:
     """What a log without known free motion lets infer of it, None where it lets infer nothing.
 
     The model error that the whole log shows is taken off where its guard allows it, then a load.
@@ -133,12 +133,12 @@ def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Unt
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
-    corrected = log.with_terms(bias.corrected(log.terms))
+    corrected = bias.corrected(log)
     short = any(remark.code in SHORT_LOG for remark in bias.remarks)
     # An arm that holds one pose does not tell a mass from a push.
-    weighed = free_load([FreePiece(corrected, bias.free)]) if bias.fitted or short else None
-    corrected = unloaded(corrected, weighed)
-    free = (FreePiece(corrected, bias.free),) if bias.fitted else ()
+    weighed = free_load([Samples(corrected, bias.free)]) if bias.fitted or short else None
+    corrected = without_load(corrected, weighed)
+    free = (Samples(corrected, bias.free),) if bias.fitted else ()
     found = inferred(corrected, free, seconds)
     if found is None:
         return None
@@ -157,30 +157,24 @@ def inferred_motion(log: ModelledRun, bias: WholeLogBias, seconds: float) -> Unt
 
 
 def inferred(
-    log: ModelledRun, free: Sequence[FreePiece], seconds: float
+    log: Run, free: Sequence[Samples], seconds: float
 ) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
     """Noise that is inferred, and its free pieces in blocks of a length [s]; None without any."""
-    whole = disturbance_blocks(log.terms, log.recording.q, seconds)
+    whole = disturbance_blocks(log.terms, log.q, seconds)
     learned = noise_of(free, seconds) if free else None
     noise = infer_noise(whole, dry_torques(log.robot), None if learned is None else learned[0])
     return None if noise is None else (noise, () if learned is None else learned[1])
 
 
 def noise_of(
-    pieces: Sequence[FreePiece], seconds: float
+    pieces: Sequence[Samples], seconds: float
 ) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
     """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short."""
     blocks = tuple(
-        disturbance_blocks(piece.run.terms, piece.run.recording.q, seconds, piece.inside)
-        for piece in pieces
+        disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside) for piece in pieces
     )
     noise = learn_noise(blocks, dry_torques(pieces[0].run.robot))
     return None if noise is None else (noise, blocks)
-
-
-def unloaded(run: ModelledRun, load: FreeLoad | None) -> ModelledRun:
-    """A run with a load taken off its terms, the run itself where there is none."""
-    return run if load is None else run.with_terms(load.off(run.terms, run))
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
@@ -194,24 +188,24 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if not choice.cycles and not repeats(motion):
             return None
         found = motion.free_cycles
-        own = own | np.isin(motion.cycles.number(log.recording.t), found.numbers)
+        own = own | np.isin(motion.cycles.number(log.t), found.numbers)
         if not choice.cycles and is_touched(log, own):
             return None
         remarks.append(found.remark(motion.cycles.whole))
-    pieces = [FreePiece(log, own)] if own.any() else []
+    pieces = [Samples(log, own)] if own.any() else []
     for run in motion.runs:
-        pieces.append(FreePiece(run.run, np.ones(run.recording.samples, dtype=bool)))
+        pieces.append(Samples(run.run, np.ones(run.recording.samples, dtype=bool)))
         remarks.append(fact("free-log", Where(about=run.recording.name)))
     return FreePart(tuple(pieces), own, tuple(remarks))
 
 
-def is_touched(log: ModelledRun, own: Mask) -> bool:
+def is_touched(log: Run, own: Mask) -> bool:
     """Whether a free part that was found is none: no quieter than the rest, and beyond friction."""
-    above = threshold_contacts(log.recording.t, observed(log), expected_torque(log, None))
-    if not (above & own & (log.recording.t >= log.recording.t[0] + SETTLED)).any():
+    above = threshold_contacts(log.t, observed(log), expected_torque(log, None))
+    if not (above & own & (log.t >= log.t[0] + SETTLED)).any():
         return False
     try:
-        return not looks_free(spectra_of(Part(log.terms, ~own), [Part(log.terms, own)]))
+        return not looks_free(spectra_of(Samples(log, ~own), [Samples(log, own)]))
     except ParameterError:  # too short for a spectrum
         return False
 
@@ -224,32 +218,32 @@ def repeats(motion: FreeMotion) -> bool:
         return False
 
 
-def observed(run: ModelledRun) -> Array:
+def observed(run: Run) -> Array:
     """The momentum observer's torque along a log. (T, n) [N·m]"""
     return MomentumObserver(gain=GAIN).estimate(run.terms).tau
 
 
-def observer_noise(run: ModelledRun) -> Array:
+def observer_noise(run: Run) -> Array:
     """Standard deviation of the noise of the observer's torque, whatever touches. (n,) [N·m]
 
     By second differences over twice the observer's time, which white noise has six times: what
     pushes last longer, and a median passes over what begins and ends in between.
     """
     torque = observed(run)
-    step = max(round(2.0 / (GAIN * median_step(run.recording.t))), 1)
+    step = max(round(2.0 / (GAIN * median_step(run.t))), 1)
     bends = torque[2 * step :] - 2.0 * torque[step:-step] + torque[: -2 * step]
     noise: Array = robust_sd(bends) / np.sqrt(6.0)
     return noise
 
 
-def torque_level(pieces: Sequence[FreePiece]) -> Array:
+def torque_level(pieces: Sequence[Samples]) -> Array:
     """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
     values, moves = [], []
     for piece in pieces:
-        t = piece.run.recording.t
+        t = piece.run.t
         use = piece.inside & (t >= t[0] + SETTLED)
         values.append(observed(piece.run)[use])
-        moves.append(faster(piece.run.recording.require("dq")[use], REST))
+        moves.append(faster(piece.run.dq[use], REST))
     torque, moving = np.abs(np.concatenate(values)), np.concatenate(moves)
     found = np.empty(torque.shape[1])
     for j, column in enumerate(torque.T):
@@ -259,7 +253,7 @@ def torque_level(pieces: Sequence[FreePiece]) -> Array:
     return found
 
 
-def expected_torque(run: ModelledRun, level: Array | None) -> Array:
+def expected_torque(run: Run, level: Array | None) -> Array:
     """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]
 
     Args:

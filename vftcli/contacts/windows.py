@@ -18,7 +18,7 @@ from vftcli.virtual_sensor.smoother.noise import steps
 
 MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
-Run = tuple[int, int]  #: Number of the first block, and of the one behind the last.
+BlockSpan = tuple[int, int]  #: Number of the first block, and of the one behind the last.
 
 
 class ContactPrior(NamedTuple):
@@ -45,21 +45,21 @@ class BlockLog(NamedTuple):
 class Lane(NamedTuple):
     """One hypothesis on one window."""
 
-    window: Run  #: Which blocks.
+    window: BlockSpan  #: Which blocks.
     gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
     hidden: Mask  #: Blocks of the log that say nothing. (K,)
     jacobian: Array  #: J along the log. (K, 6, n)
     prior: ContactPrior | None  #: How the wrench may move; None where nothing touches.
 
 
-def window_of(t: Array, run: Run, margin: float = MARGIN) -> Run:
+def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
     """The blocks within `margin` of a run of them."""
     first = int(np.searchsorted(t, t[run[0]] - margin))
     last = int(np.searchsorted(t, t[run[1] - 1] + margin, side="right"))
     return first, last
 
 
-def gate_of(count: int, runs: Sequence[Run]) -> Mask:
+def gate_of(count: int, runs: Sequence[BlockSpan]) -> Mask:
     """The blocks of some runs and one on either side. (K,)"""
     inside = np.zeros(count, dtype=bool)
     for start, stop in runs:
@@ -136,7 +136,7 @@ class WindowWrench(NamedTuple):
     values: Array  #: Force and moment in base axes. (k, 6) [N, N·m]
     covariance: Array  #: (k, 6, 6)
 
-    def within(self, run: Run) -> "WindowWrench":
+    def within(self, run: BlockSpan) -> "WindowWrench":
         """The wrench in some of its blocks."""
         span = slice(run[0] - self.first, run[1] - self.first)
         return WindowWrench(run[0], self.values[span], self.covariance[span])

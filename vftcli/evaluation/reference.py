@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.evaluation.touches import touched_remarks
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.drive import check_joints
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
@@ -27,7 +27,7 @@ class ReferenceLoad:
     wrench: Wrench | None = None
 
 
-def zero_reference(log: ModelledRun) -> ReferenceLoad:
+def zero_reference(log: Run) -> ReferenceLoad:
     """No contact at all: the reference of a free motion.
 
     How free it was cannot be known from the log alone, so neither can its error; where the log

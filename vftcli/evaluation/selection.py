@@ -8,7 +8,7 @@ import polars as pl
 
 from vftcli.evaluation.joint_means import joint_means
 from vftcli.observers.observer import Observer, Tuning
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import median_step
@@ -46,11 +46,11 @@ class Advice(NamedTuple):
 def facts(
     observers: Sequence[Observer],
     tunings: Mapping[str, Tuning],
-    run: ModelledRun,
+    run: Run,
     errors: pl.DataFrame | None,
 ) -> tuple[Facts, ...]:
     """The facts of every observer that has a response of its own."""
-    step = median_step(run.recording.t)
+    step = median_step(run.t)
     return tuple(
         facts_of(observer, tunings[observer.name], run.noise, step, errors)
         for observer in observers

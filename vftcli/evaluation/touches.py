@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
 from vftcli.signals.intervals import runs_of
@@ -43,21 +43,20 @@ class ShownContact(NamedTuple):
     excess: float  #: The largest torque that is open, over its limit.
 
 
-def touches(run: ModelledRun) -> tuple[ShownContact, ...]:
+def touches(run: Run) -> tuple[ShownContact, ...]:
     """The contacts that a log shows, in the order of time; what it does not show may still be."""
     recording, robot = run.recording, run.robot
     # Motor friction that nobody models hides contact and looks like one.
     unknown = robot.torque_source == "current" and not robot.friction
     if unknown or recording.dq is None or recording.duration < SHORTEST:
         return ()
-    drive = run.drive
     cutoff = min(CUTOFF, 0.2 / recording.median_step)
-    open_torque = low_pass(drive.t, drive.model - drive.torque, cutoff)
+    open_torque = low_pass(run.t, run.model_torque - run.drive_torque, cutoff)
     level = np.abs(open_torque - np.median(open_torque, axis=0))
     quiet = np.median(level, axis=0)
-    limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * drive.coulomb), LEAST)
+    limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * run.dry_friction), LEAST)
     return tuple(
-        touch_in(drive.t, level, limit, quiet, start, stop)
+        touch_in(run.t, level, limit, quiet, start, stop)
         for start, stop in runs_of(np.asarray((level > limit).any(axis=1)))
     )
 
@@ -73,7 +72,7 @@ def touch_in(
     return ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
 
 
-def touched_remarks(run: ModelledRun) -> tuple[Remark, ...]:
+def touched_remarks(run: Run) -> tuple[Remark, ...]:
     """A warning where a log that is to be free shows contact, with the longest span without.
 
     What the model leaves open may be friction as well: who says that nobody touched the arm is
@@ -83,7 +82,7 @@ def touched_remarks(run: ModelledRun) -> tuple[Remark, ...]:
     if not found:
         return ()
     worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
-    t = run.recording.t
+    t = run.t
     edges = [float(t[0]), *(x for touch in found for x in (touch.start, touch.stop)), float(t[-1])]
     spans = list(zip(edges[::2], edges[1::2], strict=True))
     begin, end = max(spans, key=lambda span: span[1] - span[0])

@@ -23,12 +23,11 @@ from vftcli.identification.payload import (
 from vftcli.identification.processing import gravity_torque
 from vftcli.identification.result import root_mean_square
 from vftcli.repetition.free_load import LEAST, PARTLY, SURE, columns, weighed
-from vftcli.repetition.free_motion import FreePiece
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
@@ -81,7 +80,7 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
             f"{names}: {seconds:.3g} s of motion are too short to weigh a load; record {LONG:g} s "
             "at least"
         )
-    runs = [ModelledRun(recording=recording, robot=robot) for recording in recordings]
+    runs = [Run(recording=recording, robot=robot) for recording in recordings]
     found = weigh_motion(runs, np.zeros(STATIC))
     if not found.shows:
         least = float(f"{found.least:.2g}")
@@ -101,7 +100,7 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
     )
 
 
-def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
+def weigh_motion(runs: Sequence[Run], carried: Array) -> MotionWeighing:
     """Weigh a load in motion, from what it is known to be.
 
     A joint counts where it moves, and its friction is free: a tanh(q̇/v₀) + b q̇ + o. Nothing is
@@ -114,10 +113,10 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
-        piece = FreePiece(run, np.ones(run.recording.samples, dtype=bool))
+        piece = Samples(run, np.ones(run.recording.samples, dtype=bool))
         at, own = weighed(piece), columns(piece)
         if own is not None:
-            signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))
+            signals.append((*own, run.q[at], run.dq[at]))
     if not signals:
         names = names_of([run.recording for run in runs])
         raise IdentificationError(f"{names}: no log is long enough to be filtered")
@@ -144,11 +143,11 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> MotionWeighing:
     )
 
 
-def carrying(run: ModelledRun, x: Array) -> ModelledRun:
+def carrying(run: Run, x: Array) -> Run:
     """A run whose model carries a load too, a point mass of x (4,) [kg, kg·m] in flange axes."""
     load = Payload(mass=float(x[0]), com=x[1:] / x[0], inertia=np.zeros((3, 3)))
-    q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
+    q, dq, bare, terms = run.q, run.dq, run.robot.chain, run.terms
     own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)
     more = loaded.coriolis_transpose_dq - own.coriolis_transpose_dq
     mu = handed_over(terms.mu + more - loaded.gravity + own.gravity)
-    return run.with_terms(replace(terms, p=handed_over(terms.p + loaded.p - own.p), mu=mu))
+    return run.holding(terms=replace(terms, p=handed_over(terms.p + loaded.p - own.p), mu=mu))

@@ -16,13 +16,12 @@ an error too.
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.disturbance import disturbance_stretches
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Samples
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.intervals import grown, intervals
@@ -143,13 +142,6 @@ def neighbour_mean(spectrum: Array) -> Array:
     return mean
 
 
-class Part(NamedTuple):
-    """A log's p and μ, and which of its samples belong to the part."""
-
-    terms: DynamicsTerms  #: p and μ.
-    inside: Mask  #: (T,)
-
-
 def around_impacts(t: Array, inside: Mask) -> Mask:
     """A part as it is, or half of `IMPACT` more on either side if none of it lasts that long. (T,)
 
@@ -160,17 +152,17 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
     return inside if intervals(t, inside, least=IMPACT) else grown(t, inside, 0.5 * IMPACT)
 
 
-def spectra_of(loaded: Part, free: Sequence[Part]) -> Spectra:
+def spectra_of(loaded: Samples, free: Sequence[Samples]) -> Spectra:
     """The spectra of a loaded part and a free one, by the same estimator.
 
     A loaded part of short impacts is widened until it holds a second in a row: its excess over the
     free part is then that of the impacts, thinned by what stands around them, and set right.
     """
-    t = loaded.terms.t
+    t = loaded.run.t
     nominal = median_step(t) if len(t) > 1 else 0.0
     inside = around_impacts(t, loaded.inside)
-    heavy = disturbance_stretches(loaded.terms, inside, nominal)
-    quiet = [d for part in free for d in disturbance_stretches(*part, nominal)]
+    heavy = disturbance_stretches(loaded.run.terms, inside, nominal)
+    quiet = [d for run, at in free for d in disturbance_stretches(run.terms, at, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
     size = min(round(SEGMENT / nominal) if nominal else 0, *longest)
     if size < LEAST_SEGMENT:

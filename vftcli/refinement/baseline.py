@@ -6,13 +6,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Part, Spectra, looks_free, spectra_of
+from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.refinement.tuning import gains_of
-from vftcli.repetition.free_load import FreeLoad, free_load
-from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
-from vftcli.repetition.free_run import ModelledRun
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.repetition.free_load import FreeLoad, free_load, without_load
+from vftcli.repetition.free_motion import FreeMotion, FreePart
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
@@ -46,45 +45,30 @@ class Baseline:
     by_fit: bool = False
     #: What was applied of it and what was not, and what stands in for a free part.
     on_correction: tuple[Remark, ...] = ()
-    best: "Baseline | None" = None  #: The baseline that `best` runs on, None where it is this one.
-    _made: dict[ModelledRun, DynamicsTerms] = field(
-        init=False, repr=False, compare=False, default_factory=dict
-    )
+    _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "standing", frozen_mask(self.standing))
 
-    def under(self, name: str) -> "Baseline":
-        """The baseline that the observer of this name runs on."""
-        return self.best if name == BEST and self.best is not None else self
-
-    def terms_of(self, run: ModelledRun) -> DynamicsTerms:
-        """P and μ of the log or of one of its free runs, as this baseline has them. Made once.
+    def of(self, run: Run) -> Run:
+        """The log or one of its free runs, as the observers have it. Made once.
 
         Where a correction was looked for, an observer has no samples that stand alone either.
         """
         if not self.on_correction:
-            return run.terms
+            return run
         run = run.steadied
         if self.correction is None:
-            return run.terms
+            return run
         if run not in self._made:
             own = run is self.motion.log
-            plain = run.terms
-            made = self.correction.corrected(plain) if own else self.correction.of(run)
-            self._made[run] = made
+            self._made[run] = (self.correction.corrected if own else self.correction.of)(run)
         return self._made[run]
 
     @property
-    def terms(self) -> DynamicsTerms:
-        """P and μ of the log, the correction off."""
-        return self.terms_of(self.motion.log)
-
-    def shown(self, *, gains: bool) -> LogSpectra:
-        """What it shows to the observers that are built for the log."""
-        plain = self.tunable
-        called_for = gains_of(plain) if gains and plain is not None else None
-        return LogSpectra(plain=plain, best=self.under(BEST).tunable, gains=called_for)
+    def log(self) -> Run:
+        """The log, as the observers have it."""
+        return self.of(self.motion.log)
 
     @property
     def tunable(self) -> Spectra | None:
@@ -106,24 +90,19 @@ class Baseline:
         return None if self.correction is None else self.correction.sd
 
     @property
-    def samples(self) -> list[Part]:
-        """P and μ of the free pieces, the correction off, and which samples are free.
-
-        A load that they carry is no noise, and is off too.
-        """
-        parts = []
-        for run, inside in self.pieces:
-            terms = self.terms_of(run)
-            parts.append(Part(terms if self.load is None else self.load.off(terms, run), inside))
-        return parts
+    def samples(self) -> list[Samples]:
+        """The free samples as the observers have them, less a load, which is no noise."""
+        return [
+            Samples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
+        ]
 
     @property
-    def pieces(self) -> tuple[FreePiece, ...]:
+    def pieces(self) -> tuple[Samples, ...]:
         """The free samples, of the log itself and of free runs; none without a free part."""
         return self.part.pieces if self.part is not None else ()
 
     @property
-    def untouched(self) -> tuple[FreePiece, ...]:
+    def untouched(self) -> tuple[Samples, ...]:
         """The pieces in which nothing at all touches the arm, as far as it is known."""
         return () if self.by_fit else self.pieces
 
@@ -138,14 +117,13 @@ class Baseline:
         found = self.part.remarks if self.part is not None else ()
         load = () if self.load is None else (self.load.remark,)
         missing = () if self.missing is None else (self.missing,)
-        best = () if self.best is None else self.best.on_correction
-        return (*found, *load, *missing, *self.on_correction, *best)
+        return (*found, *load, *missing, *self.on_correction)
 
 
 def baseline_of(motion: FreeMotion) -> Baseline:
     """Find the free part of a log and its spectra, or say why there are none."""
     log = motion.log
-    stands = standing(log.recording.t, log.recording.require("dq"))
+    stands = standing(log.t, log.dq)
     bare = Baseline(motion=motion, standing=stands)
     try:
         part = motion.part
@@ -153,7 +131,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
     known = replace(bare, part=part, load=free_load(part.pieces))
     try:
-        spectra = spectra_of(Part(log.terms, ~part.own), known.samples)
+        spectra = spectra_of(Samples(log, ~part.own), known.samples)
     except ParameterError as error:
         return replace(known, missing=caution("no-spectra", reason=str(error)))
     if motion.choice.is_given or looks_free(spectra):
@@ -161,6 +139,30 @@ def baseline_of(motion: FreeMotion) -> Baseline:
     residuals = motion.free_cycles.residuals
     listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()
     return replace(bare, missing=caution("free-part-not-quiet", residuals=listed))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Baselines:
+    """What the observers of a log run on."""
+
+    plain: Baseline  #: What all but `best` run on.
+    best: Baseline  #: What `best` runs on: less the bias of the whole log, where that was fitted.
+
+    def of(self, name: str) -> Baseline:
+        """What the observer of this name runs on."""
+        return self.best if name == BEST else self.plain
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What was found, and what was not and why."""
+        apart = () if self.best is self.plain else self.best.on_correction
+        return (*self.plain.remarks, *apart)
+
+    def spectra(self, *, gains: bool) -> LogSpectra:
+        """What the observers that are built for the log are tuned to."""
+        plain = self.plain.tunable
+        called_for = gains_of(plain) if gains and plain is not None else None
+        return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
 
 
 class FreeReading(NamedTuple):
@@ -186,7 +188,7 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
     """Run an observer along the free pieces; along the log itself that is its estimate."""
     log = found.motion.log
     read = [
-        estimate.tau if run is log else observer.estimate(found.terms_of(run)).tau
+        estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
         for run, _ in found.pieces
     ]
     if found.load is not None:

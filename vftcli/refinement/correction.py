@@ -10,35 +10,37 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.spectra import Part, spectra_of
-from vftcli.refinement.baseline import Baseline, baseline_of
+from vftcli.observers.spectra import spectra_of
+from vftcli.refinement.baseline import Baseline, Baselines, baseline_of
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import free_load
-from vftcli.repetition.free_motion import FreeMotion, FreePart, FreePiece
+from vftcli.repetition.free_motion import FreeMotion, FreePart
+from vftcli.robots.run import Samples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.remarks import caution, fact
 
 
-def baseline_for(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baseline:
-    """The baseline of a log, and beside it that of `best` where it is another."""
+def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:
+    """What the observers of a log run on: `best` and, where it is asked, all less the bias."""
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
     if not (choice.corrects_all or (best and choice.corrects_best)):
-        return found
+        return Baselines(plain=found, best=found)
     try:
         bias = whole_log_bias(motion.log)
     except (VftError, np.linalg.LinAlgError) as error:
         failed = caution("whole-log-bias-failed", reason=str(error))
-        return replace(found, on_correction=(failed,))
+        found = replace(found, on_correction=(failed,))
+        return Baselines(plain=found, best=found)
     if found.spectra is None and bias.fitted:
         found = on_quiet_samples(found, bias.free)
     made = corrected(found, bias)
     if motion.log is not as_read:
         evened = motion.log.recording.source.remarks[-1:]
         made = replace(made, on_correction=(*evened, *made.on_correction))
-    return made if choice.corrects_all else replace(found, best=made)
+    return Baselines(plain=made if choice.corrects_all else found, best=made)
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
@@ -55,10 +57,10 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
         # What was given is dropped, and why has to be said.
         reason = found.missing.values["reason"]
         remark = caution("free-by-the-fit-instead", share=share, reason=reason)
-    part = FreePart((FreePiece(log, quiet),), quiet, (remark,))
+    part = FreePart((Samples(log, quiet),), quiet, (remark,))
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
-        return replace(made, spectra=spectra_of(Part(log.terms, ~quiet), made.samples))
+        return replace(made, spectra=spectra_of(Samples(log, ~quiet), made.samples))
     except ParameterError:  # all of it or nothing is taken for free, or never for long enough
         return found
 
@@ -72,4 +74,4 @@ def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
     made = replace(found, on_correction=bias.remarks, correction=fitted)
     if not bias.applied.any() or made.part is None or made.spectra is None:
         return made
-    return replace(made, spectra=spectra_of(Part(made.terms, ~made.part.own), made.samples))
+    return replace(made, spectra=spectra_of(Samples(made.log, ~made.part.own), made.samples))

@@ -72,4 +72,4 @@ def with_spare(
     made = SparedObserver(observer=observer, spare=spare, lost=lost)
     joints = tuple(int(j) + 1 for j in np.flatnonzero(lost))
     said = caution("estimate-without-number", Where(observer.name, joints))
-    return made, made.estimate(found.terms), (said,)
+    return made, made.estimate(found.log.terms), (said,)

@@ -57,7 +57,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     share: Array = np.abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     modelled = read - noise
-    velocity = [piece.run.recording.require("dq")[piece.inside] for piece in found.pieces]
+    velocity = [piece.run.dq[piece.inside] for piece in found.pieces]
     by_friction = modelled * friction_share(np.concatenate(velocity), reading.samples)
     robot = found.motion.log.robot
     hidden = ONE_STOP * dry_friction(robot.friction, robot.joints)
@@ -121,7 +121,7 @@ def expected_gap(
     paper = [o for o in observers if gains_of_file and o.name in known]
     if not paper:
         paper = [*observers]
-        readings = [free_reading(found, o, o.estimate(found.terms)) for o in paper]
+        readings = [free_reading(found, o, o.estimate(found.log.terms)) for o in paper]
         known |= {r.observer.name: with_band(found, r) for r in readings}
     errors = {}
     for name in (BEST, *(o.name for o in paper)):

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.chain import Chain
 from vftcli.robots.disturbance import GAP
 from vftcli.robots.friction import dry_friction, steady_torque
@@ -26,6 +25,7 @@ from vftcli.robots.regressor import (
     with_parameters,
 )
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step
@@ -51,10 +51,10 @@ class SmoothMotion(NamedTuple):
     rigid: Array  #: Torque of the rigid body and its rotors, without friction. (T, n) [N·m]
 
 
-def smooth_motion(run: ModelledRun) -> SmoothMotion:
+def smooth_motion(run: Run) -> SmoothMotion:
     """The smooth motion of a recording."""
-    t, n = without_waits(run.recording.t), run.recording.joints
-    both = zero_phase(t, np.hstack([run.recording.q, run.recording.require("dq")]), CUTOFF)
+    t, n = without_waits(run.t), run.recording.joints
+    both = zero_phase(t, np.hstack([run.q, run.dq]), CUTOFF)
     q, dq = both[:, :n], both[:, n:]
     rigid, gravity = rigid_torque(run.robot.loaded_chain, t, q, dq)
     return SmoothMotion(t, q, dq, derivative(t, dq), gravity, rigid)
@@ -79,13 +79,13 @@ def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Ar
     return derivative(t, found.p) - found.coriolis_transpose_dq + found.gravity, found.gravity
 
 
-def friction_shapes(run: ModelledRun, gravity: Array) -> list[Array]:
+def friction_shapes(run: Run, gravity: Array) -> list[Array]:
     """What each joint's friction may be wrong by, from the motion as it was measured.
 
     The smoothed sign, how far the presliding deflection is from it, the sign times the load, the
     velocity and its signed square. (T, n) each
     """
-    q, dq = run.recording.q, run.recording.require("dq")
+    q, dq = run.q, run.dq
     sign = np.tanh(dq / SMOOTHING)
     return [sign, play(q, PLAY).state - sign, np.abs(gravity) * sign, dq, dq * np.abs(dq)]
 
@@ -137,7 +137,7 @@ class ModelError:
         mine = [*drives, *self.friction[:, joint], self.offset[joint]]
         return np.concatenate([self.inertial[LINK * joint :], mine])
 
-    def torque(self, run: ModelledRun, motion: SmoothMotion) -> Array:
+    def torque(self, run: Run, motion: SmoothMotion) -> Array:
         """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
 
         The rigid body's part is the difference of two inverse dynamics, that of the chain with
@@ -211,9 +211,7 @@ def friction_alone(robot: Robot) -> ModelError:
     return replace(expected, **none)
 
 
-def error_columns(
-    run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int
-) -> list[Array]:
+def error_columns(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> list[Array]:
     """The rows of A of every joint, each column times its standard deviation.
 
     Returns:

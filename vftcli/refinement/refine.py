@@ -7,7 +7,7 @@ from vftcli.observers.auto_tuning import AutoTuned, Curve, bound_remarks
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import BEST
 from vftcli.refinement.band import band_remarks, with_band
-from vftcli.refinement.baseline import Baseline, free_reading
+from vftcli.refinement.baseline import Baselines, free_reading
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.fallback import with_spare
 from vftcli.refinement.limits import Budget, budget, expected_gap, limits_remark
@@ -21,7 +21,7 @@ class Refinement(Shown):
     """What the complete log makes of its estimates."""
 
     estimates: tuple[ExternalTorque, ...]  #: The estimates with their bands.
-    baseline: Baseline  #: The log's free part and spectra.
+    baselines: Baselines  #: The log's free part and spectra, as the observers have them.
     curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
     #: Where each observer's error comes from, one an observer; none without spectra.
     budgets: tuple[Budget, ...]
@@ -30,7 +30,7 @@ class Refinement(Shown):
 
 
 def refine(
-    found: Baseline,
+    found: Baselines,
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     removed: str = AUTOMATIC,
@@ -40,14 +40,14 @@ def refine(
     """Give estimates their bands, and say what limits them.
 
     Args:
-        found: The log's baseline.
+        found: What the observers run on.
         observers: The observers.
         estimates: Their estimates, in the same order.
         removed: What ``--remove-bias`` asked for.
         gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
     """
     # Not every observer need run on the same terms: each is measured on those that it runs on.
-    under = [found.under(observer.name) for observer in observers]
+    under = [found.of(observer.name) for observer in observers]
     spared = [with_spare(*each) for each in zip(under, observers, estimates, strict=True)]
     readings = [free_reading(on, *each[:2]) for on, each in zip(under, spared, strict=True)]
     budgets = [
@@ -59,10 +59,11 @@ def refine(
     shown = tuple(with_band(*pair) for pair in zip(under, readings, strict=True))
     # Of the most accurate estimate: of `best` if it ran, else of the last.
     leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
-    gap = expected_gap(found, shown, gains_of_file=gains_of_file)
+    plain = found.plain
+    gap = expected_gap(plain, shown, gains_of_file=gains_of_file)
     return Refinement(
         estimates=shown,
-        baseline=found,
+        baselines=found,
         curves=curves,
         budgets=tuple(budgets),
         removed=removed,
@@ -83,8 +84,8 @@ def refine(
                 for name, curve in curves.items()
                 for remark in bound_remarks(name, curve.best, curve.omega_n)
             ),
-            *band_remarks(found),
-            *(limits_remark(one, found.stuck) for one in leading),
+            *band_remarks(plain),
+            *(limits_remark(one, plain.stuck) for one in leading),
             *(() if gap is None else (gap,)),
         ),
     )

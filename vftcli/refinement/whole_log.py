@@ -26,7 +26,7 @@ from vftcli.refinement.normal_equations import Rows
 from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
 from vftcli.refinement.slow_load import slow_loads
 from vftcli.refinement.unseen import Guarded, faded, guarded
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
@@ -87,21 +87,18 @@ class WholeLogBias:
         """Joints on which the correction is used. (n,)"""
         return np.asarray(self.weight > 0.0)
 
-    def corrected(self, terms: DynamicsTerms) -> DynamicsTerms:
-        """The log's own terms without the bias, μ ← μ − b."""
-        if not self.applied.any():
-            return terms
-        return replace(terms, mu=handed_over(terms.mu - self.bias))
+    def corrected(self, log: Run) -> Run:
+        """The log itself without the bias, μ ← μ − b."""
+        return log.less(-self.bias) if self.applied.any() else log
 
-    def of(self, other: ModelledRun) -> DynamicsTerms:
-        """The terms of another recording of the arm without the same model error."""
+    def of(self, other: Run) -> Run:
+        """Another run of the arm without the same model error."""
         if self.error is None or not self.applied.any():
-            return other.terms
-        bias = self.weight * self.error.torque(other, smooth_motion(other))
-        return replace(other.terms, mu=handed_over(other.terms.mu - bias))
+            return other
+        return other.less(-self.weight * self.error.torque(other, smooth_motion(other)))
 
 
-def whole_log_bias(run: ModelledRun) -> WholeLogBias:
+def whole_log_bias(run: Run) -> WholeLogBias:
     """The model's bias along a log, of each joint where it predicts unseen samples."""
     run = run.steadied
     terms = run.terms
@@ -150,7 +147,7 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
     return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
 
 
-def rows_of(run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride: int) -> Rows:
+def rows_of(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> Rows:
     """What is fitted: every so many samples of the log."""
     t, terms = motion.t, run.terms
     d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
@@ -161,9 +158,9 @@ def rows_of(run: ModelledRun, motion: SmoothMotion, expected: ModelError, stride
     )
 
 
-def motion_of(run: ModelledRun) -> tuple[float, Remark | None]:
+def motion_of(run: Run) -> tuple[float, Remark | None]:
     """How long a log moves from first to last [s], and why it tells no error of the model."""
-    t, dq = without_waits(run.recording.t), run.recording.require("dq")
+    t, dq = without_waits(run.t), run.dq
     duration = float(t[-1] - t[0])
     if duration < LEAST_FRICTION:
         short = caution("whole-log-too-short", duration_s=duration, least_s=LEAST_FRICTION)
@@ -202,7 +199,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
 
 
 def bias_of(
-    run: ModelledRun,
+    run: Run,
     motion: SmoothMotion,
     expected: ModelError,
     fit: WholeLogFit,

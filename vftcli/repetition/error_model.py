@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.drive_run import band
 from vftcli.repetition.laid_over import LaidOver
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
+from vftcli.robots.run import band
 from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
@@ -110,7 +110,9 @@ def error_model(
     sd = np.full_like(laid.stopped, np.nan)
     for j, stopped in enumerate(laid.stopped.T):
         left = less_noise(motion_error[:, j] * missed[j], own[j])
-        stuck = motion.coulomb[j] * np.where(at_rest, REPEATED_STOP, TWO_STOPS * stopped)[known]
+        stuck = (
+            motion.dry_friction[j] * np.where(at_rest, REPEATED_STOP, TWO_STOPS * stopped)[known]
+        )
         sd[known, j] = np.sqrt(noise[j] ** 2 + left**2 + stuck**2)
     return ErrorModel(sd, laid.standing)
 

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.drive_run import DriveRun, band
 from vftcli.repetition.ladder import difference
 from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import Pairing, pair_with_cycle
+from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
@@ -62,7 +62,7 @@ class FreeCycles(NamedTuple):
         ]
 
 
-def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
+def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
     """The cycle whose residual is smallest, and those that differ from it by noise alone.
 
     The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
@@ -78,13 +78,13 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     freest = int(np.argmin(residual))
     pairing = pair_with_cycle(motion, cycles, freest, cycles.period)
     first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
-    free = motion.taken(slice(int(first), int(last)))
+    free = motion.part(slice(int(first), int(last)))
     also = []
     for cycle in np.flatnonzero(np.isfinite(residual)).tolist():
         inside = np.flatnonzero(number == cycle)
         span = slice(int(inside[0]), int(inside[-1]) + 1)
         there = Pairing(free, pairing.times[span])
-        if cycle == freest or differs_by_noise(motion.taken(span), there):
+        if cycle == freest or differs_by_noise(motion.part(span), there):
             also.append(cycle)
     if len(also) == cycles.whole > 1:
         # Something must be left that the free cycles can be laid under.
@@ -92,14 +92,14 @@ def find_free_cycles(motion: DriveRun, cycles: Cycles) -> FreeCycles:
     return FreeCycles(tuple(also), residual)
 
 
-def residuals(motion: DriveRun, cycles: Cycles) -> Array:
+def residuals(motion: Run, cycles: Cycles) -> Array:
     """Mean over joints of each cycle's residual relative to the smallest. (cycles,)
 
     A cycle of which a gap takes more than half has none: ∞.
     """
     # Below 5 Hz a push stands out from the drives' ripple.
     cutoff = min(5.0, band(motion.step, None)[0])
-    gap = low_pass(motion.t, motion.torque - motion.model, cutoff)
+    gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
     number = cycles.number(motion.t)
     held = np.bincount(number[(number >= 0) & (number < cycles.whole)], minlength=cycles.whole)
     square = np.full((cycles.whole, gap.shape[1]), np.inf)
@@ -109,7 +109,7 @@ def residuals(motion: DriveRun, cycles: Cycles) -> Array:
     return np.asarray(relative.mean(axis=1))
 
 
-def differs_by_noise(motion: DriveRun, pairing: Pairing) -> bool:
+def differs_by_noise(motion: Run, pairing: Pairing) -> bool:
     """Whether a cycle differs from its partner by no more than the difference's own error."""
     laid = LaidOver(motion=motion, pairings=[pairing])
     found = difference(laid, "model", band(motion.step, None)[0])

@@ -10,18 +10,16 @@ with friction and offset held to what a model usually misses of them.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.free_motion import FreePiece
-from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots.chain import Chain
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.regressor import load_regressor, load_wrench
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Indices, handed_over, seal
 from vftcli.signals.errors import ClockError
 from vftcli.signals.filters import derivative, zero_phase
@@ -70,9 +68,9 @@ class FreeLoad:
         """Mass and moment. (4,) [kg, kg·m]"""
         return np.concatenate([[self.mass], self.moment])
 
-    def torque(self, run: ModelledRun) -> Array:
+    def torque(self, run: Run) -> Array:
         """External joint torque of its weight along a recording. (T, n) [N·m]"""
-        return handed_over(load_regressor(run.robot.chain, run.recording.q) @ self.weights)
+        return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
         """Wrench of its weight, and the covariance of that. (N, 6), (N, 6, 6)
@@ -88,9 +86,10 @@ class FreeLoad:
         spread = each * np.concatenate([[self.sd], self.moment_sd])
         return each @ self.weights, spread @ spread.swapaxes(1, 2)
 
-    def off(self, terms: DynamicsTerms, run: ModelledRun) -> DynamicsTerms:
-        """Terms of a recording as they were without it, μ ← μ + τ_load."""
-        return replace(terms, mu=handed_over(terms.mu + self.torque(run)))
+
+def without_load(run: Run, load: FreeLoad | None) -> Run:
+    """A run without a load, μ ← μ + τ_load; itself where there is none."""
+    return run if load is None else run.less(load.torque(run))
 
 
 class Weighing(NamedTuple):
@@ -101,7 +100,7 @@ class Weighing(NamedTuple):
     left: Array  #: Root mean square of what is left, joint by joint. (n,) [N·m]
 
 
-def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
+def free_load(pieces: Sequence[Samples]) -> FreeLoad | None:
     """The load that explains much of the free part's disturbance, None where none does."""
     parts = [part for piece in pieces if (part := columns(piece)) is not None]
     if not parts:
@@ -131,13 +130,13 @@ def free_load(pieces: Sequence[FreePiece]) -> FreeLoad | None:
     )
 
 
-def weighed(piece: FreePiece) -> Indices:
+def weighed(piece: Samples) -> Indices:
     """The samples of a piece that are weighed. (S,)"""
-    step = median_step(piece.run.recording.t)
+    step = median_step(piece.run.t)
     return np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * step)))]
 
 
-def columns(piece: FreePiece) -> tuple[Array, Array] | None:
+def columns(piece: Samples) -> tuple[Array, Array] | None:
     """The disturbance of a piece, and the columns that explain it; None of a piece too short.
 
     Returns:
@@ -148,16 +147,16 @@ def columns(piece: FreePiece) -> tuple[Array, Array] | None:
         return None
     n = run.robot.joints
     # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
-    near = round(HEARD / median_step(run.recording.t))
+    near = round(HEARD / median_step(run.t))
     first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
     t, p, mu, q, dq = (
         values[first:stop]
         for values in (
-            run.recording.t,
+            run.t,
             run.terms.p,
             run.terms.mu,
-            run.recording.q,
-            run.recording.require("dq"),
+            run.q,
+            run.dq,
         )
     )
     try:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.free_run import FreeRun
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
@@ -25,17 +26,10 @@ if TYPE_CHECKING:
 SLACK = 0.03
 
 
-class FreePiece(NamedTuple):
-    """Samples of one recording that nobody touched."""
-
-    run: ModelledRun  #: The recording they are in: the log itself or a free run.
-    inside: Mask  #: Which of its samples they are. (S,)
-
-
 class FreePart(NamedTuple):
     """Everything that is free of contact, of the log and of free runs."""
 
-    pieces: tuple[FreePiece, ...]  #: One a recording, the log's own first.
+    pieces: tuple[Samples, ...]  #: One a recording, the log's own first.
     own: Mask  #: Samples of the log itself that are free. (T,)
     remarks: tuple[Remark, ...]  #: What it is and how it was found.
 
@@ -44,7 +38,7 @@ class FreePart(NamedTuple):
 class FreeMotion(Shown):
     """The free motion of one log; each part is found once, when first asked for."""
 
-    log: ModelledRun  #: The log.
+    log: Run  #: The log.
     choice: FreeChoice = field(default_factory=FreeChoice)  #: What the user says is free.
     runs: tuple[FreeRun, ...] = ()  #: Free runs in other recordings.
 
@@ -100,13 +94,13 @@ class FreeMotion(Shown):
 
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
-        return find_free_cycles(self.log.drive, self.cycles)
+        return find_free_cycles(self.log, self.cycles)
 
     @cached_property
     def part(self) -> FreePart:
         """The free part: the given spans and runs, else the free cycles of the log."""
         log, choice = self.log, self.choice
-        own, t = self.within_spans, log.recording.t
+        own, t = self.within_spans, log.t
         remarks = [
             fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
             for a, b in choice.spans
@@ -115,11 +109,11 @@ class FreeMotion(Shown):
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
             remarks.append(found.remark(self.cycles.whole))
-        pieces = [FreePiece(log, own)] if own.any() else []
+        pieces = [Samples(log, own)] if own.any() else []
         for run in self.runs:
             whole = np.ones(run.recording.samples, dtype=bool)
             about = Where(about=run.recording.name)
-            pieces.append(FreePiece(run.run, whole))
+            pieces.append(Samples(run.run, whole))
             if run.is_same_motion:
                 remarks.append(fact("free-run", about, shift_s=run.alignment.shift))
             else:

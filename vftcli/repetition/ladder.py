@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import ErrorModel, error_model
 from vftcli.repetition.laid_over import LaidOver
 from vftcli.repetition.pairing import Pairing, by_phase
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, at
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
@@ -59,7 +59,7 @@ class Difference(NamedTuple):
 
 
 def differences(
-    motion: DriveRun,
+    motion: Run,
     clocks: Mapping[str, Sequence[Pairing]],
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],

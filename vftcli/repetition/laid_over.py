@@ -6,8 +6,8 @@ from functools import cached_property
 
 import numpy as np
 
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.pairing import Pairing, mean_of
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 
 #: A stop of this length leaves the whole of the dry friction open, a shorter one its share. [s]
@@ -26,7 +26,7 @@ class LaidOver:
     Every rung of the alignment ladder and every low-pass starts from these; each is made once.
     """
 
-    motion: DriveRun  #: The log.
+    motion: Run  #: The log.
     pairings: Sequence[Pairing]  #: Its free runs.
     #: What else was found of them, by what it is and the cutoff that it was found for.
     found: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
@@ -40,12 +40,17 @@ class LaidOver:
     @cached_property
     def torque(self) -> Array:
         """Torque difference, not corrected, not filtered; NaN without partner. (T, n) [N·m]"""
-        return mean_of(self.pairings, [p.free.torque for p in self.pairings]) - self.motion.torque
+        return (
+            mean_of(self.pairings, [p.free.drive_torque for p in self.pairings])
+            - self.motion.drive_torque
+        )
 
     @cached_property
     def change(self) -> Array:
         """The model's torque of the motion difference. (T, n) [N·m]"""
-        return self.motion.model - mean_of(self.pairings, [p.free.model for p in self.pairings])
+        return self.motion.model_torque - mean_of(
+            self.pairings, [p.free.model_torque for p in self.pairings]
+        )
 
     @property
     def momentum(self) -> Array:
@@ -69,10 +74,10 @@ class LaidOver:
     @cached_property
     def stopped(self) -> Array:
         """Share of the dry friction a stop leaves open, in the log or a free run, 0 to 1. (T, n)"""
-        longest = self.motion.standstill_s.copy()
+        longest = self.motion.standstill.copy()
         shortest = longest.copy()
         for p in self.pairings:
-            there = np.nan_to_num(p.there(p.free.standstill_s))
+            there = np.nan_to_num(p.there(p.free.standstill))
             np.maximum(longest, there, out=longest)
             np.minimum(shortest, there, out=shortest)
         alike = shortest / np.maximum(longest, 1e-9)
@@ -82,14 +87,14 @@ class LaidOver:
     @cached_property
     def misfit(self) -> Array:
         """How much of its torque's variation the model misses in the free run, at most 1. (n,)"""
-        missed = total = np.zeros(self.motion.torque.shape[1])
+        missed = total = np.zeros(self.motion.drive_torque.shape[1])
         for p in self.pairings:
             used = np.searchsorted(p.free.t, p.times[p.known])
             used = np.unique(used.clip(0, len(p.free.t) - 1))
             # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
             pad = round(HEARD / p.free.step)
             first = max(0, int(used[0]) - pad)
-            free, used = p.free.taken(slice(first, int(used[-1]) + pad + 1)), used - first
+            free, used = p.free.part(slice(first, int(used[-1]) + pad + 1)), used - first
             missed = missed + np.var(free.smooth_gap[used], axis=0)
             total = total + np.var(free.smooth_model[used], axis=0)
         return np.asarray(np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0)))

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.drive_run import DriveRun
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.filters import low_pass
 from vftcli.signals.series import resample_columns
@@ -19,7 +19,7 @@ PHASE_CUTOFF = 8.0  #: Cutoff of the joint-space phase shift: a servo's complian
 class Pairing(NamedTuple):
     """A free run, and where in it each sample of the log belongs."""
 
-    free: DriveRun  #: The free run; the log itself where cycles of one log are compared.
+    free: Run  #: The free run; the log itself where cycles of one log are compared.
     times: Array  #: Instant on the free run's clock, NaN where there is none. (T,) [s]
 
     @property
@@ -32,7 +32,7 @@ class Pairing(NamedTuple):
         return resample_columns(self.times, self.free.t, x)
 
 
-def pair_with_cycle(motion: DriveRun, cycles: Cycles, free: int, period: float) -> Pairing:
+def pair_with_cycle(motion: Run, cycles: Cycles, free: int, period: float) -> Pairing:
     """Pair a log with one of its own cycles; that cycle itself has no partner.
 
     Args:
@@ -51,7 +51,7 @@ def pair_with_cycle(motion: DriveRun, cycles: Cycles, free: int, period: float) 
     return Pairing(motion, times)
 
 
-def pair_with_run(t: Array, free: DriveRun, shift: float, rate: float = 1.0) -> Pairing:
+def pair_with_run(t: Array, free: Run, shift: float, rate: float = 1.0) -> Pairing:
     """Pair samples at times t (T,) with a free run, at rate·t + shift on the free run's clock."""
     times = rate * t + shift
     inside = (times >= free.t[0]) & (times <= free.t[-1]) & ~in_gap(free.t, times)
@@ -65,7 +65,7 @@ def in_gap(clock: Array, times: Array) -> Mask:
     return np.asarray(steps[at] > GAP * np.median(steps))
 
 
-def by_phase(motion: DriveRun, pairing: Pairing) -> Pairing:
+def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     """Move each sample's partner to the nearest place on the free run's path.
 
     The shift along the path minimises the distance of the joint positions, by Gauss–Newton; where

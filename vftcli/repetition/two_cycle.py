@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.repetition.choice import AUTOMATIC, FreeChoice
-from vftcli.repetition.drive_run import DriveRun
 from vftcli.repetition.error_model import TRUSTED_SHARE, rms
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun, ModelledRun
+from vftcli.repetition.free_run import FreeRun
 from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
 from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
@@ -53,9 +53,9 @@ def two_cycle_difference(
         ReferenceTorqueError: If nothing repeats, or what is asked for is not there.
         MissingSignalError: If a log has neither currents nor torques, or no velocities.
     """
-    log = ModelledRun(recording=recording, robot=robot)
+    log = Run(recording=recording, robot=robot)
     others = (free,) if isinstance(free, Recording) else tuple(free)
-    runs = tuple(FreeRun(run=ModelledRun(recording=r, robot=robot), log=log) for r in others)
+    runs = tuple(FreeRun(run=Run(recording=r, robot=robot), log=log) for r in others)
     return two_cycle_reference(FreeMotion(log=log, choice=choice or FreeChoice(), runs=runs))
 
 
@@ -71,18 +71,18 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
     rungs = tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
     cutoffs = cutoffs_for(choice.low_pass, log.recording.median_step)
-    chosen, floors = most_certain(differences(log.drive, partners.clocks, rungs, cutoffs))
+    chosen, floors = most_certain(differences(log, partners.clocks, rungs, cutoffs))
     measured = measured_scale(partners, chosen)
     scale = measured if measured is not None else np.ones(chosen.tau.shape[1])
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
     # Cycles of one log lie too close in time for friction to change between them.
-    change = friction_change(log.drive, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
+    change = friction_change(log, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
     # Friction changes while a joint moves; the scale was measured while it moved, too.
     wider = np.hypot(chosen.error.sd * scale, change)
     sd = np.where(chosen.error.standing, chosen.error.sd, wider)
     return ExternalTorque(
         name="two-cycle",
-        t=log.recording.t,
+        t=log.t,
         tau=chosen.tau,
         sd=sd,
         floor=rms(sd, np.isfinite(sd)),
@@ -119,8 +119,8 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     remarks += free.remarks(cycles.whole)
     if len(free.numbers) == 1:
         remarks.append(fact("free-cycle-without-reference"))
-    inside = np.isin(cycles.number(motion.log.recording.t), free.numbers)
-    drive = motion.log.drive
+    inside = np.isin(cycles.number(motion.log.t), free.numbers)
+    drive = motion.log
     laid = {
         clock: [pair_with_cycle(drive, cycles, number, seconds) for number in free.drawn]
         for clock, seconds in clocks.items()
@@ -206,7 +206,7 @@ def error_ratio(found: Difference, where: Mask) -> Array:
     return np.asarray(np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0))
 
 
-def friction_change(motion: DriveRun, tau: Array, moving: Mask) -> Array:
+def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction from the free run to the log, 0 where it may be chance. (n,) [N·m]
 
     Joints warm up between two logs, and then friction does not cancel. The change is the mean of

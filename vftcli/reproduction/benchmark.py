@@ -17,12 +17,12 @@ import numpy as np
 from vftcli.observers import BEST, PAPER
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.spectra import Part, Spectra, spectra_of
+from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.reproduction.paper import PAPERS
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.run import Run, Samples
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.
@@ -128,16 +128,18 @@ def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
 def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int) -> None:
     """Run everything once unmeasured, then interleaved for `rounds` rounds."""
     observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
-    terms, q = dynamics_terms(recording, robot), recording.q
+    run = Run(recording=recording, robot=robot)
+    terms = run.terms
     free = recording.t < FREE_SECONDS
-    spectra = partial(spectra_of, Part(terms, ~free), [Part(terms, free)])
-    found, part = spectra(), [FreeTerms(terms, q, free)]
+    part = [Samples(run, free)]
+    spectra = partial(spectra_of, Samples(run, ~free), part)
+    found = spectra()
     work: dict[str, Callable[[], object]] = {
         "dynamics": partial(dynamics_terms, recording, robot),
         **{observer.name: partial(observer.estimate, terms) for observer in observers},
         "spectra": spectra,
         BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
-        **({SMOOTHER: partial(smooth_wrench, terms, q, robot, part)} if q.shape[1] >= 6 else {}),
+        **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
         **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
     }
     for call in work.values():

@@ -13,9 +13,9 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import Models
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
+from vftcli.robots.run import Runs
 from vftcli.simulation import load_scenario, simulate
 
 #: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10 rad/s.
@@ -36,7 +36,7 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
         period: Length of a cycle, the first of which nobody touches. [s]
     """
     recording = simulate(load_scenario(scenario, ()), seed).recording
-    robot, models, result = load_robot("ur5"), Models(), RunResult()
+    robot, models, result = load_robot("ur5"), Runs(), RunResult()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.
     free = FreeChoice(period=period, alignment="period", low_pass=None)
     for variant, chosen in VARIANTS.items():

@@ -16,12 +16,12 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
-from vftcli.repetition.free_run import Models
 from vftcli.reproduction.circle import VARIANTS
 from vftcli.reproduction.control import deviation_chart
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
+from vftcli.robots.run import Runs
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import fact
@@ -55,7 +55,7 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         "zero removed": (hard, OBSERVERS[CORRECTED], ((start, stop),)),
         "soft servo": (soft, OBSERVERS[CORRECTED], ()),
     }
-    models, result = Models(), RunResult()
+    models, result = Runs(), RunResult()
     for variant, (run, observers, spans) in asked.items():
         choice = AnalysisChoice(
             observers=observers,
@@ -138,7 +138,7 @@ def assembled_bearing(
         sampled: Its sampling interval. [s]
     """
     run = simulate(load_scenario("panda-bearing", ()), seed)
-    recording, robot, models = run.recording, load_robot("panda"), Models()
+    recording, robot, models = run.recording, load_robot("panda"), Runs()
     vendor = stored_force(recording, robot, WrenchChoice(frame="base"), "libfranka").wrench
     result = RunResult()
     for variant, observers in OBSERVERS.items():

@@ -7,9 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.repetition.free_motion import FreePiece
-from vftcli.repetition.free_run import ModelledRun
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -55,9 +53,9 @@ class ToldContacts:
 
 
 def read_in_free_runs(
-    pieces: Sequence[FreePiece],
+    pieces: Sequence[Samples],
     observers: Sequence[Observer],
-    terms_of: Callable[[str, ModelledRun], DynamicsTerms],
+    run_of: Callable[[str, Run], Run],
     sensor: VirtualSensor | None,
 ) -> dict[str, Array]:
     """What each observer reads in free runs once it has settled: wrenches, or joint torques.
@@ -67,10 +65,10 @@ def read_in_free_runs(
     """
     read: dict[str, list[Array]] = {}
     for piece in pieces:
-        t, q, chain = piece.run.recording.t, piece.run.recording.q, piece.run.robot.chain
+        t, q, chain = piece.run.t, piece.run.q, piece.run.robot.chain
         settled = piece.inside & (t >= t[0] + SETTLING)
         for observer in observers:
-            torque = observer.estimate(terms_of(observer.name, piece.run))
+            torque = observer.estimate(run_of(observer.name, piece.run).terms)
             values = torque.tau if sensor is None else sensor.wrench(torque, q, chain).known
             read.setdefault(observer.name, []).append(values[settled])
     return {name: np.concatenate(each) for name, each in read.items()}

@@ -1,6 +1,6 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain as chained
 from typing import Any
@@ -21,8 +21,9 @@ from vftcli.virtual_sensor.null_space import contact_elsewhere
 from vftcli.virtual_sensor.sensor import find_mounting
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.smoother.observer_wrench import (
+    FreeLog,
     Gate,
-    InputOf,
+    as_modelled,
     smooth_all,
     smoothed_wrench,
 )
@@ -52,7 +53,8 @@ def sense(
     observers: Sequence[Observer],
     estimates: Sequence[ExternalTorque],
     choice: WrenchChoice,
-    input_of: InputOf | None = None,
+    plain: FreeLog | None = None,
+    own: Mapping[str, FreeLog] | None = None,
     gate: Gate | None = None,
 ) -> SensorReading:
     """Turn estimates into wrenches, remove the zero, and judge them.
@@ -66,8 +68,8 @@ def sense(
         observers: The observers, whose lag widens the band.
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
-        input_of: What the smoother takes for an observer whose wrench it makes, by name; None for
-            the log and its free part as they are.
+        plain: The log and its free samples as the robot's model alone has them; None to find them.
+        own: The same as an observer has them that has others, by its name.
         gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
             is one.
 
@@ -87,9 +89,9 @@ def sense(
     error = torque_error(choice, motion, observers, estimates, zero.chosen(t))
     wrenches = sensor.wrenches(estimates, recording.q, chain, dict(error.sd))
     smoothed = smooth_all(
-        motion,
         [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
-        input_of,
+        plain or as_modelled(motion),
+        own or {},
         unloaded=zero.chosen(t),
         gate=gate,
     )
@@ -184,7 +186,7 @@ def torque_error(
         return from_band(torques)
     if np.count_nonzero(free) < 2:
         return unknown_error()
-    missed = missed_torque(motion.log.terms, observers, free)
+    missed = missed_torque(motion.log, observers, free)
     return from_free_part(motion.log, torques, free, missed)
 
 

@@ -14,10 +14,9 @@ import numpy as np
 
 from vftcli.observers.error_band import error_band, free_error
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import Part, spectra_of
-from vftcli.repetition.free_run import ModelledRun
+from vftcli.observers.spectra import spectra_of
 from vftcli.robots.friction import dry_friction
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -28,12 +27,12 @@ OWN = "own"  #: The word for the observers' own covariance as the torque error.
 
 
 def missed_torque(
-    terms: DynamicsTerms, observers: Sequence[Observer], free: Mask
+    log: Run, observers: Sequence[Observer], free: Mask
 ) -> Mapping[str, Array] | None:
     """What each observer's lag leaves out of the contacts, mean square. (n,) [(N·m)²]
 
     Args:
-        terms: p and μ along the log.
+        log: The log.
         observers: The observers.
         free: Unloaded samples of the log. (T,)
 
@@ -41,10 +40,10 @@ def missed_torque(
         Observer → mean square; None where a part is too short for a spectrum.
     """
     try:
-        spectra = spectra_of(Part(terms, ~free), [Part(terms, free)])
+        spectra = spectra_of(Samples(log, ~free), [Samples(log, free)])
     except ParameterError:
         return None
-    f, step, n = spectra.frequency, spectra.step, terms.joints
+    f, step, n = spectra.frequency, spectra.step, log.robot.joints
     return {o.name: spectra.missed(o.frequency_response(f, step, n)) for o in observers}
 
 
@@ -89,7 +88,7 @@ def unknown_error() -> TorqueError:
 
 
 def from_free_part(
-    run: ModelledRun,
+    run: Run,
     torques: Sequence[ExternalTorque],
     free: Mask,
     missed: Mapping[str, Array] | None,

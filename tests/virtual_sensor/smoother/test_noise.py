@@ -4,17 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_runs import samples_of
 from scipy.optimize import minimize
 
 from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import REST_SHARE, dry_torques
+from vftcli.robots.run import Samples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
 from vftcli.virtual_sensor.smoother.noise import (
     ASSUMED_SHARE,
     UNSEEN_SHARE,
-    FreeTerms,
     fit_spectrum,
     periodogram,
     torque_noise,
@@ -72,14 +73,14 @@ def test_a_joint_without_disturbance_has_no_noise() -> None:
     assert found.white > 0.0
 
 
-def free_run(moving: np.ndarray, seconds: float = 60.0) -> FreeTerms:
+def free_run(moving: np.ndarray, seconds: float = 60.0) -> Samples:
     """An arm whose joints move or rest throughout: offset .5 N·m, error sd 1 N·m, T .5 s."""
     t = np.arange(0.0, seconds, STEP)
     torque = np.column_stack([wandering(len(t), 1.0, 0.5, j, STEP) for j in range(6)]) + 0.5
     q = 0.5 * np.cos(0.4 * t)[:, None] * moving
     p = np.cumsum(torque, axis=0) * STEP
     terms = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
-    return FreeTerms(terms, q, np.ones(len(t), dtype=bool))
+    return samples_of(terms, np.ones(len(t), dtype=bool), q)
 
 
 def blocks(velocity: np.ndarray) -> Blocks:
@@ -110,12 +111,14 @@ def test_rest_and_joints_that_never_moved_have_the_drives_share() -> None:
 
 def test_rests_before_and_after_the_motion_teach_nothing() -> None:
     """20 s at rest under 5 N·m beside 60 s of motion leave the motion's noise as it is."""
-    run = free_run(np.ones(6))
+    piece = free_run(np.ones(6))
+    run = piece.run
     t = np.concatenate([run.terms.t, run.terms.t[-1] + STEP * np.arange(1, 2001)])
     p = np.concatenate([run.terms.p, run.terms.p[-1] + 5.0 * (t[-2000:, None] - run.terms.t[-1])])
     q = np.concatenate([run.q, np.repeat(run.q[-1:], 2000, axis=0)])
-    longer = FreeTerms(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)), q, np.ones(len(t), dtype=bool))
-    alone, both = (torque_noise(LOG, [piece], UR5, SECONDS) for piece in (run, longer))
+    terms = DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    longer = samples_of(terms, np.ones(len(t), dtype=bool), q)
+    alone, both = (torque_noise(LOG, [each], UR5, SECONDS) for each in (piece, longer))
     # the block in which motion ends may fall on either side
     np.testing.assert_allclose(both.moving, alone.moving, rtol=0.05)
 

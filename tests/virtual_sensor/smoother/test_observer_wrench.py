@@ -1,6 +1,5 @@
 """The smoother as a solver beside the others: what it is fed, and what its wrench looks like."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,21 +11,17 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import ModelledRun, Models
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Runs, Samples
 from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.sensing import sense
 from vftcli.virtual_sensor.sensor_reading import SensorReading
-from vftcli.virtual_sensor.smoother.noise import FreeTerms
 from vftcli.virtual_sensor.smoother.observer_wrench import (
+    FreeLog,
     Gate,
-    SmootherInput,
-    corrected_input,
-    known_free,
-    plain_input,
+    as_modelled,
     smooth_all,
 )
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
@@ -51,12 +46,7 @@ def motion() -> FreeMotion:
     """8 s of the circle, free until 4 s."""
     asked = choice("gmo")
     recording = asked.library.open(CIRCLE, asked.read)
-    return read(*prepared(recording, asked), asked, Models())
-
-
-def lessened(terms: DynamicsTerms, torque: np.ndarray) -> DynamicsTerms:
-    """Terms whose disturbance is less by a torque. (T, n) [N·m]"""
-    return replace(terms, mu=terms.mu + torque)
+    return read(*prepared(recording, asked), asked, Runs())
 
 
 def reading(*names: str, **wrench: object) -> SensorReading:
@@ -71,8 +61,7 @@ def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMo
     sensed = reading("gmo", "fdo", solver="smoother", frame="base")
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
-    free = FreeTerms(log.terms, log.recording.q, piece.inside)
-    expected = smooth_wrench(log.terms, log.recording.q, log.robot, [free]).at(log.recording.t)
+    expected = smooth_wrench(log, [piece]).at(log.t)
     for wrench in sensed.wrenches:
         np.testing.assert_allclose(wrench.values, expected.values, atol=1e-12)
         np.testing.assert_allclose(wrench.sd, expected.sd, atol=1e-12)
@@ -105,14 +94,13 @@ def test_unasked_it_is_nobodys_here() -> None:
 
 
 def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion: FreeMotion) -> None:
-    terms, q = motion.log.terms, motion.log.recording.q
-    unloaded = motion.log.recording.t < 4.0
-    none = SmootherInput(terms, ())
-    (found,) = known_free(motion, none, unloaded)
+    log = motion.log
+    unloaded = log.t < 4.0
+    (found,) = FreeLog(log, ()).known_free(unloaded)
     assert found.inside is unloaded
-    assert known_free(motion, none, unloaded & False) == ()
-    given = FreeTerms(terms, q, ~unloaded)
-    assert known_free(motion, SmootherInput(terms, (given,)), unloaded) == (given,)
+    assert FreeLog(log, ()).known_free(unloaded & False) == ()
+    given = (Samples(log, ~unloaded),)
+    assert FreeLog(log, given).known_free(unloaded) is given
 
 
 @pytest.mark.slow
@@ -127,21 +115,16 @@ def test_a_correction_is_left_out_where_the_log_shows_one_load(
     motion: FreeMotion, newtons: float
 ) -> None:
     """Under 40 N down all the time the uncorrected terms are used, under pushes the corrected."""
-    J = flange_jacobian(motion.log.robot.chain, motion.log.recording.q)
-    plain = plain_input(motion)
-    if newtons:
-        quiet = np.broadcast_to(motion.log.recording.t[:, None] < 4.0, (len(J), 6))
-        pushes = smooth_all(motion, ["best"], unloaded=quiet[:, 0])["best"].at(
-            motion.log.recording.t
-        )
-        taken = np.einsum("tij,ti->tj", J, pushes.values)
-        free = tuple(piece._replace(terms=lessened(piece.terms, taken)) for piece in plain.free)
-        plain = SmootherInput(lessened(plain.terms, taken + newtons * J[:, 2]), free)
-    corrected = plain._replace(
-        terms=lessened(plain.terms, np.ones_like(J[:, 0])), uncorrected=plain
-    )
+    log, plain = motion.log, as_modelled(motion)
+    J = flange_jacobian(log.robot.chain, log.q)
     nothing = np.zeros(len(J), dtype=bool)
-    found = smooth_all(motion, ["best"], lambda _: corrected, unloaded=nothing)["best"]
+    if newtons:
+        pushes = smooth_all(["best"], plain, {}, unloaded=log.t < 4.0)["best"].at(log.t)
+        taken = np.einsum("tij,ti->tj", J, pushes.values)
+        free = tuple(Samples(run.less(taken), inside) for run, inside in plain.free)
+        plain = FreeLog(log.less(taken + newtons * J[:, 2]), free)
+    own = plain._replace(run=plain.run.less(np.ones_like(J[:, 0])))
+    found = smooth_all(["best"], plain, {"best": own}, unloaded=nothing)["best"]
     assert found.uncorrected is (newtons > 0.0)
     codes = {remark.code for remark in found.remarks("best")}
     assert ("wrench-uncorrected" in codes) is (newtons > 0.0)
@@ -174,14 +157,12 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotio
         mass=2.0, moment=np.array([0.0, 0.0, 0.1]), sd=0.1, moment_sd=np.full(3, 0.01), share=0.5
     )
     run, nothing = motion.log, np.zeros(motion.log.recording.samples, dtype=bool)
-    plain = plain_input(motion)
-    loaded = replace(motion, log=run.with_terms(lessened(run.terms, -load.torque(run))))
-    pieces = [piece._replace(run=loaded.log) for piece in motion.part.pieces]
-    given = corrected_input(loaded, pieces, load, lambda _name, of: of.terms, "best")
+    plain = as_modelled(motion)
+    loaded = FreeLog(run.less(-load.torque(run)), plain.free, load)
     gate = Gate([(4.5, 5.0)], WrenchPrior(1.0, 30.0))
     bare, found = (
-        smooth_all(m, ["best"], lambda _, x=x: x, unloaded=nothing, gate=gate)["best"]
-        for m, x in ((motion, plain), (loaded, given))
+        smooth_all(["best"], log, {}, unloaded=nothing, gate=gate)["best"]
+        for log in (plain, loaded)
     )
     assert found.load is load
     assert "wrench-holds-load" in {remark.code for remark in found.remarks("best")}
@@ -191,19 +172,3 @@ def test_a_load_of_the_free_part_is_in_the_wrench_and_no_noise(motion: FreeMotio
     np.testing.assert_allclose(found.values, bare.values + weight, atol=1e-6)
     np.testing.assert_allclose(found.covariance, bare.covariance + spread, atol=1e-6)
     np.testing.assert_allclose(weight[:, 2], -2.0 * 9.81, rtol=1e-3)
-
-
-def test_an_observers_own_terms_go_with_the_uncorrected_ones(motion: FreeMotion) -> None:
-    pieces = motion.part.pieces
-    shifted = lessened(motion.log.terms, np.ones_like(motion.log.terms.mu))
-
-    def terms_of(name: str, run: ModelledRun) -> DynamicsTerms:
-        return shifted if name == "best" and run is motion.log else run.terms
-
-    best, gmo = (corrected_input(motion, pieces, None, terms_of, name) for name in ("best", "gmo"))
-    assert gmo.uncorrected is None
-    assert gmo.terms is motion.log.terms
-    assert best.terms is shifted
-    assert best.free[0].terms is shifted
-    assert best.uncorrected is not None
-    assert best.uncorrected.terms is motion.log.terms

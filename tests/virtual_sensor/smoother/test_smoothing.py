@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
+from made_runs import run_of
 
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
@@ -12,11 +13,12 @@ from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.robots.run import Run, Samples
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import (
     MOST_BLOCKS,
@@ -33,7 +35,7 @@ UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 STEP = 0.01
 
 
-def simulated(robot: Robot, q: Array, wrench: Array, t: Array, seed: int = 1) -> DynamicsTerms:
+def simulated(robot: Robot, q: Array, wrench: Array, t: Array, seed: int = 1) -> Run:
     """An arm without dynamics under a wrench (T, 6), its error .3 N·m that wanders over .5 s."""
     rng = np.random.default_rng(seed)
     error, a = np.zeros((len(t), robot.joints)), np.exp(-STEP / 0.5)
@@ -42,7 +44,7 @@ def simulated(robot: Robot, q: Array, wrench: Array, t: Array, seed: int = 1) ->
     torque = np.einsum("tij,ti->tj", flange_jacobian(robot.chain, q), wrench) + error
     gained = 0.5 * (torque[1:] + torque[:-1]) * np.diff(t)[:, None]
     p = np.concatenate([np.zeros((1, robot.joints)), np.cumsum(gained, axis=0)])
-    return DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))
+    return run_of(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p)), q, robot)
 
 
 def swing(robot: Robot, t: Array) -> Array:
@@ -62,8 +64,8 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
     """25 N for 30 s of motion against .3 N·m of error; the band says what is left."""
     robot, t = load_robot(name), np.arange(0.0, 30.0, STEP)
     q = swing(robot, t)
-    free = FreeTerms(simulated(robot, q, 0 * load(t), t, seed=2), q, np.ones(len(t), dtype=bool))
-    found = smooth_wrench(simulated(robot, q, load(t), t), q, robot, [free])
+    free = Samples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
+    found = smooth_wrench(simulated(robot, q, load(t), t), [free])
     assert found.prior.is_steady
     assert found.seconds == pytest.approx(0.1)
     error = found.values - load(found.t)
@@ -75,8 +77,8 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
 def test_pushes_are_followed_in_short_blocks() -> None:
     robot, t = load_robot("ur5"), np.arange(0.0, 30.0, STEP)
     q, push = swing(robot, t), load(t) * (np.sin(2.0 * t) > 0.6)[:, None]
-    free = FreeTerms(simulated(robot, q, 0 * push, t, seed=2), q, np.ones(len(t), dtype=bool))
-    found = smooth_wrench(simulated(robot, q, push, t), q, robot, [free])
+    free = Samples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
+    found = smooth_wrench(simulated(robot, q, push, t), [free])
     assert not found.prior.is_steady
     assert found.seconds == pytest.approx(0.024)
     moved = found.at(t)
@@ -89,9 +91,9 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
     """Outside of the listed contact the wrench is zero within a band, and the model error known."""
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     q, push = swing(robot, t), load(t) * ((t > 8.0) & (t < 11.0))[:, None]
-    terms, prior = simulated(robot, q, push, t), WrenchPrior(3.0, 30.0)
-    free = FreeTerms(terms, q, t < 7.0)
-    gate, whole = (smooth_wrench(terms, q, robot, [free], g, prior) for g in ([(8.0, 11.0)], None))
+    run, prior = simulated(robot, q, push, t), WrenchPrior(3.0, 30.0)
+    free = Samples(run, t < 7.0)
+    gate, whole = (smooth_wrench(run, [free], g, prior) for g in ([(8.0, 11.0)], None))
     assert not gate.values[~gate.inside].any()
     assert gate.sd.min() > 0.0
     np.testing.assert_allclose(gate.t[gate.inside][[0, -1]], [8.0, 11.0], atol=2 * gate.seconds)
@@ -100,7 +102,7 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
     assert whole.inside.all()
     touched = (gate.t > 8.2) & (gate.t < 10.8)
     # Stiction gives way under a listed contact: the same where nearly all of the log is one.
-    wide = smooth_wrench(terms, q, robot, [free], [(0.0, 19.5)], prior)
+    wide = smooth_wrench(run, [free], [(0.0, 19.5)], prior)
     assert np.all(gate.sd[touched].mean(axis=0) < wide.sd[touched].mean(axis=0))
     assert np.mean(gate.values[touched, 2]) == pytest.approx(-25.0, abs=3.0)
 
@@ -114,12 +116,12 @@ def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) 
     """
     robot, t = load_robot("ur5"), np.arange(0.0, 12.0, STEP)
     q, prior = swing(robot, t), WrenchPrior(1.0, 30.0)
-    terms = simulated(robot, q, 0 * load(t), t)
-    free, half = FreeTerms(terms, q, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
-    never = smooth_wrench(terms, q, robot, [free], [], prior)
+    run = simulated(robot, q, 0 * load(t), t)
+    free, half = Samples(run, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
+    never = smooth_wrench(run, [free], [], prior)
     # A block on either side is inside of the gate, too.
     edge = half - 1.5 * never.seconds
-    once = smooth_wrench(terms, q, robot, [free], [(at - edge, at + edge)], prior)
+    once = smooth_wrench(run, [free], [(at - edge, at + edge)], prior)
     k = int(np.argmin(np.abs(never.t - at)))
     assert once.inside[k]
     np.testing.assert_allclose(never.sd[k], once.sd[k], rtol=0.25)
@@ -130,9 +132,12 @@ def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose()
     robot, t = load_robot("ur5"), np.arange(0.0, 10.0, STEP)
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
     q[:, 4] *= np.clip(5.0 - t, 0.0, 1.0)
-    terms = simulated(robot, q, 0 * load(t), t)
+    run = simulated(robot, q, 0 * load(t), t)
     found = smooth_wrench(
-        terms, q, robot, [FreeTerms(terms, q, np.ones(len(t), dtype=bool))], [], prior
+        run,
+        [Samples(run, np.ones(len(t), dtype=bool))],
+        [],
+        prior,
     )
     blind, clear = (found.sd[span].max(axis=0) for span in (found.t > 6.0, found.t < 3.0))
     assert np.max(blind / clear) > 2.0
@@ -149,8 +154,8 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None
     sigma = decompose(flange_jacobian(robot.chain, q)).sigma_min
     assert np.all(sigma[blind] < LEAST_SIGMA)
     push = load(t) * (np.sin(1.3 * t) > 0.3)[:, None]
-    free = FreeTerms(simulated(robot, q, 0 * push, t, seed=2), q, np.ones(len(t), dtype=bool))
-    found = smooth_wrench(simulated(robot, q, push, t), q, robot, [free], prior=WrenchPrior(1, 30))
+    free = Samples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
+    found = smooth_wrench(simulated(robot, q, push, t), [free], prior=WrenchPrior(1, 30))
     moved = found.at(t)
     assert np.isfinite(moved.values).all()
     assert np.isfinite(moved.sd).all()
@@ -164,13 +169,15 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     there = (t < 8.0) | (t > 12.0)
     q, prior = swing(robot, t), WrenchPrior(3.0, 30.0)
-    whole = simulated(robot, q, load(t), t)
+    whole = simulated(robot, q, load(t), t).terms
     # μ says nothing of the gap: what p gained in it is not the mean of two samples' torque
     cut = DynamicsTerms(
-        t=t[there], p=whole.p[there] + 50.0 * (t[there] > 12)[:, None], mu=whole.mu[there]
+        t=t[there],
+        p=whole.p[there] + 50.0 * (t[there] > 12)[:, None],
+        mu=whole.mu[there],
     )
-    quiet = FreeTerms(simulated(robot, q, 0 * load(t), t, seed=2), q, np.ones(len(t), dtype=bool))
-    found = smooth_wrench(cut, q[there], robot, [quiet], prior=prior)
+    quiet = Samples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
+    found = smooth_wrench(run_of(cut, q[there]), [quiet], prior=prior)
     at = found.at(np.array([5.0, 10.0, 15.0]))
     assert np.isfinite(at.values).all()
     assert np.all(at.sd[1] > 1.5 * at.sd[[0, 2]])
@@ -181,7 +188,7 @@ def test_a_log_of_one_sample_leaves_the_prior() -> None:
     robot = load_robot("ur5")
     nothing = np.zeros((1, 6))
     terms = DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing)
-    found = smooth_wrench(terms, nothing, robot)
+    found = smooth_wrench(run_of(terms, nothing, robot))
     assert not found.values.any()
     np.testing.assert_allclose(found.sd[0, :3], 1.5 * found.prior.force)
 
@@ -190,7 +197,7 @@ def test_fewer_than_six_joints_tell_no_wrench() -> None:
     nothing = np.zeros((9, 5))
     terms = DynamicsTerms(t=np.arange(9.0), p=nothing, mu=nothing)
     with pytest.raises(RobotError, match="5 joints cannot tell"):
-        smooth_wrench(terms, nothing, load_robot("ur5"))
+        smooth_wrench(run_of(terms, nothing))
 
 
 @pytest.mark.parametrize(
@@ -226,9 +233,8 @@ def test_a_circle_under_pushes_reads_its_truth() -> None:
     """
     path = FIXTURES / "ur5_circle.csv"
     recording, robot = Library([path]).open(path, ReadChoice()), load_robot("ur5")
-    terms, t = dynamics_terms(recording, robot), recording.t
-    free = FreeTerms(terms, recording.q, (t > 0.3) & (t < 4.0))
-    moved = smooth_wrench(terms, recording.q, robot, [free]).at(t)
+    run, t = Run(recording=recording, robot=robot), recording.t
+    moved = smooth_wrench(run, [Samples(run, (t > 0.3) & (t < 4.0))]).at(t)
     table = pl.read_parquet(f"{path}.truth.parquet")
     truth = table.select([f"wrench/{axis}" for axis in AXES]).to_numpy()
     error = moved.values - truth
@@ -246,9 +252,8 @@ def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
     choice = ReadChoice.parsed(columns=UR10E)
     paths = [folder / "load_14harm.csv", folder / "free_14harm.csv"]
     log, free = (Library([path]).open(path, choice) for path in paths)
-    terms = [dynamics_terms(recording, robot) for recording in (log, free)]
-    quiet = FreeTerms(terms[1], free.q, np.ones(free.samples, dtype=bool))
-    found = smooth_wrench(terms[0], log.q, robot, [quiet])
+    run, other = (Run(recording=recording, robot=robot) for recording in (log, free))
+    found = smooth_wrench(run, [Samples(other, np.ones(free.samples, dtype=bool))])
     assert found.prior.is_steady
     moved = found.at(log.t)
     error = moved.values[:, :3] - [0.0, 0.0, -27.52]
@@ -301,5 +306,5 @@ def test_a_log_of_one_sample_has_a_band_where_nothing_is_listed() -> None:
     robot, nothing = load_robot("ur5"), np.zeros((1, 6))
     terms = DynamicsTerms(t=np.zeros(1), p=nothing, mu=nothing)
     prior = WrenchPrior(1.0, 30.0)
-    found = smooth_wrench(terms, nothing, robot, gate=[], prior=prior)
+    found = smooth_wrench(run_of(terms, nothing, robot), gate=[], prior=prior)
     np.testing.assert_allclose(found.sd[0], np.repeat([45.0, 6.0], 3))  # nothing but the prior

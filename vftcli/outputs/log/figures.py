@@ -49,7 +49,7 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     if (drawn := wrench_drawing(analysis)) is not None:
         found["wrench"] = drawn
     if (refined := analysis.refinement) is not None:
-        if (spectra := refined.baseline.spectra) is not None:
+        if (spectra := refined.baselines.plain.spectra) is not None:
             # The |H| of one observer: those of all are a figure of their own.
             lead = next((o for o in analysis.observers if o.name == BEST), analysis.observers[0])
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})

@@ -249,7 +249,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
     found = analysis.refinement
     if found is None:
         return None
-    spectra = found.baseline.spectra
+    spectra = found.baselines.plain.spectra
     return {
         "bias_removed": found.removed,
         "segments_free_loaded": spectra.segments if spectra is not None else None,
@@ -274,7 +274,7 @@ def best_record(analysis: Analysis) -> dict[str, Any] | None:
     best = ran.get(BEST)
     if found is None or best is None:
         return None
-    under, tuned = found.baseline.under(BEST), BEST in found.curves
+    under, tuned = found.baselines.best, BEST in found.curves
     corrected = under.correction
     return {
         "observer": "rts-auto" if tuned else "kfo-rts",

@@ -29,7 +29,7 @@ def refinement_section(analysis: Analysis) -> str:
         caption = "Error budget in N·m rms, estimated from the log itself"
         shown = f"<h3>{caption}</h3>{html(budget_grid(found.budgets))}"
     charts = []
-    if (spectra := found.baseline.spectra) is not None:
+    if (spectra := found.baselines.plain.spectra) is not None:
         charts.append(spectra_chart(spectra))
     if found.curves:
         charts.append(tuning_chart(found.curves, observer_lines(analysis.estimates)))

@@ -46,7 +46,7 @@ class Batch:
     times: Integers  #: When each was recorded. (k,) [ns]
 
 
-class Run(NamedTuple):
+class ChannelRun(NamedTuple):
     """Messages of one channel as a library hands them out."""
 
     channel: Channel | None  #: Whose they are, None where the file does not say.
@@ -58,7 +58,7 @@ BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(runs: Iterable[Run], ingest: "Ingest") -> Iterator[Batch]:
+def batched(runs: Iterable[ChannelRun], ingest: "Ingest") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0

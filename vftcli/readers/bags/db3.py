@@ -10,7 +10,15 @@ from collections.abc import Iterator
 from contextlib import closing
 from typing import Any
 
-from vftcli.readers.bags.container import Batch, Channel, Ingest, Run, batched, printable, type_name
+from vftcli.readers.bags.container import (
+    Batch,
+    Channel,
+    ChannelRun,
+    Ingest,
+    batched,
+    printable,
+    type_name,
+)
 from vftcli.readers.reader import LogFile
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import warning
@@ -66,7 +74,7 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
     return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
 
 
-def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Run]:
+def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[ChannelRun]:
     """The messages of a database of a size, one by one."""
     tables = _checked_tables(db, ingest)
     db.set_authorizer(_permission)
@@ -102,7 +110,7 @@ def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Run]:
                 f"{ingest.path}: a message of topic {number!s:.20} is no bytes; damaged."
             )
         is_packed = content.startswith(ZSTD)
-        yield Run(
+        yield ChannelRun(
             channels.get(number), [time], [_unzstd(content, ingest) if is_packed else content]
         )
 

@@ -18,9 +18,9 @@ from vftcli.readers.bags.container import (
     Batch,
     Census,
     Channel,
+    ChannelRun,
     Encoding,
     Ingest,
-    Run,
     batched,
     chunk_file,
     file_of,
@@ -66,7 +66,7 @@ class _Mcap:
         self.channels: dict[int, Channel] = {}
         self.indexed = 0
 
-    def runs(self, content: memoryview) -> Iterator[Run]:
+    def runs(self, content: memoryview) -> Iterator[ChannelRun]:
         """The messages of the file, chunk by chunk, those outside chunks one by one."""
         census, end = self.census, MAGIC_SIZE
         for record, place in _records(file_of(content), len(content), inside=False):
@@ -75,7 +75,9 @@ class _Mcap:
                 census.data_end = end
             if isinstance(record, records.Message):
                 census.kept += 1
-                yield Run(self.channels.get(record.channel_id), [record.log_time], [record.data])
+                yield ChannelRun(
+                    self.channels.get(record.channel_id), [record.log_time], [record.data]
+                )
             elif isinstance(record, records.Chunk):
                 census.chunks += 1
                 yield from self._chunk(record)
@@ -126,19 +128,19 @@ class _Mcap:
             idl=schema.encoding == "ros2idl",
         )
 
-    def _chunk(self, chunk: records.Chunk) -> Iterator[Run]:
+    def _chunk(self, chunk: records.Chunk) -> Iterator[ChannelRun]:
         """The messages of a chunk, unpacked and checked."""
         file = chunk_file(self.ingest, chunk.compression, chunk.data, chunk.uncompressed_size)
         # A checksum of zero means that the writer made none.
         if chunk.uncompressed_crc and zlib.crc32(file.getbuffer()) != chunk.uncompressed_crc:
             raise LogError(f"{self.ingest.path}: a chunk does not match its checksum; damaged.")
-        found: dict[int, Run] = {}
+        found: dict[int, ChannelRun] = {}
         end, size = 0, len(file.getbuffer())
         for record, place in _records(file, size, inside=True):
             end = place
             if isinstance(record, records.Message):
                 if (number := record.channel_id) not in found:
-                    found[number] = Run(self.channels.get(number), [], [])
+                    found[number] = ChannelRun(self.channels.get(number), [], [])
                 found[number].times.append(record.log_time)
                 found[number].contents.append(record.data)
             else:

@@ -20,7 +20,7 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Samples
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import grown, runs_of
 from vftcli.signals.rest import NEAR_REST
@@ -37,14 +37,6 @@ USUAL_TIME, TIME_SPREAD = 0.5, 1.5
 LEAST_NOISE = 1e-6  #: Smallest R: a millinewton-metre, far below any drive's. [(N·m)²]
 LEAST_BLOCKS = 20  #: Shortest unbroken stretch of the free part that has a spectrum, in blocks.
 ASSUMED_SHARE = 0.2  #: Where no free part tells: the model error of motion, as a share of F_c.
-
-
-class FreeTerms(NamedTuple):
-    """A stretch of log that nobody touched."""
-
-    terms: DynamicsTerms  #: p and μ of the log.
-    q: Array  #: Its joint positions. (T, n) [rad]
-    inside: Mask  #: The free samples. (T,)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,9 +86,7 @@ def steps(blocks: Blocks) -> Array:
     return np.diff(blocks.t, prepend=blocks.t[:1])
 
 
-def torque_noise(
-    log: Blocks, free: Sequence[FreeTerms], robot: Robot, seconds: float
-) -> TorqueNoise:
+def torque_noise(log: Blocks, free: Sequence[Samples], robot: Robot, seconds: float) -> TorqueNoise:
     """The noise that the free part shows, else what the drives' dry friction lets assume.
 
     At rest the model error is at least `REST_SHARE` of the dry friction, whatever the free part
@@ -151,13 +141,13 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
     )
 
 
-def free_stretches(piece: FreeTerms, seconds: float) -> list[Blocks]:
+def free_stretches(piece: Samples, seconds: float) -> list[Blocks]:
     """The stretches of a free piece that are long enough for a spectrum, in blocks.
 
     They reach from its first motion to its last, since rest has a model error of its own; a piece
     without motion counts as it is.
     """
-    blocks = disturbance_blocks(piece.terms, piece.q, seconds, piece.inside)
+    blocks = disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside)
     motion = np.flatnonzero(blocks.known & ~blocks.rests.all(axis=1))
     if len(motion):
         blocks = blocks.part(slice(int(motion[0]), int(motion[-1]) + 1))

@@ -14,14 +14,13 @@ import numpy as np
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Run, Samples
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.virtual_sensor.smoother.noise import FreeTerms, TorqueNoise, torque_noise
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise, torque_noise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, gated, wrench_model
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
@@ -56,7 +55,7 @@ class SmoothedWrench:
     prior: WrenchPrior  #: How the wrench may move.
     noise: TorqueNoise  #: What counts as noise.
     gate: bool  #: Whether contacts were listed; else the whole log is one.
-    #: Whether a correction of the model's error was left out; see `InputOf`.
+    #: Whether a correction of the model's error was left out; see `smooth_log`.
     uncorrected: bool = False
     #: A load that the free motion carries, in the wrench with its weight; None without one.
     load: FreeLoad | None = None
@@ -148,34 +147,30 @@ def deviations(covariance: Array) -> Array:
 
 
 def smooth_wrench(
-    terms: DynamicsTerms,
-    q: Array,
-    robot: Robot,
-    free: Sequence[FreeTerms] = (),
+    run: Run,
+    free: Sequence[Samples] = (),
     gate: Sequence[tuple[float, float]] | None = None,
     prior: WrenchPrior | None = None,
 ) -> SmoothedWrench:
     """The wrench at the flange from the whole log, by `wrench_model`.
 
     Args:
-        terms: p and μ along the log, corrected or not.
-        q: Its joint positions. (T, n) [rad]
-        robot: The arm.
+        run: The log, corrected or not.
         free: Motion that nobody touched, which tells the noise; none to take it from the drives'
             dry friction.
         gate: From and to of every contact [s], outside of which the wrench is zero, as far as the
             pose can show; None where the whole log is one.
         prior: How the wrench may move; None to choose it by the log's likelihood.
     """
-    if terms.joints < 6:
+    if run.recording.joints < 6:
         raise RobotError(
-            f"an arm of {terms.joints} joints cannot tell the six components of a wrench; "
+            f"an arm of {run.recording.joints} joints cannot tell the six components of a wrench; "
             "leave --wrench and its options out: use the joint torques"
         )
     if prior is None:
-        prior = prior_of(terms, q, robot, free, gate)
-    seconds = block_length(terms.t, fine=not prior.is_steady)
-    blocks, J, noise, inside = blocks_of(terms, q, robot, free, gate, seconds)
+        prior = prior_of(run, free, gate)
+    seconds = block_length(run.t, fine=not prior.is_steady)
+    blocks, J, noise, inside = blocks_of(run, free, gate, seconds)
     model = wrench_model(blocks, J, noise, [prior], inside)
     mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model)))
     own = covariance[:, :6, :6]
@@ -273,14 +268,12 @@ def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
 
 
 def prior_of(
-    terms: DynamicsTerms,
-    q: Array,
-    robot: Robot,
-    free: Sequence[FreeTerms] = (),
+    run: Run,
+    free: Sequence[Samples] = (),
     gate: Sequence[tuple[float, float]] | None = None,
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
-    return choose_prior(*blocks_of(terms, q, robot, free, gate, block_length(terms.t, fine=False)))
+    return choose_prior(*blocks_of(run, free, gate, block_length(run.t, fine=False)))
 
 
 def block_length(t: Array, *, fine: bool) -> float:
@@ -303,15 +296,13 @@ class BlockModel(NamedTuple):
 
 
 def blocks_of(
-    terms: DynamicsTerms,
-    q: Array,
-    robot: Robot,
-    free: Sequence[FreeTerms],
+    run: Run,
+    free: Sequence[Samples],
     gate: Sequence[tuple[float, float]] | None,
     seconds: float,
 ) -> BlockModel:
     """A log in blocks of a length [s]; the other arguments as of `smooth_wrench`."""
-    blocks = disturbance_blocks(terms, q, seconds)
-    noise = torque_noise(blocks, free, robot, seconds)
-    jacobian = flange_jacobian(robot.chain, blocks.q)
+    blocks = disturbance_blocks(run.terms, run.q, seconds)
+    noise = torque_noise(blocks, free, run.robot, seconds)
+    jacobian = flange_jacobian(run.robot.chain, blocks.q)
     return BlockModel(blocks, jacobian, noise, gated(blocks, gate))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.repetition.isolated import without_isolated
+from vftcli.signals.isolated import without_isolated
 from vftcli.signals.recording import Recording
 
 STEP = 0.01

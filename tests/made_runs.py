@@ -1,0 +1,22 @@
+"""Runs of terms that a test makes itself, without a motion behind them."""
+
+import numpy as np
+
+from vftcli.robots import load_robot
+from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, Samples
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.recording import Recording
+
+
+def run_of(terms: DynamicsTerms, q: Array | None = None, robot: Robot | None = None) -> Run:
+    """A run with these terms, at positions q (T, n) [rad] or at rest in zero."""
+    places = np.zeros_like(terms.p) if q is None else q
+    log = Recording(t=terms.t, q=places)
+    return Run(recording=log, robot=robot or load_robot("ur5")).holding(terms=terms)
+
+
+def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> Samples:
+    """Some samples of such a run."""
+    return Samples(run_of(terms, q), inside)
