@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.contacts.compared_signals import compared_signals
-from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.paper import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.observers.block_run import block_run, look_ahead, runs_in_blocks
-from vftcli.observers.kalman import KalmanObserver
-from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer
+from vftcli.observers.paper import KalmanObserver, MomentumObserver
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque

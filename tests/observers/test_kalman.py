@@ -8,9 +8,8 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_gains import Covariance
-from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Densities, zero_order_hold
-from vftcli.observers.uneven_kalman import gain_sequence
+from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Covariance, Densities, zero_order_hold
+from vftcli.observers.uneven import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.steady_filter import PIECE

@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.paper import MomentumObserver
 from vftcli.outputs.simulation import save
 from vftcli.robots import load_robot
 from vftcli.robots.terms import dynamics_terms

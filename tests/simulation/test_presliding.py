@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.paper import MomentumObserver
 from vftcli.robots import Robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array

@@ -18,7 +18,7 @@ from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
 from vftcli.admittance.stability import check_stable
 from vftcli.admittance.thresholds import entering_force
-from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.paper import KalmanObserver
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix

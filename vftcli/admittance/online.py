@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.observers.kalman import KalmanObserver
+from vftcli.observers.paper import KalmanObserver
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array

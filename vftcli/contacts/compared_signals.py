@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.momentum import MomentumObserver
+from vftcli.observers.paper import MomentumObserver
 from vftcli.robots.drive import check_joints
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, seal

@@ -1,9 +1,7 @@
 """Disturbance observers: p and μ along a log in, one estimate of the external torque out."""
 
-from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
-from vftcli.observers.kalman import KalmanObserver
-from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.settings import Settings
 from vftcli.observers.table import (
     BEST,

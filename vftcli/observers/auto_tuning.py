@@ -15,8 +15,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.kalman import KalmanObserver
 from vftcli.observers.observer import Complex, Observer, Tuning
+from vftcli.observers.paper import KalmanObserver
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.observers.spectra import Spectra
 from vftcli.robots.terms import DynamicsTerms

@@ -1,9 +1,8 @@
 """Observers along a log that comes block by block: causal ones as they are, the smoother behind."""
 
 from collections.abc import Iterator
-from typing import Any, Protocol, runtime_checkable
 
-from vftcli.observers.observer import Observer
+from vftcli.observers.observer import BlockObserver, Observer
 from vftcli.observers.smoother import KalmanSmoother, SteadyRun, look_ahead
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
@@ -13,19 +12,10 @@ from vftcli.signals.series import Clock
 FARTHEST = 1 << 17
 
 
-@runtime_checkable
-class Resumable(Protocol):
-    """An observer that goes on from where it stood after the block before."""
-
-    def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
-        """The estimate of a block, and where it stands after it."""
-        ...
-
-
 def runs_in_blocks(observer: Observer, clock: Clock, joints: int) -> bool:
     """Whether an observer's estimate of a log can be made block by block."""
     if not isinstance(observer, KalmanSmoother):
-        return isinstance(observer, Resumable)
+        return isinstance(observer, BlockObserver)
     steady = observer.filter.is_steady(clock)
     return steady and look_ahead(observer, clock.step, joints) <= FARTHEST
 
@@ -37,13 +27,14 @@ def block_run(observer: Observer, clock: Clock, joints: int) -> "CausalRun | Ste
     """
     if isinstance(observer, KalmanSmoother):
         return SteadyRun(observer, clock.step, joints)
+    assert isinstance(observer, BlockObserver)
     return CausalRun(observer)
 
 
 class CausalRun:
     """An observer that needs nothing of what follows."""
 
-    def __init__(self, observer: Any) -> None:  # noqa: ANN401 - each has a state of its own
+    def __init__(self, observer: BlockObserver) -> None:
         self._observer, self._state = observer, None
 
     def take(self, terms: DynamicsTerms) -> Iterator[ExternalTorque]:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import Fold, run_blocks, spans
+from vftcli.observers.uneven import Fold, run_blocks, spans
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution

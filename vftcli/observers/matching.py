@@ -6,10 +6,8 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
-from vftcli.observers.kalman import KalmanObserver
-from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer
+from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.table import Setup
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError

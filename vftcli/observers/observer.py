@@ -1,13 +1,14 @@
 """What every observer is: parameters in, one estimate of the external torque out."""
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, frozen, number_array, seal
+from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
 from vftcli.signals.errors import ShapeError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_kind
@@ -50,6 +51,27 @@ class Observer(Protocol):
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
         ...
+
+
+class BlockObserver(Shown):
+    """An observer that goes on from where it was after the block before; a log is one block."""
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Its name at the command line."""
+
+    @abstractmethod
+    def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
+        """The estimate of a block, and what the observer is after it; None where a log begins."""
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """The estimate of a whole log, from rest at its first sample."""
+        return self.run(terms)[0]
+
+    def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
+        """An estimate (T, n) [N·m] under the observer's name, its array for good."""
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), **more)
 
 
 def per_joint(value: Array | float, joints: int) -> Array:

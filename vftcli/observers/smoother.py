@@ -21,12 +21,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman import TORQUE, KalmanObserver, closed_loop, error_filter
-from vftcli.observers.kalman_gains import Covariance, Gains
-from vftcli.observers.kalman_model import Discrete
+from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_loop, error_filter
 from vftcli.observers.observer import Complex, Tuning
-from vftcli.observers.recursion import recursion
-from vftcli.observers.uneven_kalman import gain_sequence
+from vftcli.observers.paper import TORQUE, KalmanObserver
+from vftcli.observers.uneven import gain_sequence, recursion
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque

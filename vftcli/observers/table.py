@@ -5,10 +5,8 @@ from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from vftcli.observers.filtered_dynamics import FilteredDynamicsObserver
-from vftcli.observers.kalman import KalmanObserver
-from vftcli.observers.momentum import MomentumObserver
 from vftcli.observers.observer import Observer, per_joint
+from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.settings import (
     PARAMETERS,
     Gains,

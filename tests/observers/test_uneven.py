@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_gains import Covariance, Gains, update
-from vftcli.observers.uneven_kalman import gain_sequence
+from vftcli.observers.kalman_model import Covariance, Gains, update
+from vftcli.observers.uneven import gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 
 SAMPLES = 3000

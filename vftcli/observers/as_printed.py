@@ -1,0 +1,153 @@
+"""What the paper prints otherwise, run by `--as-printed` to show its errata.
+
+FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a share of the
+momentum that leaks into the estimate; and the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, which forgets
+−ωe^{−ωt}p₀ of (26).
+
+GMO (35): it feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = .343 and is unstable from 2
+on.
+
+KFO: u = μᵗ alone (40). The zero-order hold (44) has −A_c in its lower-right block, not −A_cᵀ: the
+noise Qᵗ = M₁₂M₁₁ᵀ comes out unsymmetric, with A_τ = 0
+
+    [[Q_p Ts + (Q_τ − Q_p)Ts³/2, (Q_τ − Q_p)Ts²/2], [Q_τ Ts², Q_τ Ts]],
+
+and so does the covariance: all four entries are carried, and the gain is its left column.
+"""
+
+import numpy as np
+
+from vftcli.observers.kalman_model import (
+    Covariance,
+    Densities,
+    Discrete,
+    Gains,
+    KalmanState,
+    Steady,
+)
+from vftcli.observers.uneven import recursion
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
+from vftcli.signals.arrays import Array
+from vftcli.signals.steady_filter import steady_filter
+
+#: Relative change of a covariance in one sample from which on rounding moves it alone.
+SETTLED = 1e-14
+LONGEST = 100_000  #: Samples within which a filter settles; the paper's need some hundred.
+#: Below this a·Ts (e^{aTs} − 1 − aTs)/a² is its series, good to a tenth of a·Ts squared.
+SMALL = 1e-5
+
+
+def printed_noise(model: Discrete, d: Densities) -> Array:
+    """Qᵗ = M₁₂M₁₁ᵀ of (44), entry by entry, written out. (2, 2, …)
+
+        M₁₂ = [[Q_p Ts, Q_τ (cosh aTs − 1)/a² − Q_p (e^{aTs} − 1 − aTs)/a²], [0, Q_τ sinh(aTs)/a]]
+
+    and M₁₁ is the model's A.
+    """
+    step, a = model.step, d.decay
+    x, some = a * step, np.where(a > 0.0, a, 1.0)
+    sinh = np.where(a > 0.0, np.sinh(x) / some, step)
+    cosh = np.where(a > 0.0, 2.0 * (np.sinh(0.5 * x) / some) ** 2, 0.5 * step**2)
+    rest = np.where(x > SMALL, (np.expm1(x) - x) / some**2, 0.5 * step**2 * (1.0 + x / 3.0))
+    across, down = d.q_tau * cosh - d.q_p * rest, d.q_tau * sinh
+    return np.array(
+        [
+            [d.q_p * step + model.a12 * across, model.a22 * across],
+            [model.a12 * down, model.a22 * down],
+        ]
+    )
+
+
+def predicted(P: Array, a12: Array, a22: Array, noise: Array) -> Array:
+    """Covariance before the measurement, A P Aᵀ + Qᵗ. (2, 2, n)"""
+    (p11, p12), (p21, p22) = P
+    up, down = p12 + a12 * p22, p21 + a12 * p22
+    return np.array([[p11 + a12 * (p21 + up), a22 * up], [a22 * down, a22 * a22 * p22]]) + noise
+
+
+def updated(prior: Array, r: Array) -> tuple[Array, Array]:
+    """The gain (2, n) for a measured momentum, and the covariance after it. (2, 2, n)"""
+    gain = prior[:, 0] / (prior[0, 0] + r)
+    return gain, prior - gain[:, None] * prior[0]
+
+
+def settled_prior(model: Discrete, noise: Array) -> Array:
+    """The covariance before a measurement that a constant sample time settles to. (2, 2, n)"""
+    prior = noise
+    for _ in range(LONGEST):
+        before = prior
+        prior = predicted(updated(prior, model.r)[1], model.a12, model.a22, noise)
+        if np.all(np.abs(prior - before) <= SETTLED * np.abs(prior)):
+            break
+    return prior
+
+
+def as_covariance(P: Array) -> Covariance:
+    """A covariance without its lower-left entry, as the symmetric ones are kept."""
+    return Covariance(P[0, 0], P[0, 1], P[1, 1])
+
+
+def printed_steady(model: Discrete, d: Densities) -> Steady:
+    """The gains and covariances that a constant sample time settles to; one a joint."""
+    prior = settled_prior(model, printed_noise(model, d))
+    (l1, l2), posterior = updated(prior, model.r)
+    return Steady(Gains(l1, l2, as_covariance(posterior)), as_covariance(prior))
+
+
+def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) -> Array:
+    """The input of the FDO with k₃ and, at a log's begin, the start as printed. (T, n) [N·m·s]"""
+    a = 0.5 * omega * terms.dt
+    driven: Array = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
+    if begins:
+        driven[0] = (1.0 + a[0]) * terms.p[0]  # which alone makes τ̂⁰ = ωp⁰
+    return driven
+
+
+def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[Array, Array]:
+    """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²): its values (T, n), and the last two. (2, n) [N·m]"""
+    a = 0.5 * terms.dt * gain
+    F, g = np.array([[1.0 - a, -a], [a**0, 0.0 * a]]), np.array([gain, 0.0 * gain])
+    # As printed it may well diverge: that is the result, and is shown as unknown.
+    with np.errstate(over="ignore", invalid="ignore"):
+        if terms.clock.uniform:
+            first = np.array([[1.0], [0.0]])
+            tau, end = steady_filter(F[:, :, 0], g, terms.d, start, wanted=first)
+        else:
+            states = recursion(F, g[:, None] * terms.d, start)
+            tau, end = states[0], states[:, -1]
+    return np.where(np.isfinite(tau), tau, np.nan), end
+
+
+def printed_start(usual: Discrete, densities: Densities, prior: Covariance | None) -> KalmanState:
+    """What the filter with the printed hold is before a log: its prior, settled if not given."""
+    P = settled_prior(usual, printed_noise(usual, densities))
+    if prior is not None:
+        P = np.array([[prior.p11, prior.p12], [prior.p12, prior.p22]])
+    return KalmanState(np.zeros((2, P.shape[2])), as_covariance(P), P[1, 0] - P[0, 1])
+
+
+def printed_hold_steps(
+    d: Array, model: Discrete, densities: Densities, state: KalmanState, *, begins: bool
+) -> tuple[Array, Array, KalmanState]:
+    """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
+
+    Args:
+        d: The filter's input. (T, n) [N·m·s]
+        model: The models of all samples. (T, n) each
+        densities: The parameters, one a joint.
+        state: What the filter is before the block.
+        begins: Whether the log begins here.
+    """
+    tau, sd = np.zeros((2, *d.shape))
+    (error, torque), (p11, p12, p22) = state.error, state.posterior
+    P = np.array([[p11, p12], [p12 + state.skew, p22]])
+    noise = np.moveaxis(printed_noise(model, densities), 2, 0)
+    for k, (a12, a22, r) in enumerate(zip(model.a12, model.a22, model.r, strict=True)):
+        if k or not begins:
+            P = predicted(P, a12, a22, noise[k])
+        (l1, l2), P = updated(P, r)
+        error = error + d[k] - a12 * torque
+        torque = a22 * torque + l2 * error
+        error = (1.0 - l1) * error
+        tau[k], sd[k] = torque, np.sqrt(P[1, 1])
+    return tau, sd, KalmanState(np.array([error, torque]), as_covariance(P), P[1, 0] - P[0, 1])

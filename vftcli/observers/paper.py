@@ -1,0 +1,341 @@
+r"""The paper's four observers: filtered dynamics, generalised momentum, and two Kalman filters.
+
+All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and μ = τ + Cᵀq̇ − g − F_f, and all
+have one input: the momentum that a log gains over a sample and the model does not explain,
+
+    dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹).
+
+    FDO, GMO   τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a),  a = ½K Ts
+    KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
+
+from zero at the log's first sample. `first_order` holds what the first two share, `kalman_model`
+A, Q, R and L at a sample time, `uneven` what follows a clock that jitters, `as_printed` what the
+paper prints otherwise. An observer runs over a block of a log and says where it is after it; a
+whole log is one block.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from vftcli.observers.as_printed import (
+    printed_dynamics_input,
+    printed_hold_steps,
+    printed_momentum,
+    printed_start,
+    printed_steady,
+)
+from vftcli.observers.first_order import (
+    FirstOrderState,
+    first_order_response,
+    first_order_tuning,
+    run_first_order,
+)
+from vftcli.observers.kalman_model import (
+    DISCRETISATIONS,
+    NOISE_CONVENTIONS,
+    Covariance,
+    Densities,
+    Discrete,
+    KalmanState,
+    Steady,
+    closed_loop,
+    discretise,
+    error_filter,
+    steady,
+    update,
+)
+from vftcli.observers.observer import (
+    BlockObserver,
+    Complex,
+    Tuning,
+    check_terms,
+    numbers_of,
+    per_joint,
+)
+from vftcli.observers.uneven import kalman_steps
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
+from vftcli.signals.arrays import Array, frozen, handed_over, number_array
+from vftcli.signals.errors import ParameterError, ShapeError
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.parsing import check_known
+from vftcli.signals.remarks import Where, warning
+from vftcli.signals.series import Clock
+from vftcli.signals.steady_filter import steady_filter
+
+#: Weights that pick the external torque out of a Kalman filter's two states. (2, 1)
+TORQUE = np.array([[0.0], [1.0]])
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class FilteredDynamicsObserver(BlockObserver):
+    r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, nothing differentiated.
+
+    τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the bilinear
+    transform with a = ωTs/2 (27)–(29):
+
+        Y₁ᵗ = k₁Y₁ᵗ⁻¹ − k₂(μᵗ + μᵗ⁻¹),  Y₂ᵗ = k₁Y₂ᵗ⁻¹ + k₃(pᵗ + pᵗ⁻¹),  τ̂ = Y₁ + Y₂ + ωp
+
+    k₁ = (1−a)/(1+a), k₂ = a/(1+a), k₃ = −ωa/(1+a), from Y₁⁰ = 0 and Y₂⁰ = −ωp⁰, so that τ̂⁰ = 0.
+    With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are together the momentum observer with
+    K = ω, for every sample time. The printed k₃ and start are errata: `as_printed`.
+
+    Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
+
+    Raises:
+        ParameterError: If the cutoff is not positive.
+    """
+
+    name: ClassVar[str] = "fdo"
+    omega: float = 10.0  #: Cutoff ω, the same for all joints. [rad/s]
+    as_printed: bool = False  #: Use the printed k₃ and start.
+
+    def __post_init__(self) -> None:
+        if np.size(number_array(self.omega, "omega", self.name)) != 1:
+            raise ShapeError(f"fdo.omega is {self.omega!r}; expected one number for all joints")
+        if not (np.isfinite(self.omega) and self.omega > 0):
+            raise ParameterError(f"fdo.omega is {self.omega:g} rad/s; it must be positive")
+
+    def run(
+        self, terms: DynamicsTerms, state: FirstOrderState | None = None
+    ) -> tuple[ExternalTorque, FirstOrderState]:
+        """The estimate of a block from where the block before ended; None where the log begins."""
+        check_terms(terms)
+        driven = afresh = None
+        if self.as_printed:
+            afresh = self.omega * terms.p
+            driven = printed_dynamics_input(terms, self.omega, begins=state is None)
+        rate = np.full(terms.joints, self.omega)
+        tau, state = run_first_order(terms, rate, state, driven, afresh)
+        return self.estimated(terms, tau, remarks=state.remarks), state
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What ω means at a sample time. [s]"""
+        return first_order_tuning(np.full(joints, self.omega), step, parameter_count=1)
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain at `frequency` [Hz]: that of a momentum observer with K = ω. (F, n)"""
+        return first_order_response(np.full(joints, self.omega), frequency, step)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class MomentumObserver(BlockObserver):
+    r"""GMO (30)–(35): residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
+
+    Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
+
+        rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
+
+    (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is
+    unstable from 2 on; that form runs with `as_printed`.
+
+    Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
+
+    Raises:
+        ParameterError: If a gain is not positive.
+    """
+
+    name: ClassVar[str] = "gmo"
+    gain: Array | float = 10.0  #: Bandwidth K, one number or one a joint. (n,) [1/s]
+    as_printed: bool = False  #: Feed back one sample late, as (35) is printed.
+
+    def __post_init__(self) -> None:
+        gain = numbers_of(self.gain, "gain", self.name)
+        object.__setattr__(self, "gain", gain)
+        if not (np.all(np.isfinite(gain)) and np.all(gain > 0)):
+            raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
+
+    def run(
+        self, terms: DynamicsTerms, state: FirstOrderState | None = None
+    ) -> tuple[ExternalTorque, FirstOrderState]:
+        """The estimate of a block from where the block before ended; None where the log begins."""
+        check_terms(terms)
+        gain = per_joint(self.gain, terms.joints)
+        if not self.as_printed:
+            tau, state = run_first_order(terms, gain, state)
+            return self.estimated(terms, tau, remarks=state.remarks), state
+        start = np.zeros((2, terms.joints)) if state is None else state.states
+        tau, end = printed_momentum(terms, gain, start)
+        unstable = np.flatnonzero(0.5 * terms.clock.step * gain >= 1.0)
+        joints = Where(joints=tuple(int(j) + 1 for j in unstable))
+        remarks = (warning("unstable-as-printed", joints),) if len(unstable) else ()
+        return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """What K means at a sample time. [s]"""
+        return first_order_tuning(per_joint(self.gain, joints), step, parameter_count=joints)
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain at `frequency` [Hz]. (F, n)"""
+        return first_order_response(per_joint(self.gain, joints), frequency, step)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class KalmanObserver(BlockObserver):
+    r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext], ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
+
+    With diagonal R, Q_p and Q_τ it is n two-state filters whose gains do not depend on the data.
+    The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the stationary
+    prior, so that at a constant sample time there is no transient of the gains; on an uneven clock
+    the covariance is propagated with every step's own A, B, Q and R. `sd` of its estimate is √P₂₂,
+    the filter's own account of its error.
+
+    For A_τ = 0, A_c² = 0 and both discretisations have the same A and B; they differ in Q only.
+
+    Raises:
+        ParameterError: If a variance is not positive, or a name is unknown.
+    """
+
+    discretisation: str = "fe"  #: "fe" (41), (42) or "zoh" (43), (44).
+    r_diag: Array | float = 0.5  #: R, one number or one a joint. (n,) [(N·m·s)²·s under "density"]
+    q_p_diag: Array | float = 0.01  #: Q_p. (n,) [(N·m)²·s]
+    q_tau_diag: Array | float = 5000.0  #: Q_τ. (n,) [(N·m)²/s]
+    #: a in A_τ = −a; a number with its sign turned means the same. (n,) [1/s]
+    decay: Array | float = 0.0
+    noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
+    #: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the stationary one. (3,
+    #: n)
+    initial_covariance: Array | None = None
+    #: Use μᵗ alone (40), the literal noise convention, and (44)'s printed block.
+    as_printed: bool = False
+
+    def __post_init__(self) -> None:
+        scheme, convention = self.discretisation, self.noise_convention
+        check_known(scheme, DISCRETISATIONS, f"discretisation {scheme!r}")
+        check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
+        for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
+            value = numbers_of(getattr(self, name), name, self.name)
+            # The paper gives A_τ = −a, its tables a: either sign means the same decay.
+            value = frozen(np.abs(value)) if name == "decay" else value
+            object.__setattr__(self, name, value)
+            least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
+            if not (np.all(np.isfinite(value)) and np.all(least_allowed)):
+                raise ParameterError(
+                    f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and "
+                    "decay must not be negative"
+                )
+
+    @property
+    def name(self) -> str:
+        """kfo-fe or kfo-zoh."""
+        return f"kfo-{self.discretisation}"
+
+    def run(
+        self, terms: DynamicsTerms, state: KalmanState | None = None
+    ) -> tuple[ExternalTorque, KalmanState]:
+        """The estimate of a block from where the block before ended; None where the log begins."""
+        check_terms(terms)
+        n, begins = terms.joints, state is None
+        densities, d = self.densities(n), self.unexplained(terms)
+        model = self._model_of(densities, terms.clock.step)
+        settled = self._settled(model, densities)
+        if self.is_steady(terms.clock):
+            F, g = error_filter(settled.gains, model.a12, model.a22)
+            start = np.zeros((2, n)) if state is None else state.error
+            tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
+            sd = np.broadcast_to(handed_over(np.sqrt(settled.gains.posterior.p22)), tau.shape)
+            state = KalmanState(end, settled.gains.posterior)
+        elif self.prints_hold:
+            every = self._model_of(densities, np.broadcast_to(terms.dt, (len(d), 1)))
+            given = None if self.initial_covariance is None else self.first_prior(settled)
+            before = state or printed_start(model, densities, given)
+            tau, sd, state = printed_hold_steps(d, every, densities, before, begins=begins)
+        else:
+            if state is None:
+                first = self.model(terms.dt[:1], n).r[0]
+                posterior = update(self.first_prior(settled), first).posterior
+                state = KalmanState(np.zeros((2, n)), posterior)
+            guess = settled.gains.posterior
+            tau, sd, state = kalman_steps(
+                terms, d, self._model_of, densities, guess, state, begins=begins
+            )
+        return self.estimated(terms, tau, sd=handed_over(sd)), state
+
+    def densities(self, joints: int) -> Densities:
+        """The parameters, one a joint."""
+        values = (self.r_diag, self.q_p_diag, self.q_tau_diag, self.decay)
+        return Densities(*(per_joint(value, joints) for value in values))
+
+    def model(self, step: Array | float, joints: int) -> Discrete:
+        """The discrete model at one sample time, or one a sample as a column (T, 1). [s]"""
+        return self._model_of(self.densities(joints), step)
+
+    def _model_of(self, densities: Densities, step: Array | float) -> Discrete:
+        """The discrete model of some joints."""
+        convention = "literal" if self.as_printed else self.noise_convention
+        step = np.asarray(step, dtype=np.float64)
+        return discretise(self.discretisation, convention, step, densities)
+
+    def steady(self, step: float, joints: int) -> Steady:
+        """Stationary gains and prior at a sample time. [s]"""
+        return self._settled(self.model(step, joints), self.densities(joints))
+
+    @property
+    def prints_hold(self) -> bool:
+        """Whether its noise is that of (44) as printed."""
+        return self.as_printed and self.discretisation == "zoh"
+
+    def _settled(self, model: Discrete, densities: Densities) -> Steady:
+        """What a model of one sample time settles to."""
+        if self.prints_hold:
+            return printed_steady(model, densities)
+        return steady(model, densities.decay)
+
+    def is_steady(self, clock: Clock) -> bool:
+        """Whether the gains along a log of this clock are the stationary ones from its start on."""
+        return clock.uniform and self.initial_covariance is None
+
+    def unexplained(self, terms: DynamicsTerms) -> Array:
+        """The filter's input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or with u = μᵗ (40). (T, n)"""
+        if not self.as_printed:
+            return terms.d
+        return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
+
+    def first_prior(self, settled: Steady) -> Covariance:
+        """Covariance before the first update: the user's, or the stationary one. (n,)"""
+        if self.initial_covariance is None:
+            return settled.prior
+        given, joints = np.asarray(self.initial_covariance, np.float64), len(settled.prior.p11)
+        if given.shape not in {(3,), (3, 1), (3, joints)}:
+            told = f"initial_covariance of {self.name} has shape {given.shape}"
+            raise ShapeError(f"{told}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
+        return Covariance(*np.broadcast_to(given.reshape(3, -1), (3, joints)))
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)) of the effective densities, and the exact delay.
+
+        Q and R are taken as the convention makes them at this sample time; the delay to a ramp is
+        L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
+        """
+        d, model = self.densities(joints), self.model(step, joints)
+        gains = self.steady(step, joints).gains
+        # The convention scales all of Q alike, so Q₂₂/Ts (with A_τ = 0) is the effective density.
+        literal = self.as_printed or self.noise_convention == "literal"
+        scale = model.step if literal and self.discretisation == "fe" else np.ones(joints)
+        r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
+        omega = (q_tau / r) ** 0.25
+        zeta = 0.5 * np.sqrt(2.0 + q_p / np.sqrt(q_tau * r))
+        bend = 1.0 - 2.0 * zeta**2
+        ratio = gains.l1 / gains.l2
+        return Tuning(
+            omega_n=omega,
+            zeta=zeta,
+            delay=ratio - step / 2.0,
+            bandwidth=omega * np.sqrt(bend + np.sqrt(bend**2 + 1.0)) / (2.0 * np.pi),
+            dc_gain=step / (model.a12 + (1.0 - model.a22) * ratio),
+            parameter_count=3 * joints,
+        )
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Exact response to τ_ext = e^{jωt} whose integral, the momentum, is sampled. (F, n)"""
+        model, gains = self.model(step, joints), self.steady(step, joints).gains
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
+        omega = np.where(omega == 0.0, 1e-9, omega)
+        back = np.exp(-1j * omega * step)
+        (f11, f12), (f21, f22) = closed_loop(gains, model.a12, model.a22)
+        # (I − F z⁻¹) x = L p: the second row of the inverse times L.
+        determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
+        second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant
+        response: Complex = second / (1j * omega)
+        return response
