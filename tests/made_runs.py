@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
@@ -17,6 +17,6 @@ def run_of(terms: DynamicsTerms, q: Array | None = None, robot: Robot | None = N
     return Run(recording=log, robot=robot or load_robot("ur5")).holding(terms=terms)
 
 
-def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> Samples:
+def samples_of(terms: DynamicsTerms, inside: Mask, q: Array | None = None) -> RunSamples:
     """Some samples of such a run."""
-    return Samples(run_of(terms, q), inside)
+    return RunSamples(run_of(terms, q), inside)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -129,7 +129,7 @@ class Analysis(Shown):
         found = self.refinement.baselines.plain
         load = found.load if found.untouched else None
         pieces = ((self.run_of(name, run) if name else run, at) for run, at in found.untouched)
-        free = tuple(Samples(without_load(run, load), inside) for run, inside in pieces)
+        free = tuple(RunSamples(without_load(run, load), inside) for run, inside in pieces)
         log = self.motion.log
         return FreeLog(self.run_of(name, log) if name else log, free, load)
 

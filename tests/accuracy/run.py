@@ -36,7 +36,7 @@ from vftcli.observers.auto_tuning import (  # noqa: E402
 from vftcli.observers.choice import ObserverChoice  # noqa: E402
 from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
 from vftcli.repetition.free_motion import FreeMotion  # noqa: E402
-from vftcli.robots.run import Run, Samples  # noqa: E402
+from vftcli.robots.run import Run, RunSamples  # noqa: E402
 from vftcli.signals.rest import standing  # noqa: E402
 
 GROUPS = ("planted", "pieces", "steady", *scenarios.SIMULATED, "bullet")
@@ -104,7 +104,7 @@ def uncapped():
 
 def tuned(run, free):
     """The estimate of the smoother tuned on the spectra of the free part and the rest. (T, n)"""
-    found = spectra.spectra_of(Samples(run, ~free), [Samples(run, free)])
+    found = spectra.spectra_of(RunSamples(run, ~free), [RunSamples(run, free)])
     return tune_to_spectra("rts-auto", found).estimate(run.terms).tau
 
 

@@ -42,7 +42,7 @@ from vftcli.reproduction.benchmark import (
 from vftcli.reproduction.timing import SCRIPT_SAMPLES, dense_kalman_loop, first_order_loops
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.names import EFFORTS, EXAMINED
@@ -134,7 +134,7 @@ def core_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
 
     def spectra(terms: DynamicsTerms) -> Spectra:
         run = Run(recording=recording, robot=robot).holding(terms=terms)
-        return spectra_of(Samples(run, ~free), [Samples(run, free)])
+        return spectra_of(RunSamples(run, ~free), [RunSamples(run, free)])
 
     def complete() -> None:
         terms = core()

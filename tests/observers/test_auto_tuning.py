@@ -18,13 +18,13 @@ from vftcli.observers.auto_tuning import (
     tune_to_spectra,
 )
 from vftcli.observers.spectra import Spectra, spectra_of
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import DynamicsTerms
 
 STEP = 0.008
 
 TermsOf = Callable[..., DynamicsTerms]
-Pushed = Callable[..., tuple[Samples, Samples]]
+Pushed = Callable[..., tuple[RunSamples, RunSamples]]
 
 
 def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
@@ -46,7 +46,7 @@ def pushed(terms_of: TermsOf) -> Pushed:
 
 def half_pushed(
     terms_of: TermsOf, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
-) -> tuple[Samples, Samples]:
+) -> tuple[RunSamples, RunSamples]:
     """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
     t = STEP * np.arange(samples)
     free = np.arange(samples) < samples // 2

@@ -248,7 +248,7 @@ def test_real_pushes_come_out_better(logs):
     from vftcli.observers.spectra import spectra_of
     from vftcli.readers.library import Library
     from vftcli.readers.reader import ReadChoice
-    from vftcli.robots.run import Samples
+    from vftcli.robots.run import RunSamples
 
     path = logs / "ur10e" / "free_12harm.csv"
     columns = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -257,7 +257,7 @@ def test_real_pushes_come_out_better(logs):
     free = run.recording.t <= 8.0
     errors = []
     for each in (run, whole_log_bias(run).corrected(run)):
-        parts = Samples(each, ~free), [Samples(each, free)]
+        parts = RunSamples(each, ~free), [RunSamples(each, free)]
         tau = tune_to_spectra("rts-auto", spectra_of(*parts)).estimate(each.terms).tau
         errors.append(rms(tau - made.torque).mean())
     # another library of linear algebra moves the last digits alone

@@ -16,7 +16,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.regressor import load_regressor
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -85,7 +85,7 @@ def test_a_simulation_without_noise_or_torque_carries_nothing(log: Recording) ->
     still = replace(log, q=np.zeros_like(log.q), dq=np.zeros_like(log.q), current=0.0 * log.current)
     weightless = replace(ROBOT, chain=replace(ROBOT.chain, gravity=np.zeros(3)))
     run = Run(recording=still, robot=weightless)
-    assert free_load((Samples(run, log.t > 1.0),)) is None
+    assert free_load((RunSamples(run, log.t > 1.0),)) is None
 
 
 def test_a_payload_is_torque_and_no_noise(log: Recording) -> None:
@@ -122,7 +122,7 @@ def test_what_lies_far_from_a_piece_is_not_heard(
     log: Recording, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
-    piece = Samples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
+    piece = RunSamples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
     near = columns(piece)
     monkeypatch.setattr("vftcli.repetition.free_load.HEARD", 100.0)
     whole = columns(piece)

@@ -8,7 +8,7 @@ import pytest
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.wrench import Wrench
@@ -162,7 +162,7 @@ def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
 def test_observers_are_run_along_free_runs() -> None:
     log = read(Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv")
     run = Run(recording=log, robot=load_robot("ur5"))
-    piece = Samples(run, (log.t > 0.3) & (log.t < 4.0))
+    piece = RunSamples(run, (log.t > 0.3) & (log.t < 4.0))
     gmo = MomentumObserver(gain=10.0)
 
     def read_by(pieces, sensor):

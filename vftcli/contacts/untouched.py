@@ -32,7 +32,7 @@ from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.intervals import near, runs_of
@@ -64,12 +64,12 @@ class Untouched:
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
     noise: ErrorNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
-    own: Mask  #: Samples of the log itself that are known to be free. (T,)
+    own: Mask  #: RunSamples of the log itself that are known to be free. (T,)
     #: The log, less a load that the free part carries; less the model error of the whole log where
     #: the basis is that.
     log: Run
     runs: tuple[Run, ...]  #: Free runs in other logs, less a load that they carry.
-    free: tuple[Samples, ...]  #: Every free piece, less a load that it carries.
+    free: tuple[RunSamples, ...]  #: Every free piece, less a load that it carries.
     pieces: tuple[Blocks, ...]  #: The same in blocks.
     #: A load that the arm carries in this log and its model lacks, None where none shows.
     load: FreeLoad | None
@@ -136,9 +136,9 @@ def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched |
     corrected = bias.corrected(log)
     short = any(remark.code in SHORT_LOG for remark in bias.remarks)
     # An arm that holds one pose does not tell a mass from a push.
-    weighed = free_load([Samples(corrected, bias.free)]) if bias.fitted or short else None
+    weighed = free_load([RunSamples(corrected, bias.free)]) if bias.fitted or short else None
     corrected = without_load(corrected, weighed)
-    free = (Samples(corrected, bias.free),) if bias.fitted else ()
+    free = (RunSamples(corrected, bias.free),) if bias.fitted else ()
     found = inferred(corrected, free, seconds)
     if found is None:
         return None
@@ -157,7 +157,7 @@ def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched |
 
 
 def inferred(
-    log: Run, free: Sequence[Samples], seconds: float
+    log: Run, free: Sequence[RunSamples], seconds: float
 ) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
     """Noise that is inferred, and its free pieces in blocks of a length [s]; None without any."""
     whole = disturbance_blocks(log.terms, log.q, seconds)
@@ -167,7 +167,7 @@ def inferred(
 
 
 def noise_of(
-    pieces: Sequence[Samples], seconds: float
+    pieces: Sequence[RunSamples], seconds: float
 ) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
     """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short."""
     blocks = tuple(
@@ -192,9 +192,9 @@ def free_part(motion: FreeMotion) -> FreePart | None:
         if not choice.cycles and is_touched(log, own):
             return None
         remarks.append(found.remark(motion.cycles.whole))
-    pieces = [Samples(log, own)] if own.any() else []
+    pieces = [RunSamples(log, own)] if own.any() else []
     for run in motion.runs:
-        pieces.append(Samples(run.run, np.ones(run.recording.samples, dtype=bool)))
+        pieces.append(RunSamples(run.run, np.ones(run.recording.samples, dtype=bool)))
         remarks.append(fact("free-log", Where(about=run.recording.name)))
     return FreePart(tuple(pieces), own, tuple(remarks))
 
@@ -205,7 +205,7 @@ def is_touched(log: Run, own: Mask) -> bool:
     if not (above & own & (log.t >= log.t[0] + SETTLED)).any():
         return False
     try:
-        return not looks_free(spectra_of(Samples(log, ~own), [Samples(log, own)]))
+        return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
     except ParameterError:  # too short for a spectrum
         return False
 
@@ -236,7 +236,7 @@ def observer_noise(run: Run) -> Array:
     return noise
 
 
-def torque_level(pieces: Sequence[Samples]) -> Array:
+def torque_level(pieces: Sequence[RunSamples]) -> Array:
     """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
     values, moves = [], []
     for piece in pieces:

@@ -27,14 +27,14 @@ from vftcli.robots.chain import Payload
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact
 from vftcli.signals.rest import faster
 
-LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
+LOOKED_AT = 400  #: RunSamples of a motion, at most, by which its different poses are counted.
 #: What a weighing needs: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7
 #: of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
 LONG = 10.0
@@ -113,7 +113,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> MotionWeighing:
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
-        piece = Samples(run, np.ones(run.recording.samples, dtype=bool))
+        piece = RunSamples(run, np.ones(run.recording.samples, dtype=bool))
         at, own = weighed(piece), columns(piece)
         if own is not None:
             signals.append((*own, run.q[at], run.dq[at]))

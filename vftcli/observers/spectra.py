@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.disturbance import disturbance_stretches
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.intervals import grown, intervals
@@ -152,7 +152,7 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
     return inside if intervals(t, inside, least=IMPACT) else grown(t, inside, 0.5 * IMPACT)
 
 
-def spectra_of(loaded: Samples, free: Sequence[Samples]) -> Spectra:
+def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """The spectra of a loaded part and a free one, by the same estimator.
 
     A loaded part of short impacts is widened until it holds a second in a row: its excess over the

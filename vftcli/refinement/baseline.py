@@ -11,7 +11,7 @@ from vftcli.observers.table import BEST, LogSpectra
 from vftcli.refinement.tuning import gains_of
 from vftcli.repetition.free_load import FreeLoad, free_load, without_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
@@ -90,19 +90,19 @@ class Baseline:
         return None if self.correction is None else self.correction.sd
 
     @property
-    def samples(self) -> list[Samples]:
+    def samples(self) -> list[RunSamples]:
         """The free samples as the observers have them, less a load, which is no noise."""
         return [
-            Samples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
+            RunSamples(without_load(self.of(run), self.load), inside) for run, inside in self.pieces
         ]
 
     @property
-    def pieces(self) -> tuple[Samples, ...]:
+    def pieces(self) -> tuple[RunSamples, ...]:
         """The free samples, of the log itself and of free runs; none without a free part."""
         return self.part.pieces if self.part is not None else ()
 
     @property
-    def untouched(self) -> tuple[Samples, ...]:
+    def untouched(self) -> tuple[RunSamples, ...]:
         """The pieces in which nothing at all touches the arm, as far as it is known."""
         return () if self.by_fit else self.pieces
 
@@ -131,7 +131,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         return replace(bare, missing=caution("no-free-part", reason=str(error)))
     known = replace(bare, part=part, load=free_load(part.pieces))
     try:
-        spectra = spectra_of(Samples(log, ~part.own), known.samples)
+        spectra = spectra_of(RunSamples(log, ~part.own), known.samples)
     except ParameterError as error:
         return replace(known, missing=caution("no-spectra", reason=str(error)))
     if motion.choice.is_given or looks_free(spectra):

@@ -16,7 +16,7 @@ from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import free_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.remarks import caution, fact
@@ -57,10 +57,10 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
         # What was given is dropped, and why has to be said.
         reason = found.missing.values["reason"]
         remark = caution("free-by-the-fit-instead", share=share, reason=reason)
-    part = FreePart((Samples(log, quiet),), quiet, (remark,))
+    part = FreePart((RunSamples(log, quiet),), quiet, (remark,))
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
-        return replace(made, spectra=spectra_of(Samples(log, ~quiet), made.samples))
+        return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
     except ParameterError:  # all of it or nothing is taken for free, or never for long enough
         return found
 
@@ -74,4 +74,4 @@ def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
     made = replace(found, on_correction=bias.remarks, correction=fitted)
     if not bias.applied.any() or made.part is None or made.spectra is None:
         return made
-    return replace(made, spectra=spectra_of(Samples(made.log, ~made.part.own), made.samples))
+    return replace(made, spectra=spectra_of(RunSamples(made.log, ~made.part.own), made.samples))

@@ -19,7 +19,7 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.regressor import load_regressor, load_wrench
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Indices, handed_over, seal
 from vftcli.signals.errors import ClockError
 from vftcli.signals.filters import derivative, zero_phase
@@ -32,7 +32,7 @@ PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
 CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
 #: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]
 HEARD = 2.0
-RATE = 30.0  #: Samples a second that are weighed.
+RATE = 30.0  #: RunSamples a second that are weighed.
 #: Time over which the model's errors resemble one another: so much counts as one sample. [s]
 MEMORY = 0.3
 SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
@@ -100,7 +100,7 @@ class Weighing(NamedTuple):
     left: Array  #: Root mean square of what is left, joint by joint. (n,) [N·m]
 
 
-def free_load(pieces: Sequence[Samples]) -> FreeLoad | None:
+def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     """The load that explains much of the free part's disturbance, None where none does."""
     parts = [part for piece in pieces if (part := columns(piece)) is not None]
     if not parts:
@@ -130,13 +130,13 @@ def free_load(pieces: Sequence[Samples]) -> FreeLoad | None:
     )
 
 
-def weighed(piece: Samples) -> Indices:
+def weighed(piece: RunSamples) -> Indices:
     """The samples of a piece that are weighed. (S,)"""
     step = median_step(piece.run.t)
     return np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * step)))]
 
 
-def columns(piece: Samples) -> tuple[Array, Array] | None:
+def columns(piece: RunSamples) -> tuple[Array, Array] | None:
     """The disturbance of a piece, and the columns that explain it; None of a piece too short.
 
     Returns:

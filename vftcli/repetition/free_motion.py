@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_run import FreeRun
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
@@ -29,8 +29,8 @@ SLACK = 0.03
 class FreePart(NamedTuple):
     """Everything that is free of contact, of the log and of free runs."""
 
-    pieces: tuple[Samples, ...]  #: One a recording, the log's own first.
-    own: Mask  #: Samples of the log itself that are free. (T,)
+    pieces: tuple[RunSamples, ...]  #: One a recording, the log's own first.
+    own: Mask  #: RunSamples of the log itself that are free. (T,)
     remarks: tuple[Remark, ...]  #: What it is and how it was found.
 
 
@@ -109,11 +109,11 @@ class FreeMotion(Shown):
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
             remarks.append(found.remark(self.cycles.whole))
-        pieces = [Samples(log, own)] if own.any() else []
+        pieces = [RunSamples(log, own)] if own.any() else []
         for run in self.runs:
             whole = np.ones(run.recording.samples, dtype=bool)
             about = Where(about=run.recording.name)
-            pieces.append(Samples(run.run, whole))
+            pieces.append(RunSamples(run.run, whole))
             if run.is_same_motion:
                 remarks.append(fact("free-run", about, shift_s=run.alignment.shift))
             else:
@@ -128,7 +128,7 @@ class FreeMotion(Shown):
 
     @property
     def within_spans(self) -> Mask:
-        """Samples of the log inside the spans that are given as free. (T,)"""
+        """RunSamples of the log inside the spans that are given as free. (T,)"""
         recording, spans = self.log.recording, self.choice.spans
         t = recording.t
         inside = np.zeros(len(t), dtype=bool)

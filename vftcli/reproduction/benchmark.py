@@ -20,12 +20,12 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.reproduction.paper import PAPERS
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
-SAMPLES = 30_060  #: Samples of the paper's Table II.
+SAMPLES = 30_060  #: RunSamples of the paper's Table II.
 #: Length of the part that counts as free for the observers that the log tunes. [s]
 FREE_SECONDS = 8.0
 TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
@@ -131,8 +131,8 @@ def run_rounds(timings: Timings, robot: Robot, recording: Recording, rounds: int
     run = Run(recording=recording, robot=robot)
     terms = run.terms
     free = recording.t < FREE_SECONDS
-    part = [Samples(run, free)]
-    spectra = partial(spectra_of, Samples(run, ~free), part)
+    part = [RunSamples(run, free)]
+    spectra = partial(spectra_of, RunSamples(run, ~free), part)
     found = spectra()
     work: dict[str, Callable[[], object]] = {
         "dynamics": partial(dynamics_terms, recording, robot),

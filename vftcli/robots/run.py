@@ -18,7 +18,7 @@ from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step, white_noise
 from vftcli.signals.shown import Shown
 
-#: Samples from which on a recording's series do not stay in memory beside its results.
+#: RunSamples from which on a recording's series do not stay in memory beside its results.
 LONG = 1 << 17
 #: What has a value for each sample, and stays in a part of a run.
 SERIES = ("standing", "standstill", "drive_torque", "model_torque", "momentum")
@@ -163,7 +163,7 @@ class Run(Shown):
             steadied.spare()
 
 
-class Samples(NamedTuple):
+class RunSamples(NamedTuple):
     """Some samples of a run."""
 
     run: Run  #: The run.

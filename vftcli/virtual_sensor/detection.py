@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -45,7 +45,7 @@ class ContactScore(NamedTuple):
 class ToldContacts:
     """What is known of a log's contacts before they are judged."""
 
-    untouched: Mask  #: Samples of the log that are known to be free; none where nothing is. (T,)
+    untouched: Mask  #: RunSamples of the log that are known to be free; none where nothing is. (T,)
     #: What each observer reads in free runs of other logs, by name. (S, k) each
     beside: Mapping[str, Array] = field(default_factory=dict)
     #: Contacts that stand in a list, by the observer whose wrench they are told of.
@@ -53,7 +53,7 @@ class ToldContacts:
 
 
 def read_in_free_runs(
-    pieces: Sequence[Samples],
+    pieces: Sequence[RunSamples],
     observers: Sequence[Observer],
     run_of: Callable[[str, Run], Run],
     sensor: VirtualSensor | None,
@@ -82,7 +82,7 @@ def true_intervals(
 
 
 def learned_free(t: Array, true: Sequence[ContactInterval]) -> Mask:
-    """Samples from `SETTLING` after the start to the first true contact. (T,)"""
+    """RunSamples from `SETTLING` after the start to the first true contact. (T,)"""
     first = true[0].start if true else float(t[-1])
     free: Mask = (t >= t[0] + SETTLING) & (t < first)
     if np.count_nonzero(free) < 10:

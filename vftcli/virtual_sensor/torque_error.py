@@ -16,7 +16,7 @@ from vftcli.observers.error_band import error_band, free_error
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import spectra_of
 from vftcli.robots.friction import dry_friction
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
@@ -40,7 +40,7 @@ def missed_torque(
         Observer → mean square; None where a part is too short for a spectrum.
     """
     try:
-        spectra = spectra_of(Samples(log, ~free), [Samples(log, free)])
+        spectra = spectra_of(RunSamples(log, ~free), [RunSamples(log, free)])
     except ParameterError:
         return None
     f, step, n = spectra.frequency, spectra.step, log.robot.joints

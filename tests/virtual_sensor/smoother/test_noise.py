@@ -10,7 +10,7 @@ from scipy.optimize import minimize
 from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import REST_SHARE, dry_torques
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
 from vftcli.virtual_sensor.smoother.noise import (
@@ -73,7 +73,7 @@ def test_a_joint_without_disturbance_has_no_noise() -> None:
     assert found.white > 0.0
 
 
-def free_run(moving: np.ndarray, seconds: float = 60.0) -> Samples:
+def free_run(moving: np.ndarray, seconds: float = 60.0) -> RunSamples:
     """An arm whose joints move or rest throughout: offset .5 N·m, error sd 1 N·m, T .5 s."""
     t = np.arange(0.0, seconds, STEP)
     torque = np.column_stack([wandering(len(t), 1.0, 0.5, j, STEP) for j in range(6)]) + 0.5

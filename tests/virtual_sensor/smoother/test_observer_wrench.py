@@ -13,7 +13,7 @@ from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.robots.run import Runs, Samples
+from vftcli.robots.run import Runs, RunSamples
 from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.sensing import sense
@@ -99,7 +99,7 @@ def test_a_span_that_is_its_zero_is_free_motion_where_there_is_no_other(motion: 
     (found,) = FreeLog(log, ()).known_free(unloaded)
     assert found.inside is unloaded
     assert FreeLog(log, ()).known_free(unloaded & False) == ()
-    given = (Samples(log, ~unloaded),)
+    given = (RunSamples(log, ~unloaded),)
     assert FreeLog(log, given).known_free(unloaded) is given
 
 
@@ -121,7 +121,7 @@ def test_a_correction_is_left_out_where_the_log_shows_one_load(
     if newtons:
         pushes = smooth_all(["best"], plain, {}, unloaded=log.t < 4.0)["best"].at(log.t)
         taken = np.einsum("tij,ti->tj", J, pushes.values)
-        free = tuple(Samples(run.less(taken), inside) for run, inside in plain.free)
+        free = tuple(RunSamples(run.less(taken), inside) for run, inside in plain.free)
         plain = FreeLog(log.less(taken + newtons * J[:, 2]), free)
     own = plain._replace(run=plain.run.less(np.ones_like(J[:, 0])))
     found = smooth_all(["best"], plain, {"best": own}, unloaded=nothing)["best"]

@@ -13,7 +13,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
@@ -64,7 +64,7 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
     """25 N for 30 s of motion against .3 N·m of error; the band says what is left."""
     robot, t = load_robot(name), np.arange(0.0, 30.0, STEP)
     q = swing(robot, t)
-    free = Samples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
+    free = RunSamples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(simulated(robot, q, load(t), t), [free])
     assert found.prior.is_steady
     assert found.seconds == pytest.approx(0.1)
@@ -77,7 +77,7 @@ def test_a_steady_load_is_found_to_be_one_and_weighed(name: str) -> None:
 def test_pushes_are_followed_in_short_blocks() -> None:
     robot, t = load_robot("ur5"), np.arange(0.0, 30.0, STEP)
     q, push = swing(robot, t), load(t) * (np.sin(2.0 * t) > 0.6)[:, None]
-    free = Samples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
+    free = RunSamples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(simulated(robot, q, push, t), [free])
     assert not found.prior.is_steady
     assert found.seconds == pytest.approx(0.024)
@@ -92,7 +92,7 @@ def test_the_gate_leaves_no_wrench_where_nothing_touches() -> None:
     robot, t = load_robot("ur5"), np.arange(0.0, 20.0, STEP)
     q, push = swing(robot, t), load(t) * ((t > 8.0) & (t < 11.0))[:, None]
     run, prior = simulated(robot, q, push, t), WrenchPrior(3.0, 30.0)
-    free = Samples(run, t < 7.0)
+    free = RunSamples(run, t < 7.0)
     gate, whole = (smooth_wrench(run, [free], g, prior) for g in ([(8.0, 11.0)], None))
     assert not gate.values[~gate.inside].any()
     assert gate.sd.min() > 0.0
@@ -117,7 +117,7 @@ def test_the_band_where_nothing_is_listed_is_that_of_a_contact_there(at: float) 
     robot, t = load_robot("ur5"), np.arange(0.0, 12.0, STEP)
     q, prior = swing(robot, t), WrenchPrior(1.0, 30.0)
     run = simulated(robot, q, 0 * load(t), t)
-    free, half = Samples(run, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
+    free, half = RunSamples(run, np.ones(len(t), dtype=bool)), 0.5 * UNLISTED
     never = smooth_wrench(run, [free], [], prior)
     # A block on either side is inside of the gate, too.
     edge = half - 1.5 * never.seconds
@@ -135,7 +135,7 @@ def test_the_band_where_nothing_is_listed_grows_with_the_blindness_of_the_pose()
     run = simulated(robot, q, 0 * load(t), t)
     found = smooth_wrench(
         run,
-        [Samples(run, np.ones(len(t), dtype=bool))],
+        [RunSamples(run, np.ones(len(t), dtype=bool))],
         [],
         prior,
     )
@@ -154,7 +154,7 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None
     sigma = decompose(flange_jacobian(robot.chain, q)).sigma_min
     assert np.all(sigma[blind] < LEAST_SIGMA)
     push = load(t) * (np.sin(1.3 * t) > 0.3)[:, None]
-    free = Samples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
+    free = RunSamples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(simulated(robot, q, push, t), [free], prior=WrenchPrior(1, 30))
     moved = found.at(t)
     assert np.isfinite(moved.values).all()
@@ -176,7 +176,7 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
         p=whole.p[there] + 50.0 * (t[there] > 12)[:, None],
         mu=whole.mu[there],
     )
-    quiet = Samples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
+    quiet = RunSamples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(run_of(cut, q[there]), [quiet], prior=prior)
     at = found.at(np.array([5.0, 10.0, 15.0]))
     assert np.isfinite(at.values).all()
@@ -234,7 +234,7 @@ def test_a_circle_under_pushes_reads_its_truth() -> None:
     path = FIXTURES / "ur5_circle.csv"
     recording, robot = Library([path]).open(path, ReadChoice()), load_robot("ur5")
     run, t = Run(recording=recording, robot=robot), recording.t
-    moved = smooth_wrench(run, [Samples(run, (t > 0.3) & (t < 4.0))]).at(t)
+    moved = smooth_wrench(run, [RunSamples(run, (t > 0.3) & (t < 4.0))]).at(t)
     table = pl.read_parquet(f"{path}.truth.parquet")
     truth = table.select([f"wrench/{axis}" for axis in AXES]).to_numpy()
     error = moved.values - truth
@@ -253,7 +253,7 @@ def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
     paths = [folder / "load_14harm.csv", folder / "free_14harm.csv"]
     log, free = (Library([path]).open(path, choice) for path in paths)
     run, other = (Run(recording=recording, robot=robot) for recording in (log, free))
-    found = smooth_wrench(run, [Samples(other, np.ones(free.samples, dtype=bool))])
+    found = smooth_wrench(run, [RunSamples(other, np.ones(free.samples, dtype=bool))])
     assert found.prior.is_steady
     moved = found.at(log.t)
     error = moved.values[:, :3] - [0.0, 0.0, -27.52]

@@ -20,7 +20,7 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Samples
+from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import grown, runs_of
 from vftcli.signals.rest import NEAR_REST
@@ -86,7 +86,9 @@ def steps(blocks: Blocks) -> Array:
     return np.diff(blocks.t, prepend=blocks.t[:1])
 
 
-def torque_noise(log: Blocks, free: Sequence[Samples], robot: Robot, seconds: float) -> TorqueNoise:
+def torque_noise(
+    log: Blocks, free: Sequence[RunSamples], robot: Robot, seconds: float
+) -> TorqueNoise:
     """The noise that the free part shows, else what the drives' dry friction lets assume.
 
     At rest the model error is at least `REST_SHARE` of the dry friction, whatever the free part
@@ -141,7 +143,7 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
     )
 
 
-def free_stretches(piece: Samples, seconds: float) -> list[Blocks]:
+def free_stretches(piece: RunSamples, seconds: float) -> list[Blocks]:
     """The stretches of a free piece that are long enough for a spectrum, in blocks.
 
     They reach from its first motion to its last, since rest has a model error of its own; a piece

@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.repetition.free_load import FreeLoad, without_load
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.kinematics import link_poses
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.series import resample_columns
@@ -32,16 +32,16 @@ class FreeLog(NamedTuple):
     """A log as an observer has it, and what nobody touched."""
 
     run: Run  #: The log.
-    #: Samples that nobody touched, less a load that they carry; none where nothing is known.
-    free: tuple[Samples, ...]
+    #: RunSamples that nobody touched, less a load that they carry; none where nothing is known.
+    free: tuple[RunSamples, ...]
     #: A load that the free samples carry, and with them the whole log; None without one.
     load: FreeLoad | None = None
 
-    def known_free(self, unloaded: Mask) -> tuple[Samples, ...]:
+    def known_free(self, unloaded: Mask) -> tuple[RunSamples, ...]:
         """The free samples; without any, the samples (T,) that a zero says are unloaded."""
         if self.free or np.count_nonzero(unloaded) < 2:
             return self.free
-        return (Samples(self.run, unloaded),)
+        return (RunSamples(self.run, unloaded),)
 
 
 def as_modelled(motion: FreeMotion) -> FreeLog:
@@ -99,7 +99,7 @@ def smooth_all(
         names: The observers.
         plain: The log as the robot's model alone has it.
         own: The log as an observer has it that has another.
-        unloaded: Samples of the log that its zero says are unloaded. (T,)
+        unloaded: RunSamples of the log that its zero says are unloaded. (T,)
         gate: The contacts, outside of which there is no wrench; None where the log is one.
     """
     made: dict[Run, SmoothedWrench] = {}

@@ -14,7 +14,7 @@ import numpy as np
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
-from vftcli.robots.run import Run, Samples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, smoothed
@@ -148,7 +148,7 @@ def deviations(covariance: Array) -> Array:
 
 def smooth_wrench(
     run: Run,
-    free: Sequence[Samples] = (),
+    free: Sequence[RunSamples] = (),
     gate: Sequence[tuple[float, float]] | None = None,
     prior: WrenchPrior | None = None,
 ) -> SmoothedWrench:
@@ -269,7 +269,7 @@ def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
 
 def prior_of(
     run: Run,
-    free: Sequence[Samples] = (),
+    free: Sequence[RunSamples] = (),
     gate: Sequence[tuple[float, float]] | None = None,
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
@@ -297,7 +297,7 @@ class BlockModel(NamedTuple):
 
 def blocks_of(
     run: Run,
-    free: Sequence[Samples],
+    free: Sequence[RunSamples],
     gate: Sequence[tuple[float, float]] | None,
     seconds: float,
 ) -> BlockModel:
