@@ -2,21 +2,19 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.doctor.case import Case, size_of
-from vftcli.doctor.diagnosis import AMBIGUOUS, Cause, Diagnosis, diagnose
-from vftcli.doctor.effort import RANGE, case_of, is_modelled
+from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.fit import (
     APART,
     GUESSED,
     RobotMatch,
+    by_fit,
     is_judgeable,
-    maker_case,
-    match,
     match_of,
     profiles,
     ranking,
@@ -24,7 +22,7 @@ from vftcli.doctor.fit import (
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
-from vftcli.doctor.windows import up_axes, windows_of
+from vftcli.doctor.windows import windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
@@ -45,8 +43,8 @@ FELT = 0.02  #: Size of the vendor's torque, relative to the effort, from which 
 class ArmFindings(NamedTuple):
     """What the model says of a log."""
 
-    findings: tuple[Remark, ...]  #: The remarks.
-    robots: tuple[RobotMatch, ...]  #: The arms that were compared, best fit first.
+    findings: tuple[Remark, ...] = ()  #: The remarks.
+    robots: tuple[RobotMatch, ...] = ()  #: The arms that were compared, best fit first.
 
 
 #: Findings after which a joint's effort is no evidence.
@@ -66,42 +64,32 @@ def arm_findings(
         robot = load_robot(str(recording.robot_hint))
     if robot is not None:
         if robot.joints != recording.joints or not is_judgeable(recording):
-            return ArmFindings((), ())
+            return ArmFindings()
         return of_known_arm(recording, robot, ignored)
     return of_unknown_arm(recording, ignored)
 
 
 def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> ArmFindings:
     """Findings on a log whose arm the user knows."""
-    diagnosis = diagnose(recording, robot, ignored)
-    if diagnosis is None:
-        return ArmFindings((), ())
-    case = maker_case(recording, diagnosis.case.windows)
-    own = match(robot.name, case or diagnosis.case, by_maker=case is not None)
-    heavy = diagnosis.case.carries_load and diagnosis.case.loaded.values[0] > GENERATION
-    refuted = diagnosis.cause is not None and diagnosis.cause.code != "effort-offset"
-    doubtful = diagnosis.case.misfit > DOUBTFUL or heavy or refuted
-    if (own.by_maker and own.misfit > GUESSED) or doubtful:
-        others = [
-            found
-            for name, other in profiles().items()
-            if name != robot.name
-            and other.joints == recording.joints
-            and (found := match_of(recording, name, other)) is not None
-        ]
-        others.sort(key=lambda found: (not found.fits, found.misfit))
+    diagnosis, own = diagnose(recording, robot, ignored), match_of(recording, robot, ignored)
+    if diagnosis is None or own is None:
+        return ArmFindings()
+    case, cause = diagnosis.case, diagnosis.cause
+    heavy = case.carries_load and case.loaded.values[0] > GENERATION
+    refuted = cause is not None and cause.code != "effort-offset"
+    others: list[RobotMatch] = []
+    if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
+        arms = (other for name, other in profiles().items() if name != robot.name)
+        others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
         if (
             others
             and is_rather(others[0], own, diagnosis)
             and (robot.path in PROFILES.values() or is_driven_by(recording, others[0], diagnosis))
         ):
-            remark = warning(
-                "other-robot", own=str(own), best=str(others[0]), robot=others[0].robot
-            )
-            return ArmFindings((remark,), (others[0], replace(own, fits=False), *others[1:]))
-        robots = (own, *(replace(other, fits=False) for other in others))
-    else:
-        robots = (own,)
+            best, *more = others
+            remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
+            return ArmFindings((remark,), (best, replace(own, fits=False), *more))
+    robots = (own, *(replace(other, fits=False) for other in others))
     return ArmFindings(tuple(explained(recording, robot, diagnosis, robots)), robots)
 
 
@@ -164,66 +152,55 @@ def explained(
 def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     """Findings on a log of which nobody says the arm: the profile that fits, or why none does."""
     robots = profiles()
-    fits = ranking(recording, robots)
+    fits = ranking(recording, robots.values())
     if not fits:
         counts = sorted({robot.joints for robot in robots.values()})
         if recording.joints in counts:
-            return ArmFindings((), ())
-        return ArmFindings(
-            (warning("no-profile", joint_count=recording.joints, counts=counts),), ()
-        )
-    if fits[0].fits:
-        robot = robots[fits[0].robot]
+            return ArmFindings()
+        return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))
+    # A maker's own model that fits no profile is of another arm.
+    tried = fits[:1] if fits[0].fits else [fit for fit in fits if not fit.by_maker]
+    found = []
+    for robot in (robots[fit.robot] for fit in tried):
         diagnosis = diagnose(recording, robot, ignored)
-        if diagnosis is None:
-            return ArmFindings((), fits)
+        if diagnosis is not None and (fits[0].fits or is_mistaken(diagnosis)):
+            found.append((diagnosis.healed.misfit, robot, diagnosis))
+    if found:
+        _, robot, diagnosis = min(found, key=lambda one: one[0])
         return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
-    ranked = "; ".join(str(found) for found in fits)
-    found = [
-        (robots[found.robot], diagnosis)
-        for found in fits
-        if not found.by_maker  # a maker's own model that fits no profile is of another arm
-        and (diagnosis := diagnose(recording, robots[found.robot], ignored)) is not None
-        and diagnosis.cause is not None
-        and diagnosis.healed.misfit < MISTAKEN
-    ]
-    if not found:
-        still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
-        code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
-        # Without an arm the work of its effort is all that tells its sign.
-        return ArmFindings((*inverted_effort(recording), warning(code, ranked=ranked)), fits)
-    robot, diagnosis = min(found, key=lambda pair: pair[1].healed.misfit)
-    return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
+    if fits[0].fits:
+        return ArmFindings(robots=fits)
+    still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
+    code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
+    # Without an arm the work of its effort is all that tells its sign.
+    remark = warning(code, ranked="; ".join(map(str, fits)))
+    return ArmFindings((*inverted_effort(recording), remark), fits)
+
+
+def is_mistaken(diagnosis: Diagnosis) -> bool:
+    """Whether a cause explains a log so well that its arm is believed, which nobody named."""
+    return diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
 
 
 def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:
     """The finding on the cause that explains a log."""
-    rival = "nothing else"
-    if diagnosis.rival is not None:
-        joints = [f"J{j + 1}" for j in diagnosis.rival.joints]
-        rival = " ".join([diagnosis.rival.code, *joints])
-    robot_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
-    values: dict[str, Any] = {
-        "misfit_percent": 100 * diagnosis.case.misfit,
-        "healed_percent": 100 * cause.misfit,
-        "rival": rival,
-        "signal": "current" if robot_current else "torque",
-        "column": "current" if robot_current else "tau",
-        "width": recording.joints,
-    }
-    if cause.vertical is not None:
-        gravity = -up_axes(cause.case.windows.chain.gravity) @ cause.case.up  # base axes [m/s²]
-        values |= {
-            "angle_deg": float(np.rad2deg(cause.vertical.angle)),
-            "gravity": [round(float(component), 2) for component in gravity],
-        }
-    if cause.code == "milliamperes" and recording.current is not None:
-        values = {"typical_A": float(np.percentile(np.abs(recording.current), 99))}
-    if cause.code == "drive-scale":
-        values |= {"factor": cause.factor, "sd": cause.sd}
-    if cause.code == "effort-offset":
-        values |= {"offset_Nm": cause.offset, "sd_Nm": cause.sd}
-    return warning(cause.code, on_joints(cause.joints), **values)
+    if cause.code == "milliamperes":
+        typical = float(np.percentile(np.abs(recording.require("current")), 99))
+        return warning(cause.code, typical_A=typical)
+    rival = diagnosis.rival
+    joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
+    by_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
+    return warning(
+        cause.code,
+        on_joints(cause.joints),
+        misfit_percent=100 * diagnosis.case.misfit,
+        healed_percent=100 * cause.misfit,
+        rival=" ".join([rival.code, *joints]) if rival is not None else "nothing else",
+        signal="current" if by_current else "torque",
+        column="current" if by_current else "tau",
+        width=recording.joints,
+        **cause.values,
+    )
 
 
 def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:

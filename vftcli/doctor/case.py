@@ -1,4 +1,4 @@
-"""A log against an arm: what its effort is taken for, and what the arm's model leaves over."""
+"""A log against an arm: its effort read as a torque, and what the arm's model leaves over."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -24,7 +24,7 @@ UPRIGHT = np.array([0.0, 0.0, 1.0])  #: The robot file's own "up".
 class Case:
     """A log against an arm."""
 
-    windows: Windows  #: What the arm's model says.
+    windows: Windows  #: The log's windows with the arm's model.
     given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
     size: float  #: Root mean square of the column that was logged. [N·m]
     constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
@@ -33,9 +33,14 @@ class Case:
     rubs: bool = True  #: Whether friction is in the effort; a maker's rigid-body model has none.
 
     @cached_property
+    def gravity(self) -> Array:
+        """Torque that holds the arm. (W, n) [N·m]"""
+        return np.asarray(self.windows.gravity @ self.up)
+
+    @cached_property
     def needed(self) -> Array:
         """Torque that inertia, rotors and gravity need. (W, n) [N·m]"""
-        return np.asarray(self.windows.inertial + self.windows.gravity @ self.up)
+        return self.windows.inertial + self.gravity
 
     @property
     def friction(self) -> Terms:
@@ -45,18 +50,18 @@ class Case:
 
     @cached_property
     def bare(self) -> RobustFit:
-        """What friction alone leaves over."""
+        """Fit by friction alone."""
         return solve(self.given - self.needed, self.friction)
 
     @cached_property
     def loaded(self) -> RobustFit:
-        """What friction and a load on the flange leave over; the load's four come first."""
+        """Fit by friction and a load on the flange; the load's four coefficients come first."""
         return solve(self.given - self.needed, self.windows.load.beside(self.friction))
 
     @property
     def carries_load(self) -> bool:
         """Whether a load explains a part of what friction leaves."""
-        mass, moment = float(self.loaded.values[0]), self.loaded.values[1:4]
+        mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
         plausible = 0.05 < mass < MAX_MASS and np.linalg.norm(moment) < MAX_ARM * mass + 0.3
@@ -81,39 +86,32 @@ class Case:
     @cached_property
     def by_joint(self) -> Array:
         """What friction leaves over of each joint, relative to the joint's effort. (n,)"""
-        return np.asarray(self.bare.by_joint / self.effort_sizes)
+        return self.bare.by_joint / self.effort_sizes
 
     @property
     def gravity_range(self) -> float:
         """How much gravity's torque varies, on the joint where it varies most. [N·m]"""
-        gravity = self.windows.gravity @ self.up
-        return float(np.max(np.ptp(gravity, axis=0)))
+        return float(np.ptp(self.gravity, axis=0).max())
 
-    def lasts(self, cause: RobustFit, change: Array | None = None) -> bool:
+    def lasts(self, cause: RobustFit, change: Array) -> bool:
         """Whether a cause is there all the time, as no push and no carried object is.
 
         Args:
             cause: The fit with it.
-            change: What it changes of the torque; None for the load of `loaded`. (W, n) [N·m]
+            change: What it changes of the torque. (W, n) [N·m]
         """
-        if change is None:
-            change = self.windows.load.columns @ self.loaded.values[:4]
         size = np.linalg.norm(change, axis=1)
         felt = size > FELT * cause.size * np.sqrt(change.shape[1])
         without = np.linalg.norm(cause.rest + change, axis=1)
         refuted = felt & (without < REFUTED * np.linalg.norm(cause.rest, axis=1))
-        return bool(np.sum(refuted) <= (1 - LASTING) * max(np.sum(felt), 1))
-
-    def with_effort(self, given: Array) -> "Case":
-        """The same log with another effort."""
-        return replace(self, given=given)
+        return bool(refuted.sum() <= (1 - LASTING) * max(felt.sum(), 1))
 
     def exchanged(self, i: int, j: int) -> "Case":
-        """The same log with the logged efforts of two joints exchanged."""
+        """The log with the logged efforts of two joints exchanged."""
         order = np.arange(len(self.constant))
         order[[i, j]] = j, i
         logged = self.given / self.constant
-        return self.with_effort(logged[:, order] * self.constant)
+        return replace(self, given=logged[:, order] * self.constant)
 
 
 def size_of(given: Array) -> float:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from vftcli.doctor.arm import arm_findings
+from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.cuts import cut_findings
 from vftcli.doctor.fit import RobotMatch, profiles
@@ -28,11 +29,8 @@ REFUSING = NO_FIT | {
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
-#: Findings that an effort is something else, by which its size is explained.
-READINGS = frozenset({
-    "current-as-torque", "current-as-turned-torque", "torque-without-gravity",
-    "torque-as-current", "torque-as-turned-current", "milliamperes", "effort-sign",
-})  # fmt: skip
+#: Findings that say how large a current is: a model of the arm knows better than its numbers.
+SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
 #: Findings that every command says: nothing is wrong, and results stand on what is assumed.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
@@ -102,8 +100,7 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
-    if any(finding.code in READINGS for finding in by_arm):
-        # Large numbers alone look like mA; the model knows better.
+    if any(finding.code in SIZED for finding in by_arm):
         by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
     findings = [
         *cut_findings(recording),

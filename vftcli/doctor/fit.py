@@ -5,14 +5,14 @@ measured torque or current comes second, for friction changes from day to day an
 cent open. An unknown load on the flange is fitted where the poses vary enough to tell one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vftcli.doctor.case import Case, size_of
-from vftcli.doctor.effort import case_of
+from vftcli.doctor.causes import case_of
 from vftcli.doctor.windows import Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
@@ -67,83 +67,79 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
 
     A measured effort settles nothing: friction and loads leave several per cent of it open.
     """
-    fits = ranking(recording, profiles())
-    best = fits[0] if fits else None
-    if best is None or not best.by_maker or best.misfit > GUESSED:
+    fits = ranking(recording, profiles().values())
+    if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
         return None, fits
-    if len(fits) > 1 and fits[1].misfit < APART * best.misfit:
-        return None, fits
-    return best, fits
+    apart = len(fits) < 2 or fits[1].misfit >= APART * fits[0].misfit
+    return fits[0] if apart else None, fits
 
 
-def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[RobotMatch, ...]:
+def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, ...]:
     """Robots with as many joints as the log, best fit first."""
     if not is_judgeable(recording):
         return ()
     fits = []
-    for name, robot in robots.items():
+    for robot in robots:
         with suppress(RobotError):  # joints of other names are another arm's
-            log = paired(recording, robot)
-            if log.joints == robot.joints and (fit := match_of(log, name, robot)):
-                fits.append(fit)
-    fits.sort(key=lambda fit: (not fit.fits, fit.misfit))
+            fits.append(match_of(paired(recording, robot), robot))
+    found = sorted(filter(None, fits), key=by_fit)
     return tuple(
-        replace(fit, fits=fit.fits and fit.misfit <= CLOSE * fits[0].misfit) for fit in fits
+        replace(fit, fits=fit.fits and fit.misfit <= CLOSE * found[0].misfit) for fit in found
     )
+
+
+def by_fit(match: RobotMatch) -> tuple[bool, float]:
+    """What matches are sorted by, the best first."""
+    return not match.fits, match.misfit
 
 
 def is_judgeable(recording: Recording) -> bool:
     """Whether a log is long enough, and its numbers those of an arm, to be held against a model."""
-    if recording.dq is None or recording.samples < 10:
+    if recording.dq is None or recording.samples < 10 or not 1e-2 < recording.duration < 1e9:
         return False
-    span = recording.duration
     effort = [x for name in EFFORTS if (x := getattr(recording, name)) is not None]
-    return bool(
-        1e-2 < span < 1e9
-        and np.abs(recording.q).max() < 1e4
-        and np.abs(recording.dq).max() < 1e4
-        and all(1e-9 < np.abs(x).max() < 1e9 for x in effort)
-    )
+    motion = max(np.abs(recording.q).max(), np.abs(recording.dq).max())
+    return bool(motion < 1e4 and all(1e-9 < np.abs(x).max() < 1e9 for x in effort))
 
 
-def match_of(recording: Recording, name: str, robot: Robot) -> RobotMatch | None:
-    """A robot's fit to the most telling torque of the log, or None without any."""
+def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
+    """A robot's fit to the most telling torque of the log, None without any or of other joints.
+
+    Args:
+        recording: The log.
+        robot: The robot.
+        ignored: Joints, from zero, whose effort is no evidence.
+    """
+    if recording.joints != robot.joints:
+        return None
     windows = windows_of(recording, robot)
-    case = maker_case(recording, windows)
-    by_maker = case is not None
+    maker = maker_case(recording, windows)
+    case = maker or case_of(recording, robot, windows, ignored)
     if case is None:
-        case = case_of(recording, robot, windows)
-    return None if case is None else match(name, case, by_maker=by_maker)
-
-
-def match(name: str, case: Case, *, by_maker: bool = False) -> RobotMatch:
-    """What a case says of its robot."""
+        return None
     load = float(case.loaded.values[0]) if case.carries_load else 0.0
-    fits = case.misfit < (MAKER_LIMIT if by_maker else MEASURED_LIMIT)
-    measured = RESIDUAL if by_maker and case.rubs else MEASURED
+    measured = RESIDUAL if maker else MEASURED
     return RobotMatch(
-        robot=name,
+        robot=robot.name,
         misfit=case.misfit,
-        fits=fits and (by_maker or load < HEAVY),
+        fits=case.misfit < MAKER_LIMIT if maker else case.misfit < MEASURED_LIMIT and load < HEAVY,
         evidence=measured if case.rubs else MAKER,
         load=load,
-        by_maker=by_maker,
+        by_maker=maker is not None,
     )
 
 
 def maker_case(recording: Recording, windows: Windows) -> Case | None:
     """The maker's own model of the arm as a log holds it, None where it does not."""
     target, torque, vendor = recording.target_torque, recording.torque, recording.tau_ext
-    if target is not None and np.any(target):
-        given, rubs = windows.mean(target), False
-    elif torque is not None and vendor is not None and np.any(vendor):
+    if rubs := target is None or not np.any(target):
+        if torque is None or vendor is None or not np.any(vendor):
+            return None
         # Friction between motor and sensor is in the torque; the vendor's model has none of it.
-        given, rubs = windows.mean(torque + vendor), True
-    else:
-        return None
+        target = torque + vendor
+    given = windows.mean(target)
+    unit = np.ones(recording.joints)
     size = size_of(given)
     if not 0 < size < 1e9:
         return None
-    return Case(
-        windows=windows, given=given, size=size, constant=np.ones(recording.joints), rubs=rubs
-    )
+    return Case(windows=windows, given=given, size=size, constant=unit, rubs=rubs)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor.case import Case
-from vftcli.doctor.effort import RANGE
+from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.robust import RobustFit, solve
 from vftcli.robots import Robot
@@ -78,7 +78,8 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
         yield changed
         return
     mass, sd = float(case.loaded.values[0]), float(case.loaded.sd[0])
-    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded):
+    carried = case.windows.load.columns @ case.loaded.values[:4]
+    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded, carried):
         return
     missing = missing_payload(recording, robot)
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
@@ -99,7 +100,7 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
 
 def load_change(case: Case) -> Remark | None:
     """The finding that a load is picked up or set down along the log, None without one."""
-    count, gravity = len(case.given), case.windows.gravity @ case.up
+    count, gravity = len(case.given), case.gravity
     if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
         return None
     tried = {int(k): with_two_loads(case, int(k)) for k in np.linspace(*BETWEEN, 7) * count}

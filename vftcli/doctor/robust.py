@@ -17,7 +17,7 @@ OVERLAP = 2.0  #: Windows that overlap by half count half.
 
 
 class Terms(NamedTuple):
-    """What may explain a torque, column by column."""
+    """Torques that may explain another one, column by column."""
 
     columns: Array  #: Torque per unit of each coefficient. (W, n, k)
     positive: Mask  #: Coefficients that only make sense above zero, as friction's do. (k,)
@@ -27,16 +27,15 @@ class Terms(NamedTuple):
         """These terms and others."""
         return Terms(
             np.concatenate([self.columns, other.columns], axis=2),
-            np.concatenate([self.positive, other.positive]),
-            np.concatenate([self.prior, other.prior]),
+            np.append(self.positive, other.positive),
+            np.append(self.prior, other.prior),
         )
 
 
-def terms(columns: Array, *, positive: bool = False, prior: Array | None = None) -> Terms:
+def terms(columns: Array, *, positive: bool = False, prior: Array | float = np.inf) -> Terms:
     """Terms that are all alike."""
     count = columns.shape[2]
-    sd = np.full(count, np.inf) if prior is None else prior
-    return Terms(columns, np.full(count, positive), sd)
+    return Terms(columns, np.full(count, positive), np.full(count, prior))
 
 
 class RobustFit(NamedTuple):
@@ -44,41 +43,40 @@ class RobustFit(NamedTuple):
 
     values: Array  #: Coefficients. (k,)
     sd: Array  #: Their standard deviations by the scatter of the kept windows. (k,)
-    rest: Array  #: What they leave over, of all windows. (W, n) [N·m]
+    rest: Array  #: Torque left over in all windows. (W, n) [N·m]
     kept: Mask  #: Windows that the fit was made from. (W,)
 
     @property
     def size(self) -> float:
-        """Root mean square of what is left over in the kept windows. [N·m]"""
+        """Root mean square of the torque left over in the kept windows. [N·m]"""
         return float(np.sqrt(np.mean(self.rest[self.kept] ** 2)))
 
     @property
     def by_joint(self) -> Array:
-        """The same for each joint. (n,) [N·m]"""
+        """That of each joint. (n,) [N·m]"""
         size: Array = np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0))
         return size
 
 
-def solve(target: Array, by: Terms, noise: float = 1.0) -> RobustFit:
-    """Fit a torque by some terms, the windows that fit worst left out.
+def solve(target: Array, by: Terms) -> RobustFit:
+    """Fit of a torque by some terms, the windows that fit worst left out.
 
     Args:
         target: The torque. (W, n) [N·m]
-        by: The terms.
-        noise: Scatter of a window's torque, by which priors weigh. [N·m]
+        by: The terms; their priors weigh beside a scatter of 1 N·m.
     """
     columns = by.columns
-    gram = np.matmul(columns.swapaxes(1, 2), columns)
-    moment = np.matmul(columns.swapaxes(1, 2), target[:, :, None])[:, :, 0]
-    ridge = np.diag((noise / by.prior) ** 2)
+    across = columns.swapaxes(1, 2)
+    gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
     used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
     kept = np.ones(len(target), dtype=bool)
-    values, rest = np.zeros(columns.shape[2]), target
+
+    def inverse() -> Array:
+        return inverse_of((gram[kept].sum(axis=0) + np.diag(by.prior**-2))[np.ix_(used, used)])
+
     for _ in range(ROUNDS):
-        values = np.zeros(columns.shape[2])
-        inner = np.ix_(used, used)
-        matrix = (gram[kept].sum(axis=0) + ridge)[inner]
-        values[used] = inverse_of(matrix) @ moment[kept].sum(axis=0)[used]
+        values = np.zeros(len(used))
+        values[used] = inverse() @ moment[kept].sum(axis=0)[used]
         # Friction that would drive the arm is another error in disguise: it is left out.
         wrong = by.positive & (values < 0)
         used &= ~wrong
@@ -86,8 +84,6 @@ def solve(target: Array, by: Terms, noise: float = 1.0) -> RobustFit:
         rest = target - columns @ values
         left = np.einsum("wn,wn->w", rest, rest)
         kept = left <= np.quantile(left, KEPT)
-    matrix = (gram[kept].sum(axis=0) + ridge)[np.ix_(used, used)]
-    sd = np.zeros(len(values))
-    variance = OVERLAP * float(np.mean(rest[kept] ** 2))
-    sd[used] = np.sqrt(np.abs(np.diag(np.linalg.pinv(matrix, hermitian=True))) * variance)
+    sd = np.zeros(len(used))
+    sd[used] = np.sqrt(np.diag(inverse()) * OVERLAP * np.mean(rest[kept] ** 2))
     return RobustFit(values, sd, rest, kept)

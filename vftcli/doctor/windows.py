@@ -30,6 +30,7 @@ POINTS = 7
 GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it bends little.
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
+FAST = 0.8  #: Mean direction of a window in which a joint moves.
 #: Mass [kg] and first moment [kg·m] that a load may well have, before the log says anything.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
 
@@ -47,34 +48,26 @@ class Windows:
     dq: Array  #: Velocities there. (W, K, n) [rad/s]
     motion: Array  #: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
 
-    def exchanged(self, i: int, j: int, most: int) -> "Windows":
-        """At most so many windows, all signals of two joints in them exchanged."""
-        few = spread(len(self.first), most)
+    def exchanged(self, i: int, j: int, few: IntArray) -> "Windows":
+        """Some of the windows, all signals of two joints in them exchanged."""
         order = np.arange(self.q.shape[2])
         order[[i, j]] = j, i
+        q, dq, motion = self.q[few], self.dq[few], self.motion[:, few]
         return replace(
             self,
             first=self.first[few],
             last=self.last[few],
             t=self.t[few],
-            q=self.q[few][:, :, order],
-            dq=self.dq[few][:, :, order],
-            motion=self.motion[:, few][:, :, order],
+            q=q[:, :, order],
+            dq=dq[:, :, order],
+            motion=motion[:, :, order],
         )
 
-    @cached_property
-    def span(self) -> Array:
-        """Length of each window. (W, 1) [s]"""
-        return self.t[:, -1:] - self.t[:, :1]
-
-    @cached_property
-    def weights(self) -> Array:
-        """Weights of a window's instants in its mean, by trapezoids. (W, K)"""
-        steps = np.diff(self.t, axis=1)
-        weights = np.zeros(self.t.shape)
-        weights[:, :-1] += steps / 2
-        weights[:, 1:] += steps / 2
-        return np.asarray(weights / self.span)
+    @property
+    def ways(self) -> IntArray:
+        """Windows in which each joint moves forth, and back. (2, n)"""
+        direction = self.motion[0]
+        return np.stack([(direction > FAST).sum(axis=0), (direction < -FAST).sum(axis=0)])
 
     @cached_property
     def inertial(self) -> Array:
@@ -82,8 +75,9 @@ class Windows:
         count, points, n = self.q.shape
         terms = momentum_terms(self.chain, self.q.reshape(-1, n), self.dq.reshape(-1, n))
         p = terms.p.reshape(count, points, n)
-        rise = (p[:, -1] - p[:, 0]) / self.span
-        return np.asarray(rise - self.average(terms.coriolis_transpose_dq))
+        rise = (p[:, -1] - p[:, 0]) / (self.t[:, -1:] - self.t[:, :1])
+        coriolis = terms.coriolis_transpose_dq.reshape(p.shape)
+        return np.asarray(rise - np.einsum("wk,wkn->wn", trapezoids(self.t), coriolis))
 
     @cached_property
     def gravity(self) -> Array:
@@ -99,24 +93,14 @@ class Windows:
     @cached_property
     def friction(self) -> Terms:
         """Coulomb and viscous friction of every joint, which only ever take energy."""
-        direction, speed = self.motion
-        n = direction.shape[1]
-        columns = np.zeros((len(direction), n, 2 * n))
-        joints = np.arange(n)
-        columns[:, joints, joints] = direction
-        columns[:, joints, n + joints] = speed
-        return terms(columns, positive=True)
+        each = [motion[:, :, None] * np.eye(motion.shape[1]) for motion in self.motion]
+        return terms(np.concatenate(each, axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:
         """Torque that carries a load, by its mass and its first moment about the flange."""
         middle = self.q[:, self.q.shape[1] // 2]
         return terms(-load_regressor(self.chain, middle), prior=LOAD)
-
-    def average(self, values: Array) -> Array:
-        """Mean over each window of what is known at its instants. (W · K, ...) → (W, ...)"""
-        grouped = values.reshape(*self.t.shape, *values.shape[1:])
-        return np.asarray(np.einsum("wk,wk...->w...", self.weights, grouped))
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
@@ -126,8 +110,7 @@ class Windows:
 def windows_of(recording: Recording, robot: Robot) -> Windows:
     """Cut a log with velocities into windows."""
     t, dq = recording.t, recording.require("dq")
-    length = max(1, round(WINDOW / recording.median_step))
-    length = min(length, max(1, (recording.samples - 1) // 3))
+    length = max(1, min(round(WINDOW / recording.median_step), (recording.samples - 1) // 3))
     first = np.arange(0, recording.samples - length, max(1, length // 2))
     first = first[spread(len(first), WINDOWS)]
     last = first + length
@@ -145,11 +128,18 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
     )
 
 
-def spread(count: int, most: int) -> IntArray:
-    """Numbers of at most so many of some things, evenly spread. (≤ most,)"""
+def spread(count: int, most: int, block: int = 1) -> IntArray:
+    """Numbers of at most so many things, evenly spread in blocks of neighbours. (≤ most,)"""
     if count <= most:
         return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(int)
+    first = np.linspace(0, count - block, most // block).astype(int)
+    return np.unique(first[:, None] + np.arange(block))
+
+
+def trapezoids(t: Array) -> Array:
+    """Weights of a window's instants (W, K) [s] in its mean. (W, K)"""
+    steps = np.diff(t, axis=1) / (2 * (t[:, -1:] - t[:, :1]))
+    return np.pad(steps, ((0, 0), (0, 1))) + np.pad(steps, ((0, 0), (1, 0)))
 
 
 def means(t: Array, value: Array, first: IntArray, last: IntArray) -> Array:
