@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_unit
+from vftcli.doctor.stuck import repeated_rows
+from vftcli.doctor.velocity import VelocityFit, common_cause
 from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
@@ -22,14 +23,11 @@ STALE = 0.003  #: Share of rows that repeat the one before, from which it is wor
 
 def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
     """Findings about the clock, each check independent of the others."""
-    factor = common_factor(fit) if fit is not None else None
-    if factor is not None and (unit := time_unit(factor)):
-        # What else is odd about its steps is this.
-        yield warning("time-unit", gain=factor, unit=unit)
-        return
-    if factor is not None and is_clock(factor):
-        pace = "fast" if factor > 1 else "slow"
-        yield warning("clock-rate", gain=factor, percent=100 * abs(factor - 1), pace=pace)
+    common = common_cause(fit)
+    if common is not None and common.code in {"time-unit", "clock-rate"}:
+        yield common
+        if common.code == "time-unit":
+            return  # what else is odd about its steps is this
     if recording.duration < SHORT:
         yield fact("short", duration_s=recording.duration)
     rate = 1 / recording.median_step
@@ -81,11 +79,7 @@ def long_steps(recording: Recording) -> Iterator[Remark]:
 
 def stale_rows(recording: Recording) -> Iterator[Remark]:
     """Rows that repeat every value of the row before under a new stamp: a packet that was late."""
-    # One column rules most rows out, and the others are compared in what is left.
-    last = np.flatnonzero(recording.q[1:, 0] == recording.q[:-1, 0])
-    for name in JOINT_SIGNALS:
-        if (value := getattr(recording, name)) is not None:
-            last = last[(value[last + 1] == value[last]).all(axis=1)]
+    last = repeated_rows(recording, JOINT_SIGNALS)
     share = len(last) / (recording.samples - 1)
     # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
     if recording.dq is None or share < STALE or share > 0.9:

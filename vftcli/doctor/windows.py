@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.doctor.robust import Terms, terms
 from vftcli.robots import Robot
@@ -18,10 +17,8 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.kinematics import LinkPoses, link_poses
 from vftcli.robots.regressor import load_regressor
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.recording import Recording
-
-IntArray = NDArray[np.intp]
 
 WINDOW = 0.3
 WINDOWS = 200  #: Length of a window [s], and how many are looked at at most.
@@ -41,14 +38,14 @@ class Windows:
 
     recording: Recording  #: The log.
     chain: Chain  #: The arm with its payload.
-    first: IntArray  #: First sample of each window. (W,)
-    last: IntArray  #: Last sample of each window. (W,)
+    first: Indices  #: First sample of each window. (W,)
+    last: Indices  #: Last sample of each window. (W,)
     t: Array  #: Those instants. (W, K) [s]
     q: Array  #: Positions at a few instants of each window. (W, K, n) [rad]
     dq: Array  #: Velocities there. (W, K, n) [rad/s]
     motion: Array  #: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
 
-    def exchanged(self, i: int, j: int, few: IntArray) -> "Windows":
+    def exchanged(self, i: int, j: int, few: Indices) -> "Windows":
         """Some of the windows, all signals of two joints in them exchanged."""
         order = np.arange(self.q.shape[2])
         order[[i, j]] = j, i
@@ -64,7 +61,7 @@ class Windows:
         )
 
     @property
-    def ways(self) -> IntArray:
+    def ways(self) -> Indices:
         """Windows in which each joint moves forth, and back. (2, n)"""
         direction = self.motion[0]
         return np.stack([(direction > FAST).sum(axis=0), (direction < -FAST).sum(axis=0)])
@@ -128,7 +125,7 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
     )
 
 
-def spread(count: int, most: int, block: int = 1) -> IntArray:
+def spread(count: int, most: int, block: int = 1) -> Indices:
     """Numbers of at most so many things, evenly spread in blocks of neighbours. (≤ most,)"""
     if count <= most:
         return np.arange(count)
@@ -142,7 +139,7 @@ def trapezoids(t: Array) -> Array:
     return np.pad(steps, ((0, 0), (0, 1))) + np.pad(steps, ((0, 0), (1, 0)))
 
 
-def means(t: Array, value: Array, first: IntArray, last: IntArray) -> Array:
+def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
     steps = np.diff(t)[:, None]
     rise = (value[1:] + value[:-1]) / 2 * steps
