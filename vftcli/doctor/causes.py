@@ -20,6 +20,7 @@ import numpy as np
 
 from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.robust import solve, terms
+from vftcli.doctor.stuck import TRAVEL
 from vftcli.doctor.windows import Windows, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.drive import effort_name
@@ -45,9 +46,7 @@ OVERWHELMING = 5.0
 #:
 #: Read as something else it leaves 16 % and more on real logs; a tilt of 10° leaves 8 %.
 READ_RIGHT, UPRIGHT = 0.1, 0.05
-#: Misfit of a joint from which its sign and its place are tried, and travel from which its friction
-#: and gravity tell them. [1, rad]
-SUSPECT, TRAVEL = 0.35, 0.05
+SUSPECT = 0.35  #: Misfit of a joint from which its sign and its place are tried.
 #: Share of one joint's misfit that turning it, and of two joints' that exchanging them may leave.
 TURNED, SWAPPED = 0.5, 0.7
 FEW = 60  #: Windows by which every pair of joints is tried: each pair needs the model anew.

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.findings import on_joints
+from vftcli.doctor.signals import effort_of
 from vftcli.doctor.windows import spread, trapezoids
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
@@ -153,7 +154,7 @@ class Lateness(NamedTuple):
 
 def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
     """What a log says of how late its effort is, None where that is nothing."""
-    effort = recording.torque if recording.torque is not None else recording.current
+    effort = effort_of(recording)
     if effort is None or recording.dq is None or recording.samples < LEAST:
         return None
     t, step = recording.t, recording.median_step
@@ -175,7 +176,7 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
         when=(t[starts[:-1]] - t[0])[pairs],
         model=np.diff(model, axis=0)[pairs],
         moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
-        effort=np.stack([np.convolve(column, hann, "valid") for column in effort.T], axis=1),
+        effort=np.stack([np.convolve(column, hann, "valid") for column in effort[1].T], axis=1),
     )
 
 

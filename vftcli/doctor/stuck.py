@@ -28,7 +28,7 @@ UNUSUAL = 10.0
 #:
 #: Without noise a constant acceleration takes a constant torque.
 BENT = 0.005
-TRAVEL = 0.05  #: Travel of a joint whose effort cannot be zero throughout. [rad]
+TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Steps of the positions that are worth telling: a velocity from them is off by 0.02 rad/s at
 #: 100 Hz. [rad]
 COARSE = 2e-4

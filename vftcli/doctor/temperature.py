@@ -1,14 +1,13 @@
 """Findings about the joints' temperature, which friction follows."""
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
-from vftcli.robots.robot import JointFriction
 from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -66,16 +65,6 @@ def untold_temperature(
         yield fact("temperature-gaps", on_joints(joints), **values, share_percent=share)
 
 
-class Distance(NamedTuple):
-    """A joint that was not as warm as its friction was taken for."""
-
-    joint: int  #: The joint, from zero.
-    code: str  #: The finding it is.
-    seen: float  #: Its temperature in motion, the end that is farther away. [°C]
-    reference: float  #: That of the model. [°C]
-    wrong: float  #: What its friction is off by, at its median speed. [N·m]
-
-
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
     """Joints whose temperature is far from the model's, and whose friction follows no law there.
 
@@ -84,46 +73,34 @@ def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> I
         robot: The arm.
         temperature: Its joint temperatures, NaN where not measured. (T, n) [°C]
     """
+    far: dict[str, list[tuple[int, float, float, float]]] = {}
     speeds = np.abs(recording.require("dq"))
-    pairs = zip(robot.friction, speeds.T, temperature.T, strict=True)
-    far = [found for j, pair in enumerate(pairs) if (found := distance_of(j, *pair)) is not None]
-    for code in dict.fromkeys(found.code for found in far):
-        same = [found for found in far if found.code == code]
+    for j, joint in enumerate(robot.friction):
+        used = (speeds[:, j] > MOVES) & ~np.isnan(temperature[:, j])
+        if joint.model == "none" or not used.any():
+            continue
+        reference = joint.reference_temperature
+        code, (low, high), least = "far-temperature", (reference, reference), FAR
+        if joint.temperature:
+            code, (low, high), least = "temperature-beyond-law", HOLDS, 0.0
+        elif joint.temperature_at is None:
+            code, least = "far-temperature-assumed", ASSUMED
+        coldest, warmest = np.percentile(temperature[used, j], [5.0, 95.0])
+        below, above = low - coldest, warmest - high
+        seen, colder = (coldest, below) if below > above else (warmest, -above)
+        torque = steady_torque(joint, np.median(speeds[used, j], keepdims=True))[0]
+        wrong = abs(float(torque) * float(np.expm1(PER_KELVIN * colder)))
+        if max(below, above) > least and wrong >= NOTICED:
+            far.setdefault(code, []).append((j, float(seen), reference, wrong))
+    for code, rows in far.items():
+        joints, ends, references, torques = zip(*rows, strict=True)
         level = caution if code == "far-temperature-assumed" else warning
         yield level(
             code,
-            on_joints(found.joint for found in same),
+            on_joints(joints),
             robot=robot.name,
-            seen_C=[found.seen for found in same],
-            reference_C=sorted({found.reference for found in same}),
-            wrong_Nm=[found.wrong for found in same],
+            seen_C=list(ends),
+            reference_C=sorted(set(references)),
+            wrong_Nm=list(torques),
             range_C=list(HOLDS),
         )
-
-
-def distance_of(j: int, joint: JointFriction, speed: Array, temperature: Array) -> Distance | None:
-    """How far one joint was from the temperature of its model while it moved, None where near.
-
-    Args:
-        j: The joint, from zero.
-        joint: Its friction.
-        speed: Its speed. (T,) [rad/s]
-        temperature: Its temperature, NaN where not measured. (T,) [°C]
-    """
-    used = (speed > MOVES) & ~np.isnan(temperature)
-    if joint.model == "none" or not used.any():
-        return None
-    if joint.temperature:
-        code, (low, high), least = "temperature-beyond-law", HOLDS, 0.0
-    else:
-        stated, low = joint.temperature_at is not None, joint.reference_temperature
-        code, least = ("far-temperature", FAR) if stated else ("far-temperature-assumed", ASSUMED)
-        high = low
-    coldest, warmest = np.percentile(temperature[used], [5.0, 95.0])
-    below, above = low - coldest, warmest - high
-    seen, away = (coldest, below) if below > above else (warmest, above)
-    torque = abs(float(steady_torque(joint, np.median(speed[used], keepdims=True))[0]))
-    wrong = torque * abs(float(np.expm1(PER_KELVIN * (away if below > above else -away))))
-    if away <= least or wrong < NOTICED:
-        return None
-    return Distance(j, code, float(seen), joint.reference_temperature, wrong)

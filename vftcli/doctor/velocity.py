@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.stuck import stuck_joints, travel_of
+from vftcli.doctor.stuck import TRAVEL, stuck_joints, travel_of
 from vftcli.doctor.windows import spread
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.intervals import runs_of
@@ -33,7 +33,6 @@ USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 WINDOWS, WANTED, LEAST = 600, 12, 8
 #: Windows that a joint's motion has to be spread over, and its turns: one or two tell no error.
 SPREAD, TURNS = 5.0, 3.0
-TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Share of the turns of a position that the logged velocity has to show to tell its lag by them.
 TELLING = 0.1
 #: Deviation of the gain from 1 that is named; sound logs, real and simulated, stay within 0.004.
