@@ -8,8 +8,7 @@ import pytest
 from moving_arms import carrying, exchanged, gravity, moving
 
 from vftcli.doctor import Examination, examine, in_words
-from vftcli.doctor.arm import ArmFindings, arm_findings
-from vftcli.doctor.fit import GUESSED
+from vftcli.doctor.fit import GUESSED, ArmFindings, arm_findings
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning

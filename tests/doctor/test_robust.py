@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.doctor.robust import Terms, solve, terms
+from vftcli.doctor.windows import Terms, solve, terms
 from vftcli.signals.arrays import Array
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from moving_arms import FRICTION, exchanged, gravity, moving
 
-from vftcli.doctor.windows import gravity_regressor, spread, up_axes, windows_of
+from vftcli.doctor.windows import gravity_by_up, spread, up_axes, windows_of
 from vftcli.robots import load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.recording import Recording
@@ -28,9 +28,9 @@ def test_gravity_is_linear_in_the_direction_that_is_up(up: list[float]) -> None:
     chain = replace(UR10E.chain, gravity=-9.81 * np.array(up))
     expected = momentum_terms(chain, q, 0 * q).gravity
     base = np.linalg.solve(up_axes(UR10E.chain.gravity) / 9.81, up)
-    np.testing.assert_allclose(gravity_regressor(UR10E.chain, q) @ base, expected, atol=1e-9)
+    np.testing.assert_allclose(gravity_by_up(UR10E.chain, q) @ base, expected, atol=1e-9)
     # of a robot file that says its own direction, the third component is it
-    own = gravity_regressor(chain, q)[:, :, 2]
+    own = gravity_by_up(chain, q)[:, :, 2]
     np.testing.assert_allclose(own, expected, atol=1e-9)
 
 

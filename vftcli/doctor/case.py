@@ -5,8 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from vftcli.doctor.robust import RobustFit, Terms, solve, terms
-from vftcli.doctor.windows import Windows
+from vftcli.doctor.windows import RobustFit, Windows, solve
 from vftcli.signals.arrays import Array
 
 MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
@@ -30,7 +29,6 @@ class Case:
     constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
     #: Where "up" is, in axes whose third is the robot file's own. (3,)
     up: Array = field(default_factory=lambda: UPRIGHT)
-    rubs: bool = True  #: Whether friction is in the effort; a maker's rigid-body model has none.
 
     @cached_property
     def gravity(self) -> Array:
@@ -42,21 +40,15 @@ class Case:
         """Torque that inertia, rotors and gravity need. (W, n) [N·m]"""
         return self.windows.inertial + self.gravity
 
-    @property
-    def friction(self) -> Terms:
-        """The friction that may be in the effort."""
-        friction = self.windows.friction
-        return friction if self.rubs else terms(friction.columns[:, :, :0])
-
     @cached_property
     def bare(self) -> RobustFit:
         """Fit by friction alone."""
-        return solve(self.given - self.needed, self.friction)
+        return solve(self.given - self.needed, self.windows.friction)
 
     @cached_property
     def loaded(self) -> RobustFit:
         """Fit by friction and a load on the flange; the load's four coefficients come first."""
-        return solve(self.given - self.needed, self.windows.load.beside(self.friction))
+        return solve(self.given - self.needed, self.windows.load.beside(self.windows.friction))
 
     @property
     def carries_load(self) -> bool:

@@ -19,9 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.case import Case, size_of
-from vftcli.doctor.robust import solve, terms
 from vftcli.doctor.stuck import TRAVEL
-from vftcli.doctor.windows import Windows, spread, up_axes, windows_of
+from vftcli.doctor.windows import Windows, solve, spread, terms, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.drive import effort_name
 from vftcli.robots.friction import steady_torque
@@ -279,7 +278,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     Friction is fitted beside it and takes any size.
     """
     n = len(case.constant)
-    fit = solve(case.given, terms(case.needed[:, :, None]).beside(case.friction))
+    fit = solve(case.given, terms(case.needed[:, :, None]).beside(case.windows.friction))
     factor, sd = float(fit.values[0]), float(fit.sd[0])
     # No load lightens an arm; one that weighs something explains a factor above 1 as well.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
@@ -289,7 +288,7 @@ def scaled(case: Case) -> Iterator[Cause]:
         healed = replace(case, given=case.given / factor, size=case.size / factor)
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
     each = case.needed[:, :, None] * np.eye(n)
-    fit = solve(case.given, terms(each).beside(case.friction))
+    fit = solve(case.given, terms(each).beside(case.windows.friction))
     factors, sds = fit.values[:n], fit.sd[:n]
     off = np.abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))

@@ -2,11 +2,10 @@
 
 from dataclasses import dataclass
 
-from vftcli.doctor.arm import arm_findings
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.cuts import cut_findings
-from vftcli.doctor.fit import RobotMatch, profiles
+from vftcli.doctor.fit import RobotMatch, arm_findings, profiles
 from vftcli.doctor.lateness import LAGLESS, MISTIMED, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings

@@ -78,21 +78,17 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
     best = int(np.argmin(together))
     lag = float(lags[best])
     better = float(np.exp(together[np.argmin(np.abs(lags))] - together[best]))
-    alike = are_near(lags[np.argmin(rest, axis=1)], lag, STEP)
-    if abs(lag) > LATE and better > BETTER and is_agreed(alike):
+    alike = agreed(lags[np.argmin(rest, axis=1)], lag, STEP)
+    if abs(lag) > LATE and better > BETTER and alike.any():
         order = "later" if lag > 0 else "earlier"
         values = {"lag_ms": 1e3 * abs(lag), "order": order, "ratio": better}
         yield warning("effort-lag", on_joints(known[alike]), **values)
 
 
-def are_near(own: Array, best: float, step: float) -> Mask:
-    """Which joints' own best values are near to that of all, by the step of what is tried. (K,)"""
-    return np.asarray(np.abs(own - best) < max(NEAR * abs(best), 1.5 * step))
-
-
-def is_agreed(alike: Mask) -> bool:
-    """Whether enough joints agree. (K,)"""
-    return bool(alike.sum() >= ENOUGH and np.mean(alike) >= AGREE)
+def agreed(own: Array, best: float, step: float) -> Mask:
+    """Joints near to the best of all, by the step of what is tried; none if they are few. (K,)"""
+    near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
+    return np.asarray(near & (near.sum() >= ENOUGH) & (np.mean(near) >= AGREE))
 
 
 class Lateness(NamedTuple):
@@ -134,10 +130,10 @@ class Lateness(NamedTuple):
         left = np.log(rests).mean(axis=1)
         best = int(np.argmin(left.min(axis=1)))
         grown, least = float(each[best]), left[best].min()
-        alike = are_near(each[np.argmin(rests.min(axis=2), axis=0)], grown, DRIFTS[0])
+        alike = agreed(each[np.argmin(rests.min(axis=2), axis=0)], grown, DRIFTS[0])
         better = np.exp(left[0, np.argmin(np.abs(self.lags))] - least)
         steadily = np.exp(left[0].min() - least)
-        if min(steadily / STEADY, better / BETTER) < 1 or not is_agreed(alike):
+        if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
         first = float(self.lags[np.argmin(left[best])])
         return warning(
@@ -183,11 +179,8 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
 def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
     """First samples of windows that lie on an even clock at every lag. (W,)
 
-    Args:
-        t: Clock. (T,) [s]
-        length: Steps of a window.
-        earliest: The first lag, negative. [samples]
-        latest: The last lag. [samples]
+    The clock is t (T,) [s]; a window has so many steps, lags go from one number of samples, which
+    is negative, to another.
     """
     starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
     starts = starts[spread(len(starts), WINDOWS, BLOCK)]

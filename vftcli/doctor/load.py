@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.doctor.case import Case
 from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.robust import RobustFit, solve
+from vftcli.doctor.windows import RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
@@ -128,7 +128,7 @@ def with_two_loads(case: Case, split: int) -> RobustFit:
     load, late = case.windows.load, np.arange(len(case.given)) >= split
     parts = [load._replace(columns=load.columns * mask[:, None, None]) for mask in (~late, late)]
     both = parts[0].beside(parts[1])
-    return solve(case.given - case.needed, both.beside(case.friction))
+    return solve(case.given - case.needed, both.beside(case.windows.friction))
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:

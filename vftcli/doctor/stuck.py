@@ -141,9 +141,9 @@ def farthest(t: Array, way: Array) -> float:
 
 def is_bent(t: Array, speed: Array) -> bool:
     """Whether a speed is no straight line of time."""
-    time, rest = t - t.mean(), speed - speed.mean()
-    rest = rest - time * float(time @ rest) / float(time @ time)
-    return float(np.sqrt(np.mean(rest**2))) > max(BENT, 0.03 * float(np.ptp(speed)))
+    time = t - t.mean()
+    slope = time @ speed / (time @ time)
+    return bool(np.std(speed - slope * time) > max(BENT, 0.03 * np.ptp(speed)))
 
 
 def is_extreme(value: Array, rows: slice) -> bool:

@@ -29,27 +29,17 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)
-    lawful = [j for j, joint in enumerate(robot.friction) if joint.temperature]
-    if lawful:
-        yield from untold_temperature(robot, lawful, temperature)
-    if temperature is None:
-        return
-    yield from far_temperature(recording, robot, temperature)
-
-
-def untold_temperature(
-    robot: Robot, lawful: list[int], temperature: Array | None
-) -> Iterator[Remark]:
-    """That friction is taken at the model's own temperature where the log tells none.
-
-    Args:
-        robot: The arm.
-        lawful: Joints, from zero, whose friction follows a law.
-        temperature: What the log tells, NaN where nothing; None for nothing at all. (T, n) [°C]
-    """
+    lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], dtype=int)
     reference = [robot.friction[j].reference_temperature for j in lawful]
     values: dict[str, Any] = {"reference_C": sorted(set(reference)), "robot": robot.name}
-    if temperature is None:
+    if temperature is not None:
+        unknown = np.isnan(temperature[:, lawful])
+        if unknown.any():
+            gaps = unknown.any(axis=0)
+            values["share_percent"] = 100.0 * float(unknown[:, gaps].mean())
+            yield fact("temperature-gaps", on_joints(lawful[gaps]), **values)
+        yield from far_temperature(recording, robot, temperature)
+    elif lawful.size:
         colder = np.full((1, robot.joints), np.nan)
         colder[0, lawful] = np.array(reference) - 10.0
         factor = friction_factor(robot.friction, colder)
@@ -57,12 +47,6 @@ def untold_temperature(
             more = 100.0 * (factor[0, lawful] - 1.0)
             values |= {"least_percent": float(more.min()), "most_percent": float(more.max())}
             yield fact("no-temperature", **values)
-        return
-    untold = np.isnan(temperature[:, lawful])
-    if untold.any():
-        joints = np.array(lawful)[untold.any(axis=0)]
-        share = 100.0 * float(untold[:, untold.any(axis=0)].mean())
-        yield fact("temperature-gaps", on_joints(joints), **values, share_percent=share)
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:

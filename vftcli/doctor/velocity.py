@@ -62,6 +62,7 @@ UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1e-3: "s", 1e-6: "s", 1e-9: "s"}
 #: Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
 #: are those of half the rate, and sound logs repeat up to a third.
 HELD = 0.55
+TINY = 1e-300  #: Least divisor: what it divides is 0 too.
 STEPS, BLOCK = 8000, 500  #: Steps that are looked at, at most, in blocks.
 CRUISE = 0.2  #: A velocity that repeats itself for longer may be a constant one. [s]
 
@@ -100,8 +101,8 @@ def velocity_fit(recording: Recording) -> VelocityFit | None:
         alone[:, j] = joint_fit(*means[:, :, j])
     product = logged.T @ positions
     size, whole = np.sum(positions**2, axis=0), np.sum(logged**2, axis=0)[:, None]
-    factor = np.divide(product, size, out=np.zeros_like(product), where=size > 0)
-    explained = np.divide(factor * product, whole, out=np.zeros_like(product), where=whole > 0)
+    factor = product / np.maximum(size, TINY)
+    explained = factor * product / np.maximum(whole, TINY)
     return VelocityFit._make([*alone, factor, np.maximum(1 - explained, 0.0)])
 
 
@@ -148,8 +149,7 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
 
 def spread_of(v: Array) -> Array:
     """Over how many windows a motion is spread, (Σv²)²/Σv⁴, column by column."""
-    square, fourth = np.sum(v**2, axis=0) ** 2, np.sum(v**4, axis=0)
-    return np.asarray(np.divide(square, fourth, out=np.zeros_like(square), where=fourth > 0))
+    return np.asarray(np.sum(v**2, axis=0) ** 2 / np.maximum(np.sum(v**4, axis=0), TINY))
 
 
 def weighed_means(recording: Recording) -> Array:
