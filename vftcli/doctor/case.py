@@ -27,7 +27,7 @@ class Case:
     given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
     size: float  #: Root mean square of the column that was logged. [N·m]
     constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
-    #: Where "up" is, in axes whose third is the robot file's own. (3,)
+    #: Direction of "up" in axes of which the third is the robot file's own. (3,)
     up: Array = field(default_factory=lambda: UPRIGHT)
 
     @cached_property
@@ -66,7 +66,7 @@ class Case:
 
     @property
     def misfit(self) -> float:
-        """What stays unexplained, relative to the logged effort; loads and contacts are not."""
+        """Share of the logged effort left unexplained; loads and contacts are not."""
         return self.best.size / self.size
 
     @cached_property
@@ -77,12 +77,12 @@ class Case:
 
     @cached_property
     def by_joint(self) -> Array:
-        """What friction leaves over of each joint, relative to the joint's effort. (n,)"""
+        """Share of each joint's effort that friction leaves over. (n,)"""
         return self.bare.by_joint / self.effort_sizes
 
     @property
     def gravity_range(self) -> float:
-        """How much gravity's torque varies, on the joint where it varies most. [N·m]"""
+        """Range of gravity's torque on the joint where it varies most. [N·m]"""
         return float(np.ptp(self.gravity, axis=0).max())
 
     def lasts(self, cause: RobustFit, change: Array) -> bool:

@@ -1,4 +1,4 @@
-"""What is wrong with a log that its arm does not explain: each cause is tried, the best one wins.
+"""The cause of a log that its arm does not explain: each is tried, the best one wins.
 
 A turned sign, two joints that changed places, a torque without gravity, a hanging base and a load
 all look alike in one number. So each cause puts the log right in its own way, the log is fitted
@@ -38,7 +38,7 @@ AMBIGUOUS = 1.25  #: A cause that explains less by a smaller factor is named bes
 CLEAR = 1.5  #: Ratio of misfits by which another reading wins over the second best.
 #: Ratio of misfits by which another reading wins although the stated one fits.
 #:
-#: Taken for currents, torques without gravity are so large that a UR5 leaves only 16 % of them
+#: Read as currents, torques without gravity are so large that a UR5 leaves only 16 % of them
 #: open; read right it leaves 1.5 %.
 OVERWHELMING = 5.0
 #: Misfits below which an effort is what its name says, and a base as the robot file says.
@@ -63,7 +63,7 @@ OTHERS = 0.05  #: By which the factors of the other joints may be off for one to
 LEAST, MOST = 0.6, 1.7  #: Factors beyond these are of another unit or of another arm.
 SURE = 4.0  #: Standard deviations that an offset, a factor or missing friction has to be.
 KNOWN = 0.05  #: Standard deviation of a factor that the motion determines.
-CLEARER = 1.5  #: How much better than a load a factor must explain a log that some load explains.
+CLEARER = 1.5  #: Ratio of misfits by which a factor wins over a load that weighs something.
 #: Misfit that a model of the arm leaves of another's; measured efforts leave 1.3 % and more.
 MODELLED = 0.02
 #: Share of the friction of the robot file that no arm falls below, and joints that judge it.
@@ -73,8 +73,8 @@ RUBS, WITHOUT = 0.1, 3
 class Reading(NamedTuple):
     """An effort that is not what it is called."""
 
-    kind: str  #: What it is, one of `vftcli.signals.names.EFFORTS`; "" for what it is called.
-    factor: float = 1.0  #: What its values are multiplied with.
+    kind: str  #: The kind it is, one of `vftcli.signals.names.EFFORTS`; "" for what it is called.
+    factor: float = 1.0  #: Factor on its values.
 
 
 #: Finding that an effort is something else → what puts it right.
@@ -105,7 +105,7 @@ MAY_BE = {
 
 
 class Cause(NamedTuple):
-    """What may be wrong with a log."""
+    """A fault that a log may have."""
 
     code: str  #: The finding it would be; "" of the log as its names say.
     case: Case  #: The log with it put right.
@@ -114,7 +114,7 @@ class Cause(NamedTuple):
 
     @property
     def misfit(self) -> float:
-        """What stays unexplained once it is put right."""
+        """Share of the effort left unexplained once it is put right."""
         return self.case.misfit
 
 
@@ -122,7 +122,7 @@ class Diagnosis(NamedTuple):
     """The cause that explains a log, and what was compared."""
 
     case: Case  #: The log as its names say.
-    cause: Cause | None = None  #: What is wrong, None where nothing explains more.
+    cause: Cause | None = None  #: The best one, None where nothing explains more.
     rival: Cause | None = None  #: A second cause that explains nearly as much.
     #: Another reading that leaves less than what the effort's name says, where no cause is named.
     unclear: Cause | None = None
@@ -149,7 +149,7 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
         found += swapped(case)
     diagnosis = chosen(case, found)
     if tells and diagnosis.cause is None and case.misfit > READ_RIGHT:
-        # Gravity that is counted twice may look like a load: none is taken off here.
+        # Gravity that is counted twice may look like a load: none is subtracted here.
         least = min(may_be, key=lambda other: other.case.bare.size / other.case.size)
         return diagnosis._replace(unclear=least if least.code else None)
     return diagnosis
@@ -165,7 +165,7 @@ def case_of(
 def readings(
     recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
 ) -> Iterator[Cause]:
-    """What an effort may be, first what its name says."""
+    """Readings of an effort, first the one of its name."""
     name = effort_name(recording, robot)
     value, constant = getattr(recording, name), robot.torque_constant
     if value is None or (name == "current" and constant is None):
@@ -197,11 +197,9 @@ def readings(
 def read_otherwise(may_be: Sequence[Cause]) -> Iterator[Cause]:
     """The effort read as something else than its name says."""
     named, *others = may_be
-    if not others:
-        return
     best, *rest = sorted(others, key=lambda cause: cause.misfit)
     second = min(cause.misfit for cause in (named, *rest))
-    # Gravity that is counted twice may look like a load, so none is taken off here.
+    # Gravity that is counted twice may look like a load, so none is subtracted here.
     right = named.case.bare.size < READ_RIGHT * named.case.size
     if second > (OVERWHELMING if right else CLEAR) * best.misfit:
         yield best
@@ -227,7 +225,7 @@ def tilted(case: Case) -> Iterator[Cause]:
 
 
 def turned_or_swapped(case: Case) -> Iterator[Cause]:
-    """Single joints whose effort is turned, and two whose efforts changed places."""
+    """Single joints with a turned effort, and two joints with exchanged efforts."""
     moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
     suspects = np.flatnonzero((case.by_joint > SUSPECT) & moving).tolist()
     if not suspects:
@@ -246,7 +244,7 @@ def turned_or_swapped(case: Case) -> Iterator[Cause]:
 
 
 def rest_of(case: Case, i: int, j: int, sign: float = 1.0) -> float:
-    """What joint j's model leaves over of joint i's effort times a sign. [N·m]"""
+    """Rest of joint i's effort times a sign beside joint j's model. [N·m]"""
     given = sign * case.given[:, [i]] / case.constant[i] * case.constant[j]
     friction = np.moveaxis(case.windows.motion[:, :, [j]], 0, 2)
     return solve(given - case.needed[:, [j]], terms(friction, positive=True)).size

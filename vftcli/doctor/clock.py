@@ -52,7 +52,7 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
     if missed > 0.001 * len(steps):
         yield fact("missing-samples", missed=missed, steps=len(steps))
-    # A gap is no jitter: it is told by its own finding.
+    # A gap is no jitter: it has its own finding.
     low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95])
     spread = float(high - low) / usual
     if spread > JITTER:

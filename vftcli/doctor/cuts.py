@@ -30,7 +30,7 @@ BEYOND = 1.5
 #: A sample that differs from its neighbours by this share of the joint's largest torque, and by so
 #: many robust deviations of their noise, is none of the arm's. [1, -]
 AWAY, FAR = 0.5, 25.0
-FAST = 0.25  #: The same for velocities: share of the joint's largest speed. [1]
+FAST = 0.25  #: `AWAY` for velocities: share of the joint's largest speed. [1]
 #: Such samples come at most so many in a row, within so long; more may be a blow. [-, s]
 FEW, BRIEF = 3, 0.03
 #: Bend of a joint's speed across such samples that shows a blow: the arm felt it. [rad/s]
@@ -56,7 +56,7 @@ SHARE, MOST = 0.05, 0.5
 
 
 class Bad(NamedTuple):
-    """What one rule finds."""
+    """Bad samples by one rule."""
 
     code: str  #: The finding.
     samples: Mask  #: The samples, joint by joint. (T, n)
@@ -252,7 +252,7 @@ def without_turns(recording: Recording) -> Recording:
 
 
 def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
-    """Rows whose position is none of the motion's, and what lies around where recordings meet."""
+    """Rows with a position outside the motion, and the time around where recordings meet."""
     steps, slips, jumps = slips_of(recording)
     real = jumps.any(axis=1) & ~(frozen[steps] | frozen[steps + 1])
     steps, slips, jumps = steps[real], slips[real], jumps[real]

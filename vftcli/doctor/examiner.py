@@ -67,7 +67,7 @@ class Examiner:
         return tuple(self._robots.values())
 
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
-        """A log laid on its robot, its effort taken for what the model explains best if it is open.
+        """A log in its robot's joints, its effort read as the model explains it best if it is open.
 
         Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
 

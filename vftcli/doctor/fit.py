@@ -1,4 +1,4 @@
-"""Which robot a log is from, and what is wrong where it does not explain the log.
+"""The robot that a log is from, and the findings where it does not explain the log.
 
 Every profile's dynamics are held against the torques of the log.
 
@@ -28,12 +28,12 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
-CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not told apart.
+CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not distinguished.
 #: Misfit up to which a profile fits: the maker's own model, and a measured effort.
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
-#: Misfit to the maker's own model up to which a profile is taken, and how much worse the next is.
+#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the next is.
 #:
 #: UR10e logs fit their own profile to .1–.26 % and the next 30 times worse; FR3 and Panda are 2
 #: apart.
@@ -62,12 +62,12 @@ EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position
 
 @dataclass(frozen=True, kw_only=True)
 class RobotMatch:
-    """How well a profile explains a log."""
+    """Fit of a profile to a log."""
 
     robot: str  #: The profile's name.
-    misfit: float  #: What it cannot explain, relative to the torques; 0 is perfect.
+    misfit: float  #: Share of the torques that it cannot explain; 0 is perfect.
     fits: bool  #: Whether that is as good as the kind of evidence allows.
-    evidence: str  #: Which torque was explained, in words.
+    evidence: str  #: The torque that was explained, in words.
     load: float  #: Mass of the unknown load that was fitted, 0 if none. [kg]
     #: Whether the maker's own model was explained rather than a measured effort.
     by_maker: bool = False
@@ -79,7 +79,7 @@ class RobotMatch:
 
 
 class ArmFindings(NamedTuple):
-    """What the model says of a log."""
+    """Findings by the model of an arm."""
 
     findings: tuple[Remark, ...] = ()  #: The remarks.
     robots: tuple[RobotMatch, ...] = ()  #: The arms that were compared, best fit first.
@@ -117,7 +117,7 @@ def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, 
 
 
 def by_fit(match: RobotMatch) -> tuple[bool, float]:
-    """What matches are sorted by, the best first."""
+    """Key by which matches are sorted, the best first."""
     return not match.fits, match.misfit
 
 
@@ -136,7 +136,7 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     Args:
         recording: The log.
         robot: The robot.
-        ignored: Joints, from zero, whose effort is no evidence.
+        ignored: Joints, from zero, with an effort that is no evidence.
     """
     if recording.joints != robot.joints:
         return None
@@ -197,7 +197,7 @@ def arm_findings(
 
 
 def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> ArmFindings:
-    """Findings on a log whose arm the user knows."""
+    """Findings on a log of an arm that the user knows."""
     diagnosis, own = diagnose(recording, robot, ignored), match_of(recording, robot, ignored)
     if diagnosis is None or own is None:
         return ArmFindings()

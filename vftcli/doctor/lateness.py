@@ -37,15 +37,17 @@ KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be
 #: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 COARSE = 3  #: One in so many lags tells whether any growth is worth a closer look.
-LONG = 60.0  #: What is looked at of a long log: a clock that is .5 % off loses 300 ms in it. [s]
-#: How much better a lag that grows explains the joints than a steady one; 1.00 on sound logs.
+LONG = (
+    60.0  #: Part of a long log that is looked at: a clock that is .5 % off loses 300 ms in it. [s]
+)
+#: Ratio of rests by which a lag that grows beats a steady one; 1.00 on sound logs.
 STEADY = 1.1
-LEAST_RATE = 30.0  #: Sample rate below which no lag of that size can be told. [Hz]
+LEAST_RATE = 30.0  #: Sample rate below which no lag of that size shows. [Hz]
 #: Lag that is named. Friction that builds up behind a turn looks like 20 ms on real logs, and a
-#: simulation whose torque belongs to the step before like 30. [s]
+#: simulation with the torque of the step before like 30. [s]
 LATE = 0.035
-BETTER = 1.45  #: How much better a lag explains the joints, in the mean.
-#: Share and number of the joints whose own best lag is nearer to it than this share of it; half of
+BETTER = 1.45  #: Ratio of rests by which a lag beats none, in the mean over joints.
+#: Share and number of the joints with a best lag nearer to it than this share of it; half of
 #: the arm's have to tell one.
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
 #: Findings that the logged velocity is another motion's.
@@ -98,12 +100,12 @@ class Lateness(NamedTuple):
     step: float  #: Sample time. [s]
     starts: Indices  #: First samples of the two windows of each pair. (2, W)
     when: Array  #: When each pair is, from the log's first moment. (W,) [s]
-    model: Array  #: What the change of a joint's torque is made of. (W, n, 4)
+    model: Array  #: Parts of the change of a joint's torque. (W, n, 4)
     moves: Mask  #: Pairs in which a joint moves. (W, n)
     effort: Array  #: Means of the effort over the window that begins at each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
-        """What the model leaves of each joint's effort at every lag; NaN at rest. (n, L)
+        """Rest of each joint's effort beside the model at every lag; NaN at rest. (n, L)
 
         Args:
             rate: By how much the lag grows, from these lags at the log's first moment. [s/s]
@@ -149,7 +151,7 @@ class Lateness(NamedTuple):
 
 
 def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
-    """What a log says of how late its effort is, None where that is nothing."""
+    """Windows of a log that show how late its effort is, None where none do."""
     effort = effort_of(recording)
     if effort is None or recording.dq is None or recording.samples < LEAST:
         return None
@@ -191,7 +193,7 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
 
 
 def model_columns(recording: Recording, robot: Robot, rows: Indices) -> tuple[Array, Array]:
-    """What a joint's torque is made of, window by window, and its rms speed. (W, n, 4), (W, n)
+    """Parts of a joint's torque, window by window, and its rms speed. (W, n, 4), (W, n)
 
     Args:
         recording: The log.
@@ -215,7 +217,7 @@ def model_columns(recording: Recording, robot: Robot, rows: Indices) -> tuple[Ar
 
 
 def rest_of(model: Array, effort: Array) -> Array:
-    """What a model leaves of an effort at every lag, rms over the better of its samples. (L,)
+    """Rest of an effort beside a model at every lag, rms over its better samples. (L,)
 
     Args:
         model: What the effort is made of. (W, 4)

@@ -41,26 +41,26 @@ DECLARED = 0.1  #: A declared payload, or a difference from the mounted one, tha
 RATIO = 0.05
 
 
-def drive_constants(recording: Recording) -> Array | None:
+def drive_constants(recording: Recording) -> Array:
     """The controller's own torque per current, target_torque over target_current. (n,) [N·m/A]
 
     The controller adds friction to its current while it moves, so only resting samples count; NaN
-    where they carry too little current. None if the log lacks either.
+    where they carry too little current, or where the log lacks either.
     """
     current, torque = recording.target_current, recording.target_torque
-    if current is None or torque is None:
-        return None
-    rest = resting(recording)
     constants = np.full(recording.joints, np.nan)
+    if current is None or torque is None:
+        return constants
+    rest = resting(recording)
     for j in range(recording.joints):
         use = rest & (np.abs(current[:, j]) > 0.02)
         if use.sum() >= 10:
             i, tau = current[use, j], torque[use, j]
             # Through the origin: no current, no torque.
-            slope = float(i @ tau / (i @ i))
-            size = max(float(np.std(tau)), float(np.abs(tau).mean()))
+            slope = i @ tau / (i @ i)
             # A joint that carries nothing has a target of zero and shows no constant.
-            constants[j] = slope if float(np.std(tau - slope * i)) < 0.05 * size else np.nan
+            if np.std(tau - slope * i) < 0.05 * max(np.std(tau), np.abs(tau).mean()):
+                constants[j] = slope
     return constants
 
 
@@ -100,7 +100,7 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
 
 def load_change(case: Case) -> Remark | None:
     """The finding that a load is picked up or set down along the log, None without one."""
-    count, gravity = len(case.given), case.gravity
+    count = len(case.given)
     if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
         return None
     tried = {int(k): with_two_loads(case, int(k)) for k in np.linspace(*BETWEEN, 7) * count}
@@ -109,7 +109,7 @@ def load_change(case: Case) -> Remark | None:
     before, after = fit.values[0], fit.values[4]
     sd = float(np.hypot(fit.sd[0], fit.sd[4]))
     # In one pose any residual passes for a load.
-    varied = min(np.ptp(part, axis=0).max() for part in (gravity[:split], gravity[split:]))
+    varied = min(np.ptp(part, axis=0).max() for part in np.split(case.gravity, [split]))
     if fit.size > CHANGED * case.loaded.size or varied < RANGE:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
@@ -124,11 +124,11 @@ def load_change(case: Case) -> Remark | None:
 
 
 def with_two_loads(case: Case, split: int) -> RobustFit:
-    """What friction, a load before a window and another from it on leave over."""
-    load, late = case.windows.load, np.arange(len(case.given)) >= split
-    parts = [load._replace(columns=load.columns * mask[:, None, None]) for mask in (~late, late)]
-    both = parts[0].beside(parts[1])
-    return solve(case.given - case.needed, both.beside(case.windows.friction))
+    """Fit by friction, a load before a window and another from it on."""
+    load, late = case.windows.load, (np.arange(len(case.given)) >= split)[:, None, None]
+    before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
+    by = before.beside(after).beside(case.windows.friction)
+    return solve(case.given - case.needed, by)
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
@@ -139,7 +139,7 @@ def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
 
 
 def missing_payload(recording: Recording, robot: Robot) -> float:
-    """How much more the log declares than the robot carries, 0 where it declares nothing. [kg]"""
+    """Payload declared beyond the mounted one, 0 where the log declares none. [kg]"""
     declared = recording.payload_mass or 0.0
     missing = declared - (0.0 if robot.payload is None else robot.payload.mass)
     slight = declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared)
@@ -150,7 +150,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
     """Payload mismatch at rest, and the controller's drive constants against the robot file's."""
     constants = drive_constants(recording)
     yield from payload_mismatch(recording, constants)
-    if robot is None or robot.torque_constant is None or constants is None:
+    if robot is None or robot.torque_constant is None:
         return
     profile = np.asarray(robot.torque_constant)
     ratio = constants / profile - 1
@@ -168,27 +168,23 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
         )
 
 
-def payload_mismatch(recording: Recording, constants: Array | None) -> Iterator[Remark]:
+def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]:
     """Drives that carry another current at rest than the controller expects.
 
-    Args:
-        recording: The log.
-        constants: Its own drive constants, NaN where not known. (n,) [N·m/A]
+    The log's own drive constants are NaN where they are not known. (n,) [N·m/A]
     """
     rest = resting(recording)
     current, expected = recording.current, recording.target_current
     if current is None or expected is None or rest.sum() < 20:
         return
     carried, wanted = np.mean(current[rest], axis=0), np.mean(expected[rest], axis=0)
-    known = constants if constants is not None else np.full(recording.joints, np.nan)
-    torque = (carried - wanted) * np.where(np.isfinite(known), known, USUAL_CONSTANT)
+    torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
     # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint tell.
     heavy = np.flatnonzero(np.abs(torque[1:4]) > MISMATCH) + 1
     if heavy.size < 2:
         return
-    untold = recording.payload_mass is None
     yield warning(
-        "payload-mismatch-untold" if untold else "payload-mismatch",
+        "payload-mismatch" if recording.payload_mass is not None else "payload-mismatch-untold",
         on_joints(heavy),
         carried_A=carried[heavy].tolist(),
         expected_A=wanted[heavy].tolist(),

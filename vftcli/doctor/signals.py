@@ -17,7 +17,7 @@ from vftcli.signals.rest import NONZERO
 #:
 #: Joints hand energy to one another through gravity, so a single joint may well give some back.
 STRONG = -0.4
-ALONE = -0.85  #: The same for a joint whose neighbours' effort is sound.
+ALONE = -0.85  #: `STRONG` for a joint among sound neighbours.
 ABSURD, FARTHEST = 1e9, 1e18  #: No measurement is this large, in whatever unit, and no time. [-, s]
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
@@ -33,7 +33,7 @@ LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA 
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
-    """What leaves nothing else to be examined: numbers that no clock and no robot gives."""
+    """Numbers that no clock and no robot gives: nothing else is examined then."""
     t = recording.t
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)

@@ -64,7 +64,7 @@ def stuck_findings(recording: Recording) -> Iterator[Remark]:
 
 
 def travel_of(recording: Recording) -> Array:
-    """How far each joint goes, as a part of the samples tells. (n,) [rad]"""
+    """Travel of each joint in a part of the samples. (n,) [rad]"""
     return np.asarray(np.ptp(recording.q[:: max(1, recording.samples // SOME)], axis=0))
 
 
@@ -84,7 +84,7 @@ def stuck_joints(recording: Recording, name: str) -> list[int]:
 
 
 def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int]]:
-    """Joint, first and last sample wherever a signal stands still although it has to change."""
+    """Joint, first and last sample of each stretch in which a signal wrongly repeats itself."""
     t, dq, value = recording.t, recording.dq, getattr(recording, name)
     if dq is None or value is None or recording.samples < 3:
         return []
@@ -186,7 +186,7 @@ def zero_columns(value: Array) -> Mask:
 def is_noisy(value: Array) -> bool:
     """Whether most columns of a signal are rougher than motion: they were measured.
 
-    White noise gives steps whose differences are √3 times as large as they are.
+    Steps of white noise differ by √3 times their own size.
     """
     steps = np.diff(value, axis=0)
     if len(steps) < 2:

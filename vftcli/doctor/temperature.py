@@ -14,12 +14,12 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.rest import MOVES
 
-#: What a joint rubs less for each kelvin: UR's five joint sizes .011–.022 between 28 and 45 °C.
+#: Share less that a joint rubs for each kelvin: UR's five sizes .011–.022 between 28 and 45 °C.
 PER_KELVIN = 0.015
 #: Distance from the temperature of the model from which a joint rubs 8–15 % otherwise. [K]
 FAR = 7.0
-ASSUMED = 10.0  #: The same where the robot file does not say the temperature of its friction. [K]
-#: Where the law stands on measurements (28 to 46 °C), and 15 to 20 K beyond. [°C]
+ASSUMED = 10.0  #: `FAR` where the robot file does not state that temperature. [K]
+#: Range of the law: measured from 28 to 46 °C, and 15 to 20 K beyond. [°C]
 HOLDS = (15.0, 65.0)
 NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
 
@@ -50,7 +50,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
-    """Joints whose temperature is far from the model's, and whose friction follows no law there.
+    """Joints far from the temperature of their model, their friction without a law there.
 
     Args:
         recording: The log.

@@ -25,7 +25,7 @@ from vftcli.signals.rest import MOVES
 WINDOW = 0.2
 #: Steps of a window of a slow log, and of a fast one, which is thinned.
 LEAST_STEPS, MOST_STEPS = 8, 40
-#: Sample times beyond which the clock's unit may be another one than it was taken for [s], and the
+#: Sample times beyond which the clock's unit may be another one than was read [s], and the
 #: steps of a window then.
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
 #: Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
@@ -41,7 +41,7 @@ SURE = 4.0  #: Standard errors by which a deviation has to exceed its limit as w
 #: Lag that is named, or a sample time where that is longer: a robot's own velocity filter takes
 #: 2–3 ms, a host's stamps up to 6. [s]
 LATE = 0.008
-#: What another joint's position may leave open beside what the joint's own leaves with a lag, and
+#: Ratio of open shares by which another joint's position wins over the joint's own with a lag, and
 #: how far the gain of the joint's own may be off for that to count.
 ANOTHER, ALIKE = 0.25, 0.3
 OPEN = 0.1  #: Share of a velocity that its own position may leave open for its gain to count.
@@ -71,7 +71,7 @@ class VelocityFit(NamedTuple):
     """The logged velocities as gain and lag of the positions' derivative; NaN where at rest."""
 
     gain: Array  #: Logged velocity over the derivative of the position, a. (n,)
-    lag: Array  #: How much later the logged velocity is, τ. (n,) [s]
+    lag: Array  #: Delay of the logged velocity, τ. (n,) [s]
     gain_error: Array  #: Standard error of the gain. (n,)
     lag_error: Array  #: Standard error of the lag. (n,) [s]
     open: Array  #: Share of the logged velocity that the fit leaves open, by its square. (n,)
@@ -79,7 +79,7 @@ class VelocityFit(NamedTuple):
     rate: Array  #: Typical rate of change of the motion, rms v̇ over rms v. (n,) [1/s]
     #: Every logged velocity over every position's derivative: row i by column j. (n, n)
     factor: Array
-    share: Array  #: What is left open of the velocity then, by its square. (n, n)
+    share: Array  #: Share of the velocity left open then, by its square. (n, n)
 
     @property
     def known(self) -> Mask:
@@ -178,7 +178,7 @@ def weighed_means(recording: Recording) -> Array:
 
 
 def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """What is odd about the logged velocity, the likeliest cause alone where one explains all."""
+    """Findings on the logged velocity, the likeliest cause alone where one explains all."""
     if fit is None:
         return
     if (common := common_cause(fit)) is not None:
@@ -196,7 +196,7 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
 
 
 def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Remark]:
-    """Joints whose velocity runs behind, or is of another size, each joint by itself.
+    """Joints with a velocity that runs behind, or is of another size, each by itself.
 
     Args:
         fit: The fit.
@@ -228,7 +228,7 @@ def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Re
 
 
 def quantity_of(fit: VelocityFit, joint: int) -> str:
-    """What a joint's logged velocity is, by its gain, where it is no velocity in rad/s."""
+    """Quantity in the place of a joint's velocity in rad/s, by its gain."""
     gain = fit.gain[joint]
     if abs(gain) * BEYOND < 1 and fit.share[joint, joint] > OPEN > fit.open[joint]:
         return "the joint's acceleration"
@@ -238,7 +238,7 @@ def quantity_of(fit: VelocityFit, joint: int) -> str:
 
 
 def common_cause(fit: VelocityFit | None) -> Remark | None:
-    """What is wrong with all velocities alike: the clock's unit or rate, or degrees; else None."""
+    """The fault of all velocities alike: the clock's unit or rate, or degrees; else None."""
     factor = common_factor(fit) if fit is not None else None
     if factor is None:
         return None
@@ -273,21 +273,21 @@ def in_degrees(factor: float) -> bool:
 
 
 def exchanged(fit: VelocityFit) -> list[int]:
-    """Joints whose logged velocity is that of another joint's position, and those others."""
+    """Joints with the velocity of another joint's position, and those others."""
     close = np.abs(fit.gain - 1) < ALIKE
     own = np.where(close, fit.open, 1.0)
     fits = np.where(np.abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
     fits[:, ~fit.known] = 1.0
     np.fill_diagonal(fits, 1.0)
     others = np.flatnonzero(fits.min(axis=1) < np.minimum(ANOTHER * own, OPEN))
-    # A joint that stands has no velocity to be recognised by where it was written instead.
+    # A joint at rest has no velocity to be recognised by where it was written instead.
     written = np.argmin(fits[others], axis=1)
     found = np.union1d(others, written[~close[written]]).tolist()
     return found if len(found) > 1 else []
 
 
 def held_shares(recording: Recording) -> dict[int, float]:
-    """Joints whose velocity stays for some samples and then jumps, while the position moves on.
+    """Joints with a velocity that stays for some samples and then jumps while they move on.
 
     Each with the share of its moving steps in which its velocity repeats itself [%]. A constant
     speed repeats for longer; one of coarse resolution mostly changes by a step of it.

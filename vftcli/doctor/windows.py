@@ -1,9 +1,9 @@
 """The torque that a robot's model needs over short windows of a log, and least squares over them.
 
 Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since ṗ = Cᵀq̇ − g + τ, and no
-acceleration has to be differentiated. Gravity stands apart, as a matrix times the direction that
+acceleration has to be differentiated. Gravity is kept apart, as a matrix times the direction that
 is up, so that its direction can be fitted: a base that is tilted, an arm that hangs, an effort from
-which gravity was taken off.
+which gravity was subtracted.
 
 Least squares set contact aside, with terms that cannot be negative. The normal equations of every
 window are made once; a round of trimming then only adds up those of the windows that are kept.
