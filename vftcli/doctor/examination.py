@@ -49,15 +49,12 @@ class Examination(Shown):
             fitting: Whether the arm must be the one of the model; identification makes it so.
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
-        unmeasured = self._unmeasured()
-        return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
-
-    def _unmeasured(self) -> tuple[Remark, ...]:
-        """The findings that at least half of the joints' effort was not measured, if all agree."""
+        # At least half of the joints' effort was not measured, if all efforts agree.
         joints, efforts = self.recording.joints, set(EFFORTS) & set(self.recording.signals)
-        zero = [finding for finding in self.warnings if finding.code == "zero-effort"]
-        found = tuple(finding for finding in zero if 2 * len(finding.where.joints) >= joints)
-        return found if len(found) == len(efforts) else ()
+        zero = [f for f in self.warnings if f.code == "zero-effort"]
+        half = [f for f in zero if 2 * len(f.where.joints) >= joints]
+        unmeasured = half if len(half) == len(efforts) else []
+        return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:

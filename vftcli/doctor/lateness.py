@@ -164,7 +164,20 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
     if len(starts) < LEAST:
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)
-    model, speed = model_columns(recording, robot, rows)
+    times, dq = t[rows], recording.dq[rows]
+    since, span = times - times[:, :1], times[:, -1:] - times[:, :1]
+    turn, shares = 2 * np.pi / span, trapezoids(times)
+    weight, slope = (1 - np.cos(turn * since)) * shares, turn * np.sin(turn * since) * shares
+    joints = recording.q[rows.ravel()], dq.reshape(-1, recording.joints)
+    terms = momentum_terms(robot.loaded_chain, *joints)
+    rate = (terms.coriolis_transpose_dq - terms.gravity).reshape(dq.shape)
+
+    def mean(by: Array, of: Array) -> Array:
+        return np.asarray((by[:, None] @ of)[:, 0])
+
+    rigid = -mean(slope, terms.p.reshape(dq.shape)) - mean(weight, rate)
+    columns = (rigid, mean(weight, np.tanh(dq / SLOW)), mean(weight, dq), -mean(slope, dq))
+    speed = np.sqrt(mean(weight, dq**2))
     pairs = np.diff(starts) <= length // 2
     hann = (1 - np.cos(2 * np.pi * np.arange(length + 1) / length)) / length
     return Lateness(
@@ -172,7 +185,7 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
         step=step,
         starts=np.stack([starts[:-1], starts[1:]])[:, pairs],
         when=(t[starts[:-1]] - t[0])[pairs],
-        model=np.diff(model, axis=0)[pairs],
+        model=np.diff(np.stack(columns, axis=2), axis=0)[pairs],
         moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
         effort=np.stack([np.convolve(column, hann, "valid") for column in effort[1].T], axis=1),
     )
@@ -190,30 +203,6 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
     usual = (length + latest - earliest) * median_step(t)
     found: Indices = starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
     return found
-
-
-def model_columns(recording: Recording, robot: Robot, rows: Indices) -> tuple[Array, Array]:
-    """Parts of a joint's torque, window by window, and its rms speed. (W, n, 4), (W, n)
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        rows: Samples of each window at which the model is computed. (W, I)
-    """
-    times, dq = recording.t[rows], recording.require("dq")[rows]
-    since, span = times - times[:, :1], times[:, -1:] - times[:, :1]
-    turn, shares = 2 * np.pi / span, trapezoids(times)
-    weight, slope = (1 - np.cos(turn * since)) * shares, turn * np.sin(turn * since) * shares
-    joints = recording.q[rows.ravel()], dq.reshape(-1, recording.joints)
-    terms = momentum_terms(robot.loaded_chain, *joints)
-    rate = (terms.coriolis_transpose_dq - terms.gravity).reshape(dq.shape)
-
-    def mean(by: Array, of: Array) -> Array:
-        return np.asarray((by[:, None] @ of)[:, 0])
-
-    rigid = -mean(slope, terms.p.reshape(dq.shape)) - mean(weight, rate)
-    columns = (rigid, mean(weight, np.tanh(dq / SLOW)), mean(weight, dq), -mean(slope, dq))
-    return np.stack(columns, axis=2), np.sqrt(mean(weight, dq**2))
 
 
 def rest_of(model: Array, effort: Array) -> Array:
