@@ -47,7 +47,7 @@ class Case:
 
     @cached_property
     def loaded(self) -> RobustFit:
-        """Fit by friction and a load on the flange; the load's four coefficients come first."""
+        """Fit by a load on the flange, its four coefficients first, and friction."""
         return solve(self.given - self.needed, self.windows.load.beside(self.windows.friction))
 
     @property

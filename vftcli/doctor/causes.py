@@ -1,14 +1,11 @@
 """The cause of a log that its arm does not explain: each is tried, the best one wins.
 
-A turned sign, two joints that changed places, a torque without gravity, a hanging base and a load
-all look alike in one number. So each cause puts the log right in its own way, the log is fitted
-again, and only a cause that leaves much less than the log as it is, and less than every other
-cause, is named.
+All faults look alike in one number. So each cause puts the log right in its own way, the log is
+fitted again, and only a cause that leaves much less than the log and every other cause is named.
 
-Drivers publish motor currents, joint torques, or torques less gravity under one name, some with
-the sign turned. Each reading is judged by what the arm needs minus the reading, after friction,
-relative to the column as it was logged: relative to the reading a slow arm's currents would pass
-for torques without gravity.
+Drivers publish currents, torques, or torques less gravity under one name, some with the sign
+turned. A reading's rest is relative to the column as logged: relative to the reading
+a slow arm's currents would pass for torques without gravity.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -28,7 +25,7 @@ from vftcli.signals.recording import Recording
 
 #: Range of gravity's torque below which a log does not tell what its effort is. [N·m]
 #:
-#: Of real and simulated logs all 105 readings with 24 N·m and more were right, 3 of 10 below wrong.
+#: All 105 readings of logs with 24 N·m and more were right, 3 of 10 below wrong.
 RANGE = 10.0
 EXPLAINED = 0.6  #: Share of the misfit that a cause may leave.
 SLIGHT = 0.75  #: That of an offset, which lowers the misfit less than a turned sign.
@@ -38,8 +35,7 @@ AMBIGUOUS = 1.25  #: A cause that explains less by a smaller factor is named bes
 CLEAR = 1.5  #: Ratio of misfits by which another reading wins over the second best.
 #: Ratio of misfits by which another reading wins although the stated one fits.
 #:
-#: Read as currents, torques without gravity are so large that a UR5 leaves only 16 % of them
-#: open; read right it leaves 1.5 %.
+#: Torques without gravity read as currents leave only 16 % open on a UR5, read right 1.5 %.
 OVERWHELMING = 5.0
 #: Misfits below which an effort is what its name says, and a base as the robot file says.
 #:
@@ -53,11 +49,11 @@ CARRIES = 0.25  #: Gravity's share of a joint's effort from which gravity tells 
 OFFSET = 0.1  #: Offset from which a joint's effort counts as shifted, relative to the effort.
 #: Windows that a joint moves, each way and both, in which an offset is no stiction.
 FORTH_AND_BACK, BOTH = 8, 30
-#: Angle between the fitted "up" and the robot file's from which a base counts as tilted [rad], and
-#: the weight that the effort carries then, relative to the robot file's.
+#: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its weight then,
+#: relative to the robot file's.
 TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
-#: Deviation of a drive's factor from 1 that is named; sound logs, real and simulated, stay within
-#: .06. A load or a wrong forearm moves that of one joint as well.
+#: Deviation of a drive's factor from 1 that is named, of all joints (sound logs stay within .06)
+#: and of one, which a load moves too.
 OFF, ALONE = 0.08, 0.1
 OTHERS = 0.05  #: By which the factors of the other joints may be off for one to be the cause.
 LEAST, MOST = 0.6, 1.7  #: Factors beyond these are of another unit or of another arm.
@@ -272,8 +268,7 @@ def shifted(case: Case) -> Iterator[Cause]:
 def scaled(case: Case) -> Iterator[Cause]:
     """An effort that has a factor: of all joints, or of a single one.
 
-    A wrong drive constant scales a joint's whole effort, its gravity and its inertia alike.
-    Friction is fitted beside it and takes any size.
+    A wrong drive constant scales gravity and inertia alike; friction has any size beside it.
     """
     n = len(case.constant)
     fit = solve(case.given, terms(case.needed[:, :, None]).beside(case.windows.friction))
@@ -299,7 +294,7 @@ def scaled(case: Case) -> Iterator[Cause]:
 
 
 def swapped(case: Case) -> Iterator[Cause]:
-    """Two joints of which all signals changed places: the model is asked anew for each pair."""
+    """Two joints with all signals exchanged: each pair asks the model anew."""
     far = case.by_joint > SUSPECT
     gravity = np.sqrt(np.mean(case.gravity**2, axis=0))
     if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
@@ -339,7 +334,7 @@ def is_accepted(case: Case, cause: Cause) -> bool:
 
 
 def is_plain(case: Case, cause: Cause) -> bool:
-    """Whether a cause of single joints explains these joints, however little the rest changes."""
+    """Whether a cause of single joints explains these, however little the rest changes."""
     if cause.code not in {"joint-sign", "effort-order"} or cause.misfit > case.misfit:
         return False
     after, before = (x.bare.by_joint[list(cause.joints)] for x in (cause.case, case))
@@ -349,8 +344,7 @@ def is_plain(case: Case, cause: Cause) -> bool:
 def is_modelled(case: Case, robot: Robot) -> bool:
     """Whether an effort is what a model asks for: the arm's own friction is not in it.
 
-    A simulation without friction beside another model of the arm leaves more open than a maker's
-    own model does, and is not judged.
+    A simulation without friction is not judged by another model of its arm.
     """
     n = len(case.constant)
     if len(robot.friction) != n:

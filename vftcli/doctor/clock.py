@@ -11,13 +11,13 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.rest import NONZERO
 
-SLOW_RATE = 50.0  #: Below this rate a contact of a tenth of a second is a handful of samples. [Hz]
+SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
 #: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
 JITTER = 0.05
 GAP_STEPS = 4.0  #: A step this many times the median is a gap.
 LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
-MISSED = (1.6, 3.4)  #: Steps this many times the median are one or two samples that were missed.
-SHORT = 2.0  #: A log shorter than this tells little of noise and nothing of repeated motion. [s]
+MISSED = (1.6, 3.4)  #: Steps over the median where one or two samples were missed.
+SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion. [s]
 STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
 
 
@@ -78,7 +78,7 @@ def long_steps(recording: Recording) -> Iterator[Remark]:
 
 
 def stale_rows(recording: Recording) -> Iterator[Remark]:
-    """Rows that repeat every value of the row before under a new stamp: a packet that was late."""
+    """Rows that repeat the row before under a new stamp: a packet that was late."""
     last = repeated_rows(recording, JOINT_SIGNALS)
     share = len(last) / (recording.samples - 1)
     # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.

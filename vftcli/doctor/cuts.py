@@ -1,8 +1,7 @@
 """Samples that no arm can have made: they are cut out of a log like a gap in its clock.
 
-Each rule looks at single samples or spans, never at the log as a whole, and its limits are the
-arm's own. Every consumer knows gaps. Where two recordings meet the gap is made so long that no
-filter runs across.
+Each rule looks at single samples or spans, and its limits are the arm's own. Where two
+recordings meet the gap is made so long that no filter runs across.
 """
 
 from collections.abc import Iterator
@@ -27,8 +26,8 @@ from vftcli.signals.source import Cut
 
 #: Times its largest torque that no drive gives: the slack is that of drive constants. [1]
 BEYOND = 1.5
-#: A sample that differs from its neighbours by this share of the joint's largest torque, and by so
-#: many robust deviations of their noise, is none of the arm's. [1, -]
+#: Share of the joint's largest torque, and robust deviations of the noise, by which a bad sample
+#: differs from its neighbours. [1, -]
 AWAY, FAR = 0.5, 25.0
 FAST = 0.25  #: `AWAY` for velocities: share of the joint's largest speed. [1]
 #: Such samples come at most so many in a row, within so long; more may be a blow. [-, s]
@@ -43,11 +42,9 @@ TURN, TURNS, NEAR = 2 * np.pi, 3, 0.1
 #: A stamp may be off by so much: a sample that a recorder lost or held back is no jump. [s]
 LATE = 0.01
 APART = 0.25  #: Time that is cut on both sides of where two recordings meet. [s]
-#: Time for which rows that all repeat one another are no late packets, and how many times as many
-#: rows they are as the log's usual repeats. [s, -]
+#: Time for which repeated rows are no late packets, and ratio to the usual repeats. [s, -]
 FROZEN, UNUSUAL = 0.25, 10
-#: Share of gravity's torque that the drives of an arm on its brakes carry at most, and that they
-#: carry at least without. [1]
+#: Share of gravity's torque that drives carry on brakes at most, and without at least. [1]
 LET_GO, HELD = 0.2, 0.5
 #: Windows in which that is weighed, and gravity's torque from which on it can be. [s, N·m]
 WEIGHED, HEAVY = 0.5, 10.0
@@ -66,7 +63,7 @@ class Bad(NamedTuple):
 
 
 def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
-    """The recording less what no arm can have made; the log itself where it holds none of it."""
+    """The recording less what no arm can have made, or the log itself."""
     if recording.joints != robot.joints or recording.dq is None or recording.samples < 20:
         return recording
     log = without_turns(recording)
@@ -96,7 +93,7 @@ def sound_block(block: Recording, robot: Robot) -> Recording:
 
 
 def cut_findings(recording: Recording) -> Iterator[Remark]:
-    """One warning a rule on what was cut out of a log, with the place and the largest of it."""
+    """One warning a rule on its cuts of a log, with their place and the largest."""
     cuts = recording.source.cuts
     for code in dict.fromkeys(cut.code for cut in cuts):
         some = [cut for cut in cuts if cut.code == code]
@@ -176,7 +173,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
 
 
 def blows(dq: Array, rows: Mask) -> Mask:
-    """Samples across which a joint's speed bends as it does where something hits the arm. (T,)"""
+    """Samples across which a joint's speed bends as if something hit the arm. (T,)"""
     found = np.zeros(len(dq), dtype=bool)
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)

@@ -40,7 +40,7 @@ class Examination(Shown):
 
     recording: Recording  #: The log.
     findings: tuple[Remark, ...]  #: Warnings before notes.
-    robots: tuple[RobotMatch, ...]  #: The arms that were compared with the log, best fit first.
+    robots: tuple[RobotMatch, ...]  #: The arms compared with the log, best first.
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
         """The findings with which no result means anything.
@@ -58,7 +58,7 @@ class Examination(Shown):
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:
-        """The findings that tell what the model takes for granted where the log says nothing."""
+        """The findings on what the model assumes where the log says nothing."""
         return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
     @property
@@ -68,12 +68,12 @@ class Examination(Shown):
 
     @property
     def distrusts(self) -> bool:
-        """Whether no size of a contact can be relied on: the velocities are not the motion's."""
+        """Whether the velocities are not the motion's, so no contact's size is reliable."""
         return any(finding.code in MISTIMED for finding in self.warnings)
 
     @property
     def load(self) -> tuple[float, float] | None:
-        """Mass and standard deviation of a load that the model lacks, None without one. [kg]"""
+        """Mass and standard deviation of a load that the model lacks, or None. [kg]"""
         for remark in self.findings:
             if "load_kg" in remark.values:
                 return float(remark.values["load_kg"]), float(remark.values["sd_kg"])

@@ -1,4 +1,4 @@
-"""Examiner: who examines the logs of a command, each once, and turns the meaningless ones away."""
+"""Examiner: examines each log of a command once and refuses the meaningless ones."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -18,7 +18,7 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 
-#: Signals that nothing but an examination looks at; temperatures where no friction follows them.
+#: Signals for the examination alone; temperatures where no friction follows them.
 ONLY_EXAMINED = frozenset(
     ("target_q", "target_dq", "target_current", "target_torque", "temperature")
 )

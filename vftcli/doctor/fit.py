@@ -2,9 +2,8 @@
 
 Every profile's dynamics are held against the torques of the log.
 
-The controller's own model (target_torque, or torque less the vendor's residual) tells most; a
-measured torque or current comes second, for friction changes from day to day and leaves several per
-cent open. An unknown load on the flange is fitted where the poses vary enough to tell one.
+The controller's own model (target_torque, or torque less the vendor's residual) tells
+most; friction leaves several per cent of a measured effort open.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -33,10 +32,9 @@ CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not d
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
-#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the next is.
+#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the next.
 #:
-#: UR10e logs fit their own profile to .1–.26 % and the next 30 times worse; FR3 and Panda are 2
-#: apart.
+#: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are 2 apart.
 GUESSED, APART = 0.012, 5.0
 HEAVY = 5.0  #: A load from which a measured effort rather is another arm's. [kg]
 #: Torques that a model should explain, the most telling first.
@@ -47,7 +45,7 @@ MAKER, RESIDUAL, MEASURED = (
 )
 #: Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
 #:
-#: Load and contact are left out of it, and a log in which gravity hardly varies is not judged.
+#: Load and contact are left out of it.
 NO_FIT = 0.35
 DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
 ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.
@@ -122,7 +120,7 @@ def by_fit(match: RobotMatch) -> tuple[bool, float]:
 
 
 def is_judgeable(recording: Recording) -> bool:
-    """Whether a log is long enough, and its numbers those of an arm, to be held against a model."""
+    """Whether a log is long enough, and its numbers are those of an arm."""
     if recording.dq is None or recording.samples < 10 or not 1e-2 < recording.duration < 1e9:
         return False
     effort = [x for name in EFFORTS if (x := getattr(recording, name)) is not None]
@@ -161,8 +159,7 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
 def maker_case(recording: Recording, windows: Windows) -> tuple[str, Case | None]:
     """The maker's own model of the arm as a log holds it, and its evidence; None where it does not.
 
-    A rigid-body model has no friction. Friction between motor and sensor is in the torque; the
-    vendor's model of it has none.
+    A rigid-body model has no friction; torque less the residual has that before the sensor.
     """
     target, torque, vendor = recording.target_torque, recording.torque, recording.tau_ext
     if target is not None and np.any(target):
@@ -221,7 +218,7 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
 
 
 def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
-    """Whether a log is another profile's: no load, contact or other cause explains it as well."""
+    """Whether a log is another profile's: nothing else explains it as well."""
     if other.by_maker:
         return other.misfit < GUESSED and own.misfit > APART * other.misfit
     if diagnosis.cause is not None and diagnosis.cause.code == "drive-scale" and not other.load:
@@ -234,8 +231,7 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
 def is_driven_by(recording: Recording, other: RobotMatch, diagnosis: Diagnosis) -> bool:
     """Whether another arm explains the measured effort much better too.
 
-    A user's own file, identified or measured, may well be nearer to the arm than its maker's model:
-    it is not refused for differing from that.
+    A user's own file may be nearer to the arm than its maker's model.
     """
     robot = load_robot(other.robot)
     case = case_of(recording, robot, windows_of(recording, robot))
@@ -245,7 +241,7 @@ def is_driven_by(recording: Recording, other: RobotMatch, diagnosis: Diagnosis) 
 def explained(
     recording: Recording, robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]
 ) -> Iterator[Remark]:
-    """The cause that was found, or that there is none; then what is left once it is put right."""
+    """Findings on the cause, or on none; then on the log once it is put right."""
     healed = diagnosis.healed
     if diagnosis.cause is None and is_modelled(healed, robot):
         yield warning("no-friction-in-effort", robot=robot.name)
@@ -277,7 +273,7 @@ def explained(
 
 
 def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
-    """Findings on a log of which nobody says the arm: the profile that fits, or why none does."""
+    """Findings on a log of an unknown arm: by the profile that fits, or why none does."""
     robots = profiles()
     fits = ranking(recording, robots.values())
     if not fits:
@@ -333,8 +329,7 @@ def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Re
 def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
     """That the vendor's torque fits the arm's only with its sign turned.
 
-    The effort plus the torque ON the robot is what moving and holding the arm takes; with the other
-    sign the pushes stand in it twice.
+    Moving the arm takes the effort plus the torque ON the robot.
     """
     if recording.tau_ext is None or recording.torque is None:
         return

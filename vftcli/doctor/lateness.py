@@ -6,8 +6,7 @@ a few numbers a joint: the model's own torque, dry and viscous friction, and rot
     ∫φ τ(t + lag) = c₁ ∫(−φ' p − φ (Cᵀq̇ − g)) + c₂ ∫φ tanh(q̇/ε) + c₃ ∫φ q̇ − c₄ ∫φ' q̇.
 
 The differences of neighbouring windows are fitted at every lag, joint by joint: they leave out what
-changes slowly, an offset, a load and most of a contact. A turn of the motion, where dry friction
-jumps and inertia is large, tells the lag; a wrong mass or drive constant shifts nothing.
+changes slowly, as a load does. Turns of the motion show the lag.
 """
 
 from collections.abc import Iterator
@@ -37,14 +36,11 @@ KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be
 #: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 COARSE = 3  #: One in so many lags tells whether any growth is worth a closer look.
-LONG = (
-    60.0  #: Part of a long log that is looked at: a clock that is .5 % off loses 300 ms in it. [s]
-)
+LONG = 60.0  #: Part of a long log that is looked at: a clock .5 % off loses 300 ms in it. [s]
 #: Ratio of rests by which a lag that grows beats a steady one; 1.00 on sound logs.
 STEADY = 1.1
 LEAST_RATE = 30.0  #: Sample rate below which no lag of that size shows. [Hz]
-#: Lag that is named. Friction that builds up behind a turn looks like 20 ms on real logs, and a
-#: simulation with the torque of the step before like 30. [s]
+#: Lag that is named: friction behind a turn looks like 20 ms, simulations like 30. [s]
 LATE = 0.035
 BETTER = 1.45  #: Ratio of rests by which a lag beats none, in the mean over joints.
 #: Share and number of the joints with a best lag nearer to it than this share of it; half of
@@ -88,7 +84,7 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
 
 
 def agreed(own: Array, best: float, step: float) -> Mask:
-    """Joints near to the best of all, by the step of what is tried; none if they are few. (K,)"""
+    """Joints near to the best of all by steps of the trial; none if they are few. (K,)"""
     near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
     return np.asarray(near & (near.sum() >= ENOUGH) & (np.mean(near) >= AGREE))
 

@@ -23,7 +23,7 @@ USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives 
 #: [N·m/A]
 JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
 SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
-#: A load from which it is worth telling, as a hand or gripper is; and one that nobody overlooks.
+#: Load that is worth a remark, as a hand is; and one that nobody overlooks.
 #:
 #: Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg. [kg]
 HAND, LOAD = 0.4, 1.2
@@ -31,13 +31,13 @@ SURE = 4.0  #: Standard deviations that a load has to be.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
 #: Share of the misfit that a load which changes may leave, and by how much it must [-, kg].
 #:
-#: Sound logs leave .7 and more, pushes of some seconds among them; 1.5 kg picked up half-way .2–.6.
+#: Sound logs leave .7 and more; 1.5 kg picked up half-way .2–.6.
 CHANGED, CHANGE = 0.6, 0.7
-#: Share that a change in the middle must leave for others to be tried, and between which shares of
-#: the log: what lasts for less than a third of it may be a push.
+#: Share that a change in the middle must leave for others to be tried, and the shares of the log
+#: between which they are: pushes last less than a third.
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
 DECLARED = 0.1  #: A declared payload, or a difference from the mounted one, that is none. [kg]
-#: Relative difference between the log's own drive constants and the profile's that is reported.
+#: Relative difference between the log's drive constants and the profile's in a finding.
 RATIO = 0.05
 
 
@@ -147,7 +147,7 @@ def missing_payload(recording: Recording, robot: Robot) -> float:
 
 
 def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
-    """Payload mismatch at rest, and the controller's drive constants against the robot file's."""
+    """Payload mismatch at rest; drive constants of controller and robot file."""
     constants = drive_constants(recording)
     yield from payload_mismatch(recording, constants)
     if robot is None or robot.torque_constant is None:

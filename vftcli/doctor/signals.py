@@ -1,4 +1,4 @@
-"""Findings about the signals: what is missing, units and signs; and those of their own files."""
+"""Findings about the signals: missing ones, units and signs."""
 
 from collections.abc import Iterator
 
@@ -15,17 +15,15 @@ from vftcli.signals.rest import NONZERO
 
 #: Net share of work from which a joint's effort counts as inverted.
 #:
-#: Joints hand energy to one another through gravity, so a single joint may well give some back.
+#: Through gravity joints hand energy to one another.
 STRONG = -0.4
 ALONE = -0.85  #: `STRONG` for a joint among sound neighbours.
 ABSURD, FARTHEST = 1e9, 1e18  #: No measurement is this large, in whatever unit, and no time. [-, s]
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
 SOME = 5000  #: Samples that tell how large a signal usually is.
-#: Share of the samples at which a signal runs straight on, from which it is interpolated; change of
-#: its slope that is none, relative to it; and share of values that have to change to judge by.
-#:
-#: No measured effort runs straight: its noise bends it at nearly every sample.
+#: Share of the samples at which an interpolated signal runs straight on; change of slope that
+#: is none, relative to it; and share of values that have to change.
 STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
 #: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
@@ -86,7 +84,7 @@ def interpolated(recording: Recording) -> Iterator[Remark]:
 
 
 def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
-    """Share of a signal's samples (T, n) at which moving columns run straight, and where any bends.
+    """Share of a signal's samples (T, n) in straight motion, and where any bends.
 
     The share is 0 where hardly one moves; the samples are those from the second to the last but
     one. (T - 2,)
@@ -126,7 +124,7 @@ def effort_of(recording: Recording) -> tuple[str, Array] | None:
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
-    """Effort that takes energy out of a moving arm: friction only takes, so its sign is turned."""
+    """Effort of a turned sign: it takes energy out of a moving arm as friction does."""
     effort = effort_of(recording)
     if effort is None or recording.dq is None:
         return

@@ -1,8 +1,7 @@
 """Findings about signals that stand still, are zero, reach a limit or move in coarse steps.
 
 A signal is stuck where it repeats itself to the last bit for half a second while the joint's other
-signals show that it has to change. An arm at rest, a held joint, a constant speed, a packet that
-came late (all signals repeat) and a coarse resolution (short repeats everywhere) are none of that.
+signals show that it has to change.
 """
 
 from collections.abc import Iterable, Iterator
@@ -19,18 +18,14 @@ from vftcli.signals.rest import HELD
 
 LONG = 0.5  #: Time for which a signal has to repeat itself. [s]
 MANY = 10  #: Steps for which it has to.
-#: Way within that time by which a joint surely moves: 20 mrad/s, beyond any offset of a velocity at
-#: rest. [rad]
+#: Way within that time by which a joint surely moves, at 20 mrad/s. [rad]
 WAY = 0.01
 #: A signal's stuck stretch is this many times as long as nearly all its other repeats.
 UNUSUAL = 10.0
-#: Deviation of a speed from a straight line of time, beyond which its effort has to change. [rad/s]
-#:
-#: Without noise a constant acceleration takes a constant torque.
+#: Deviation of a speed from a constant acceleration, beyond which its effort changes. [rad/s]
 BENT = 0.005
 TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
-#: Steps of the positions that are worth telling: a velocity from them is off by 0.02 rad/s at
-#: 100 Hz. [rad]
+#: Steps of the positions that are worth telling: .02 rad/s at 100 Hz. [rad]
 COARSE = 2e-4
 SOME = 2000  #: Samples that tell most of what a column is like.
 ONCE = 0.2  #: Share of a log that no effort stays at its limit in one go.
@@ -84,7 +79,7 @@ def stuck_joints(recording: Recording, name: str) -> list[int]:
 
 
 def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int]]:
-    """Joint, first and last sample of each stretch in which a signal wrongly repeats itself."""
+    """Joint, first and last sample where a signal wrongly repeats itself."""
     t, dq, value = recording.t, recording.dq, getattr(recording, name)
     if dq is None or value is None or recording.samples < 3:
         return []
@@ -209,7 +204,7 @@ def saturated_effort(recording: Recording) -> Iterator[Remark]:
 
 
 def is_clipped(value: Array, position: Array, least: int = 10) -> bool:
-    """Whether an effort stays exactly at its extreme for several samples while the joint moves.
+    """Whether an effort stays exactly at its extreme while the joint moves.
 
     Args:
         value: An effort that may vary. (T,)

@@ -2,8 +2,7 @@
 
 Over short windows the logged velocity is fitted as q̇(t) ≈ a·v(t) − a·τ·v̇(t), where v is the
 derivative of the position: a is its gain and τ the time by which it runs behind. Both sides are
-weighed with a Hann window, and the derivatives fall on the window instead of on the data
-(∫φ v̇ dt = −∫φ' v dt), so that uneven steps need no resampling and noise is not amplified.
+weighed with a Hann window φ, and ∫φ v̇ dt = −∫φ' v dt: no resampling, no amplified noise.
 """
 
 from collections.abc import Iterator
@@ -28,8 +27,7 @@ LEAST_STEPS, MOST_STEPS = 8, 40
 #: Sample times beyond which the clock's unit may be another one than was read [s], and the
 #: steps of a window then.
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
-#: Windows that are looked at, at most: spread evenly, they tell as much as all; how many a short
-#: log is cut into, and how many tell anything.
+#: Windows looked at, at most; of a short log; and how many tell anything.
 WINDOWS, WANTED, LEAST = 600, 12, 8
 #: Windows that a joint's motion has to be spread over, and its turns: one or two tell no error.
 SPREAD, TURNS = 5.0, 3.0
@@ -51,8 +49,7 @@ DAMPED = 0.01
 WIDE = 0.15  #: Deviation from a factor between units by which it still is that factor.
 #: Degrees in a radian; by which a factor still is that: gears of 50 and 51 are common.
 DEGREES, CLOSE = 180 / np.pi, 0.06
-#: Gain, or its inverse, from which a velocity is another quantity: no filter and no clock of a
-#: robot is so far off.
+#: Gain, or its inverse, from which a velocity is another quantity, no filter or clock.
 BEYOND = 1.5
 #: Gain from which a gear, and no clock, makes the velocities too large: arms have 30 to 160.
 GEARED = 10.0
@@ -156,8 +153,7 @@ def weighed_means(recording: Recording) -> Array:
     """Means by Hann's weights over windows spread over the log. (4, W, n)
 
     Of the derivative v of the position, of the logged velocity [rad/s], then −v̇ by the one and by
-    the other [rad/s²]. A window across a gap mixes motion that was not recorded, one of tiny steps
-    hardly lasts: both are left out.
+    the other [rad/s²]. Windows across a gap or of tiny steps are left out.
     """
     t, dq, step = recording.t, recording.require("dq"), recording.median_step
     length = round(WINDOW / step) if USUAL[0] < step < USUAL[1] else UNUSUAL_STEPS

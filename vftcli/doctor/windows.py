@@ -2,11 +2,10 @@
 
 Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since ṗ = Cᵀq̇ − g + τ, and no
 acceleration has to be differentiated. Gravity is kept apart, as a matrix times the direction that
-is up, so that its direction can be fitted: a base that is tilted, an arm that hangs, an effort from
-which gravity was subtracted.
+is up, so that its direction can be fitted.
 
-Least squares set contact aside, with terms that cannot be negative. The normal equations of every
-window are made once; a round of trimming then only adds up those of the windows that are kept.
+Least squares set contact aside, with terms that cannot be negative. A round of trimming
+only adds up the normal equations of the windows that are kept.
 """
 
 from dataclasses import dataclass, replace
