@@ -218,17 +218,23 @@ def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     The sample before each (K,), their sizes (K, n) [rad], and the jumps among them (K, n). A step
     of time may be off by what the steps around it are, and by a sample that was late.
     """
-    dq, steps, usual = recording.require("dq"), np.diff(recording.t), recording.median_step
-    mean = 0.5 * (dq[1:] + dq[:-1])
-    slips = np.diff(recording.q, axis=0) - mean * steps[:, None]
-    sizes = np.abs(slips)
-    noise = FAR / 0.6745 * np.median(sizes, axis=0)
-    at = np.flatnonzero((sizes > SLIPPED).any(axis=1) & (steps <= GAP_STEPS * usual))
+    q, dq = recording.q, recording.require("dq")
+    steps, usual = np.diff(recording.t), recording.median_step
+    large, noise = np.zeros(len(steps), dtype=bool), np.zeros(recording.joints)
+    for j in range(recording.joints):  # a long log has no room for all joints at once
+        change = np.diff(q[:, j])
+        fastest = np.max(np.abs(dq[:, j])) * GAP_STEPS * usual
+        if np.max(np.abs(change)) + fastest > SLIPPED:
+            slip = np.abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
+            large |= slip > SLIPPED
+            noise[j] = FAR / 0.6745 * median(slip)
+    at = np.flatnonzero(large & (steps <= GAP_STEPS * usual))
+    mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at, None]
+    slips = q[at + 1] - q[at] - mean * dt
     around = np.clip(at[:, None] + np.arange(-1, 2), 0, len(steps) - 1)
     off = np.max(np.abs(steps[around] - usual), axis=1, keepdims=True)
-    slack = 0.5 * np.abs(np.diff(dq, axis=0)[at]) * steps[at, None]
-    slack += np.abs(mean[at]) * np.maximum(off + usual, LATE)
-    return at, slips[at], sizes[at] > np.maximum(SLIPPED + slack, noise)
+    slack = 0.5 * np.abs(dq[at + 1] - dq[at]) * dt + np.abs(mean) * np.maximum(off + usual, LATE)
+    return at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise)
 
 
 def without_turns(recording: Recording) -> Recording:
