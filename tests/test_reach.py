@@ -234,7 +234,7 @@ READINGS = {
 @pytest.mark.parametrize("name", LOGS)
 def test_an_effort_is_told_from_four_others_on_real_logs(logs: Path, name: str) -> None:
     """Each is explained best as what it is; what explains it less than 1.5 × better is said."""
-    from vftcli.doctor.effort import readings
+    from vftcli.doctor.causes import readings
     from vftcli.doctor.windows import windows_of
     from vftcli.identification.processing import gravity_torque
 

@@ -8,8 +8,7 @@ import pytest
 from moving_arms import carrying, exchanged, gravity, moving
 
 from vftcli.doctor import Examination, examine, in_words
-from vftcli.doctor.arm import ArmFindings, arm_findings
-from vftcli.doctor.fit import GUESSED
+from vftcli.doctor.fit import GUESSED, ArmFindings, arm_findings
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
@@ -137,12 +136,12 @@ def test_a_vendor_torque_of_the_other_sign_is_told() -> None:
 
 def test_what_cannot_be_compared_is_not_judged() -> None:
     log = moving("panda")
-    assert arm_findings(log, UR10E) == ArmFindings((), ())
-    assert arm_findings(replace(log, dq=None), PANDA) == ArmFindings((), ())
+    assert arm_findings(log, UR10E) == ArmFindings()
+    assert arm_findings(replace(log, dq=None), PANDA) == ArmFindings()
     four = replace(log, q=log.q[:, :4], dq=log.q[:, :4], torque=log.q[:, :4])
     found = arm_findings(four, None)
     assert codes(found) == ["no-profile"]
-    assert arm_findings(replace(log, torque=None), None) == ArmFindings((), ())
+    assert arm_findings(replace(log, torque=None), None) == ArmFindings()
 
 
 def test_a_cause_has_its_numbers_and_no_consequence_is_told_beside_it() -> None:

@@ -37,7 +37,7 @@ def off(misfit: float) -> float:
 
 
 def first_match(log: Recording) -> RobotMatch:
-    found = match_of(log, "panda", PANDA)
+    found = match_of(log, PANDA)
     assert found is not None
     return found
 
@@ -64,24 +64,24 @@ def test_signals_of_zeros_are_no_evidence() -> None:
     zeros = np.zeros_like(log.q)
     assert first_match(replace(log, target_torque=zeros)).evidence == MEASURED
     assert first_match(replace(log, tau_ext=zeros)).evidence == MEASURED
-    assert match_of(replace(log, torque=zeros), "panda", PANDA) is None
-    assert match_of(replace(log, torque=None), "panda", PANDA) is None
+    assert match_of(replace(log, torque=zeros), PANDA) is None
+    assert match_of(replace(log, torque=None), PANDA) is None
 
 
 def test_a_load_is_found_where_the_poses_tell_it() -> None:
     """Up to 12 kg; more is another arm. 10 %: the load's inertia is not in the fit."""
-    found = match_of(moving("ur10e", load=3.0), "ur10e", load_robot("ur10e"))
+    found = match_of(moving("ur10e", load=3.0), load_robot("ur10e"))
     assert found is not None
     assert found.load == pytest.approx(3.0, rel=0.1)
     assert str(found).startswith(f"ur10e {100 * found.misfit:.3g} % with 3")
-    heavy = match_of(moving("ur10e", load=14.0), "ur10e", load_robot("ur10e"))
+    heavy = match_of(moving("ur10e", load=14.0), load_robot("ur10e"))
     assert heavy is not None
     assert heavy.load == 0.0
     assert first_match(held()).load == 0.0
 
 
 def test_a_measured_effort_that_needs_a_heavy_load_is_no_fit() -> None:
-    found = match_of(moving("ur10e", load=7.0), "ur10e", load_robot("ur10e"))
+    found = match_of(moving("ur10e", load=7.0), load_robot("ur10e"))
     assert found is not None
     assert found.misfit < 0.1
     assert not found.fits
@@ -116,11 +116,11 @@ def fake(misfit: float, *, fits: bool = True) -> RobotMatch:
 def ranked(monkeypatch: pytest.MonkeyPatch, **fits: RobotMatch) -> list[tuple[str, bool]]:
     """The ranking of profiles whose fits are as given."""
 
-    def given(_log: Recording, name: str, _robot: Robot) -> RobotMatch:
-        return replace(fits[name], robot=name)
+    def given(_log: Recording, robot: Robot) -> RobotMatch:
+        return replace(fits[robot.name], robot=robot.name)
 
     monkeypatch.setattr(doctor_fit, "match_of", given)
-    found = ranking(held(), dict.fromkeys(fits, PANDA))
+    found = ranking(held(), [replace(PANDA, name=name) for name in fits])
     return [(fit.robot, fit.fits) for fit in found]
 
 
@@ -139,7 +139,7 @@ def test_a_profile_that_fits_goes_before_a_better_one_that_does_not(
 
 
 def test_what_cannot_be_ranked() -> None:
-    log, robots = held(), {"panda": PANDA, "ur10e": load_robot("ur10e")}
+    log, robots = held(), [PANDA, load_robot("ur10e")]
     assert [fit.robot for fit in ranking(log, robots)] == ["panda"]
     assert ranking(replace(log, dq=None), robots) == ()
     assert ranking(log.between(0, T[8]), robots) == ()

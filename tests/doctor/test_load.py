@@ -41,7 +41,6 @@ def test_two_heavy_joints_tell_a_load(torques: tuple, joints: tuple | None) -> N
 @pytest.mark.parametrize(("current", "told"), [(0.39, False), (0.41, True)])
 def test_an_unknown_constant_is_taken_for_a_large_drive_s(current: float, told: bool) -> None:
     """Ten newton metres an ampere, so 0.4 A are the 4 N·m that tell."""
-    assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), None))) == told
     nowhere = np.full(6, np.nan)
     assert len(list(payload_mismatch(log(0, current, current, 0, 0, 0), nowhere))) == told
     weak = np.full(6, 5.0)
@@ -114,14 +113,13 @@ def test_constants_are_the_controller_s_torque_per_current() -> None:
     planted = np.array([14.0, 13.0, 10.0, 9.5, 9.0, -8.0])
     found = drive_constants(controlled(planted))
     assert found == pytest.approx(planted, rel=1e-12)
-    assert drive_constants(replace(controlled(planted), target_torque=None)) is None
-    assert drive_constants(replace(controlled(planted), target_current=None)) is None
+    for name in ("target_torque", "target_current"):
+        assert np.isnan(drive_constants(replace(controlled(planted), **{name: None}))).all()
 
 
 @pytest.mark.parametrize(("current", "known"), [(0.019, False), (0.021, True), (-0.021, True)])
 def test_constants_need_a_fiftieth_of_an_ampere(current: float, known: bool) -> None:
     found = drive_constants(controlled(TEN, np.full((400, 6), current)))
-    assert found is not None
     assert np.isfinite(found).all() == known
 
 
@@ -129,7 +127,6 @@ def test_constants_need_a_fiftieth_of_an_ampere(current: float, known: bool) -> 
 def test_constants_need_ten_samples(samples: int, known: bool) -> None:
     current = np.where(np.arange(400) < samples, 1.0, 0.0)[:, None] * np.ones(6)
     found = drive_constants(controlled(TEN, current))
-    assert found is not None
     assert np.isfinite(found).all() == known
 
 
@@ -142,7 +139,6 @@ def test_constants_need_torques_that_are_proportional_to_the_currents(
     assert arm.target_torque is not None
     wave = np.where(np.arange(400) % 2, 1 + noise, 1 - noise)[:, None]
     found = drive_constants(replace(arm, target_torque=arm.target_torque * wave))
-    assert found is not None
     assert np.isfinite(found).all() == known
     if known:
         assert found == pytest.approx(TEN)

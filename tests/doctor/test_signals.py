@@ -7,8 +7,6 @@ import pytest
 
 from vftcli.doctor.signals import (
     inverted_effort,
-    inverted_joints,
-    is_most,
     signal_findings,
     unusable_findings,
     work_shares,
@@ -187,15 +185,20 @@ def test_the_numbers_of_an_inverted_effort() -> None:
 
 
 def test_torque_is_judged_before_current() -> None:
-    log = log_of(torque=FRICTION, current=-FRICTION)
-    assert inverted_joints(log) == ([], 6)
-    assert inverted_joints(replace(log, torque=None)) == ([0, 1, 2, 3, 4, 5], 6)
-    assert inverted_joints(replace(log, torque=None, current=None)) == ([], 0)
+    assert found(current=-FRICTION) == {}
+    turned = found(torque=None, current=-FRICTION)["effort-sign-by-work"]
+    assert turned.where.joints == (1, 2, 3, 4, 5, 6)
 
 
 @pytest.mark.parametrize(
     ("judged", "least"), [(1, 2), (2, 2), (3, 2), (4, 2), (5, 3), (6, 4), (7, 4), (8, 5)]
 )
 def test_most_are_three_in_five_and_two_at_least(judged: int, least: int) -> None:
-    assert is_most(least, judged)
-    assert not is_most(least - 1, judged)
+    """Of most joints less than half of the work tells the sign, of fewer it does not."""
+    columns = np.arange(judged) % 6
+    half = effort_of_share(-0.45, 1, 2, 3, 4, 5, 6)[:, columns]
+    for turned in range(least - 1, min(least, judged) + 1):
+        effort = np.where(np.arange(judged) < turned, half, FRICTION[:, columns])
+        log = Recording(t=T, q=Q[:, columns], dq=DQ[:, columns], torque=effort)
+        codes = [finding.code for finding in inverted_effort(log)]
+        assert codes == ["effort-sign-by-work"] * (turned >= least)

@@ -1,12 +1,11 @@
-"""A log against an arm: what its effort is taken for, and what the arm's model leaves over."""
+"""A log against an arm: its effort read as a torque, and what the arm's model leaves over."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
-from vftcli.doctor.robust import RobustFit, Terms, solve, terms
-from vftcli.doctor.windows import Windows
+from vftcli.doctor.windows import RobustFit, Windows, solve
 from vftcli.signals.arrays import Array
 
 MAX_MASS, MAX_ARM = 12.0, 0.35  #: Loads beyond these are no loads but another arm. [kg, m]
@@ -24,39 +23,37 @@ UPRIGHT = np.array([0.0, 0.0, 1.0])  #: The robot file's own "up".
 class Case:
     """A log against an arm."""
 
-    windows: Windows  #: What the arm's model says.
+    windows: Windows  #: The log's windows with the arm's model.
     given: Array  #: Mean of the effort, as torque, over each window. (W, n) [N·m]
     size: float  #: Root mean square of the column that was logged. [N·m]
     constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
-    #: Where "up" is, in axes whose third is the robot file's own. (3,)
+    #: Direction of "up" in axes of which the third is the robot file's own. (3,)
     up: Array = field(default_factory=lambda: UPRIGHT)
-    rubs: bool = True  #: Whether friction is in the effort; a maker's rigid-body model has none.
+
+    @cached_property
+    def gravity(self) -> Array:
+        """Torque that holds the arm. (W, n) [N·m]"""
+        return np.asarray(self.windows.gravity @ self.up)
 
     @cached_property
     def needed(self) -> Array:
         """Torque that inertia, rotors and gravity need. (W, n) [N·m]"""
-        return np.asarray(self.windows.inertial + self.windows.gravity @ self.up)
-
-    @property
-    def friction(self) -> Terms:
-        """The friction that may be in the effort."""
-        friction = self.windows.friction
-        return friction if self.rubs else terms(friction.columns[:, :, :0])
+        return self.windows.inertial + self.gravity
 
     @cached_property
     def bare(self) -> RobustFit:
-        """What friction alone leaves over."""
-        return solve(self.given - self.needed, self.friction)
+        """Fit by friction alone."""
+        return solve(self.given - self.needed, self.windows.friction)
 
     @cached_property
     def loaded(self) -> RobustFit:
-        """What friction and a load on the flange leave over; the load's four come first."""
-        return solve(self.given - self.needed, self.windows.load.beside(self.friction))
+        """Fit by a load on the flange, its four coefficients first, and friction."""
+        return solve(self.given - self.needed, self.windows.load.beside(self.windows.friction))
 
     @property
     def carries_load(self) -> bool:
         """Whether a load explains a part of what friction leaves."""
-        mass, moment = float(self.loaded.values[0]), self.loaded.values[1:4]
+        mass, moment = self.loaded.values[0], self.loaded.values[1:4]
         if self.gravity_range < VARIED * self.size:
             return False  # in one pose any residual passes for a load
         plausible = 0.05 < mass < MAX_MASS and np.linalg.norm(moment) < MAX_ARM * mass + 0.3
@@ -69,7 +66,7 @@ class Case:
 
     @property
     def misfit(self) -> float:
-        """What stays unexplained, relative to the logged effort; loads and contacts are not."""
+        """Share of the logged effort left unexplained; loads and contacts are not."""
         return self.best.size / self.size
 
     @cached_property
@@ -80,40 +77,33 @@ class Case:
 
     @cached_property
     def by_joint(self) -> Array:
-        """What friction leaves over of each joint, relative to the joint's effort. (n,)"""
-        return np.asarray(self.bare.by_joint / self.effort_sizes)
+        """Share of each joint's effort that friction leaves over. (n,)"""
+        return self.bare.by_joint / self.effort_sizes
 
     @property
     def gravity_range(self) -> float:
-        """How much gravity's torque varies, on the joint where it varies most. [N·m]"""
-        gravity = self.windows.gravity @ self.up
-        return float(np.max(np.ptp(gravity, axis=0)))
+        """Range of gravity's torque on the joint where it varies most. [N·m]"""
+        return float(np.ptp(self.gravity, axis=0).max())
 
-    def lasts(self, cause: RobustFit, change: Array | None = None) -> bool:
+    def lasts(self, cause: RobustFit, change: Array) -> bool:
         """Whether a cause is there all the time, as no push and no carried object is.
 
         Args:
             cause: The fit with it.
-            change: What it changes of the torque; None for the load of `loaded`. (W, n) [N·m]
+            change: What it changes of the torque. (W, n) [N·m]
         """
-        if change is None:
-            change = self.windows.load.columns @ self.loaded.values[:4]
         size = np.linalg.norm(change, axis=1)
         felt = size > FELT * cause.size * np.sqrt(change.shape[1])
         without = np.linalg.norm(cause.rest + change, axis=1)
         refuted = felt & (without < REFUTED * np.linalg.norm(cause.rest, axis=1))
-        return bool(np.sum(refuted) <= (1 - LASTING) * max(np.sum(felt), 1))
-
-    def with_effort(self, given: Array) -> "Case":
-        """The same log with another effort."""
-        return replace(self, given=given)
+        return bool(refuted.sum() <= (1 - LASTING) * max(felt.sum(), 1))
 
     def exchanged(self, i: int, j: int) -> "Case":
-        """The same log with the logged efforts of two joints exchanged."""
+        """The log with the logged efforts of two joints exchanged."""
         order = np.arange(len(self.constant))
         order[[i, j]] = j, i
         logged = self.given / self.constant
-        return self.with_effort(logged[:, order] * self.constant)
+        return replace(self, given=logged[:, order] * self.constant)
 
 
 def size_of(given: Array) -> float:

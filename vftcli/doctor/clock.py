@@ -4,32 +4,30 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vftcli.doctor.velocity import VelocityFit, common_factor, is_clock, time_unit
+from vftcli.doctor.stuck import repeated_rows
+from vftcli.doctor.velocity import VelocityFit, common_cause
 from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.rest import NONZERO
 
-SLOW_RATE = 50.0  #: Below this rate a contact of a tenth of a second is a handful of samples. [Hz]
+SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
 #: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
 JITTER = 0.05
 GAP_STEPS = 4.0  #: A step this many times the median is a gap.
 LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
-MISSED = (1.6, 3.4)  #: Steps this many times the median are one or two samples that were missed.
-SHORT = 2.0  #: A log shorter than this tells little of noise and nothing of repeated motion. [s]
+MISSED = (1.6, 3.4)  #: Steps over the median where one or two samples were missed.
+SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion. [s]
 STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
 
 
 def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
     """Findings about the clock, each check independent of the others."""
-    factor = common_factor(fit) if fit is not None else None
-    if factor is not None and (unit := time_unit(factor)):
-        # What else is odd about its steps is this.
-        yield warning("time-unit", gain=factor, unit=unit)
-        return
-    if factor is not None and is_clock(factor):
-        pace = "fast" if factor > 1 else "slow"
-        yield warning("clock-rate", gain=factor, percent=100 * abs(factor - 1), pace=pace)
+    common = common_cause(fit)
+    if common is not None and common.code in {"time-unit", "clock-rate"}:
+        yield common
+        if common.code == "time-unit":
+            return  # what else is odd about its steps is this
     if recording.duration < SHORT:
         yield fact("short", duration_s=recording.duration)
     rate = 1 / recording.median_step
@@ -54,7 +52,7 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
     if missed > 0.001 * len(steps):
         yield fact("missing-samples", missed=missed, steps=len(steps))
-    # A gap is no jitter: it is told by its own finding.
+    # A gap is no jitter: it has its own finding.
     low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95])
     spread = float(high - low) / usual
     if spread > JITTER:
@@ -80,12 +78,8 @@ def long_steps(recording: Recording) -> Iterator[Remark]:
 
 
 def stale_rows(recording: Recording) -> Iterator[Remark]:
-    """Rows that repeat every value of the row before under a new stamp: a packet that was late."""
-    # One column rules most rows out, and the others are compared in what is left.
-    last = np.flatnonzero(recording.q[1:, 0] == recording.q[:-1, 0])
-    for name in JOINT_SIGNALS:
-        if (value := getattr(recording, name)) is not None:
-            last = last[(value[last + 1] == value[last]).all(axis=1)]
+    """Rows that repeat the row before under a new stamp: a packet that was late."""
+    last = repeated_rows(recording, JOINT_SIGNALS)
     share = len(last) / (recording.samples - 1)
     # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
     if recording.dq is None or share < STALE or share > 0.9:

@@ -1,8 +1,7 @@
 """Samples that no arm can have made: they are cut out of a log like a gap in its clock.
 
-Each rule looks at single samples or spans, never at the log as a whole, and its limits are the
-arm's own. Every consumer knows gaps. Where two recordings meet the gap is made so long that no
-filter runs across.
+Each rule looks at single samples or spans, and its limits are the arm's own. Where two
+recordings meet the gap is made so long that no filter runs across.
 """
 
 from collections.abc import Iterator
@@ -11,12 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.doctor.clock import GAP_STEPS
+from vftcli.doctor.stuck import repeated_rows
 from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask, median
 from vftcli.signals.errors import ExaminationError
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, fact, warning
@@ -25,10 +26,10 @@ from vftcli.signals.source import Cut
 
 #: Times its largest torque that no drive gives: the slack is that of drive constants. [1]
 BEYOND = 1.5
-#: A sample that differs from its neighbours by this share of the joint's largest torque, and by so
-#: many robust deviations of their noise, is none of the arm's. [1, -]
+#: Share of the joint's largest torque, and robust deviations of the noise, by which a bad sample
+#: differs from its neighbours. [1, -]
 AWAY, FAR = 0.5, 25.0
-FAST = 0.25  #: The same for velocities: share of the joint's largest speed. [1]
+FAST = 0.25  #: `AWAY` for velocities: share of the joint's largest speed. [1]
 #: Such samples come at most so many in a row, within so long; more may be a blow. [-, s]
 FEW, BRIEF = 3, 0.03
 #: Bend of a joint's speed across such samples that shows a blow: the arm felt it. [rad/s]
@@ -41,12 +42,9 @@ TURN, TURNS, NEAR = 2 * np.pi, 3, 0.1
 #: A stamp may be off by so much: a sample that a recorder lost or held back is no jump. [s]
 LATE = 0.01
 APART = 0.25  #: Time that is cut on both sides of where two recordings meet. [s]
-#: Time for which rows that all repeat one another are no late packets, and how many times as many
-#: rows they are as the log's usual repeats. [s, -]
+#: Time for which repeated rows are no late packets, and ratio to the usual repeats. [s, -]
 FROZEN, UNUSUAL = 0.25, 10
-GAP_STEPS = 4.0  #: A step of more than this many usual ones is a gap: what lies in it is not known.
-#: Share of gravity's torque that the drives of an arm on its brakes carry at most, and that they
-#: carry at least without. [1]
+#: Share of gravity's torque that drives carry on brakes at most, and without at least. [1]
 LET_GO, HELD = 0.2, 0.5
 #: Windows in which that is weighed, and gravity's torque from which on it can be. [s, N·m]
 WEIGHED, HEAVY = 0.5, 10.0
@@ -55,7 +53,7 @@ SHARE, MOST = 0.05, 0.5
 
 
 class Bad(NamedTuple):
-    """What one rule finds."""
+    """Bad samples by one rule."""
 
     code: str  #: The finding.
     samples: Mask  #: The samples, joint by joint. (T, n)
@@ -65,7 +63,7 @@ class Bad(NamedTuple):
 
 
 def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
-    """The recording less what no arm can have made; the log itself where it holds none of it."""
+    """The recording less what no arm can have made, or the log itself."""
     if recording.joints != robot.joints or recording.dq is None or recording.samples < 20:
         return recording
     log = without_turns(recording)
@@ -74,7 +72,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
     for bad in rules(log, robot):
         fresh = bad.samples & ~rows[:, None]
         if 0 < np.mean(fresh.any(axis=1)) <= bad.most:
-            cuts += cuts_of(log.t, bad._replace(samples=fresh))
+            cuts += cuts_of(log.t, bad, fresh)
             rows |= fresh.any(axis=1)
     kept = log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
     if recording.long is None:
@@ -95,16 +93,15 @@ def sound_block(block: Recording, robot: Robot) -> Recording:
 
 
 def cut_findings(recording: Recording) -> Iterator[Remark]:
-    """One warning a rule on what was cut out of a log, with the place and the largest of it."""
+    """One warning a rule on its cuts of a log, with their place and the largest."""
     cuts = recording.source.cuts
     for code in dict.fromkeys(cut.code for cut in cuts):
         some = [cut for cut in cuts if cut.code == code]
         worst = max(some, key=lambda cut: cut.size)
-        joints = sorted({joint for cut in some for joint in cut.joints})
-        where = Where(recording.name, tuple(joints), (some[0].start, some[-1].stop))
+        joints = tuple(sorted({joint for cut in some for joint in cut.joints}))
         yield warning(
             code,
-            where._replace(about=""),
+            Where(joints=joints, span=(some[0].start, some[-1].stop)),
             rows=sum(cut.rows for cut in some),
             spans=len(some),
             at_s=0.5 * (worst.start + worst.stop),
@@ -114,30 +111,25 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
         )
 
 
-def cuts_of(t: Array, bad: Bad) -> Iterator[Cut]:
-    """The spans that a rule cuts out."""
-    for start, stop in runs_of(np.asarray(bad.samples.any(axis=1))):
-        here = bad.samples[start:stop]
-        sizes = None if bad.sizes is None else np.abs(bad.sizes[start:stop][here])
-        yield Cut(
-            code=bad.code,
-            start=float(t[start]),
-            stop=float(t[stop - 1]),
-            rows=stop - start,
-            joints=tuple(int(j) + 1 for j in np.flatnonzero(here.any(axis=0))),
-            size=float(t[stop - 1] - t[start] if sizes is None else np.max(sizes)),
-        )
+def cuts_of(t: Array, bad: Bad, samples: Mask) -> Iterator[Cut]:
+    """The spans that a rule cuts out: some of its samples. (T, n)"""
+    for start, stop in runs_of(np.asarray(samples.any(axis=1))):
+        here = samples[start:stop]
+        first, last = float(t[start]), float(t[stop - 1])
+        size = last - first
+        if bad.sizes is not None:
+            size = float(np.max(np.abs(bad.sizes[start:stop][here])))
+        joints = tuple((np.flatnonzero(here.any(axis=0)) + 1).tolist())
+        yield Cut(bad.code, first, last, stop - start, joints, size)
 
 
 def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
-    """What each rule finds in a log."""
-    dq, frozen = recording.require("dq"), frozen_rows(recording)
+    """Bad samples of a log, rule by rule."""
+    dq, step, frozen = recording.require("dq"), recording.median_step, frozen_rows(recording)
     yield Bad("frozen-rows", np.repeat(frozen[:, None], recording.joints, axis=1), None, MOST)
     yield from position_jumps(recording, frozen)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
-    yield Bad("isolated-velocity", isolated(recording, dq, fast), dq)
-    if not any(getattr(recording, name) is not None for name in EFFORTS):
-        return
+    yield Bad("isolated-velocity", isolated(dq, fast, step), dq)
     name = effort_name(recording, robot)
     effort: Array | None = getattr(recording, name)
     constant = np.ones(robot.joints) if name != "current" else robot.torque_constant
@@ -146,43 +138,42 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     torque, limit = effort * constant, np.nan_to_num(robot.limits.tau_max, nan=np.inf)
     beyond = np.abs(torque) > BEYOND * limit
     yield Bad("effort-beyond-drive", beyond, torque)
-    alone = isolated(recording, torque, AWAY * limit) & ~beyond
+    alone = isolated(torque, AWAY * limit, step) & ~beyond
     yield Bad("isolated-effort", alone & ~blows(dq, np.asarray(alone.any(axis=1)))[:, None], torque)
     yield Bad("zero-burst", zero_bursts(torque, ZERO * limit))
     if name != "torque_without_gravity":
         yield from braked(recording, robot, torque)
 
 
-def isolated(recording: Recording, x: Array, away: Array) -> Mask:
+def isolated(x: Array, away: Array, step: float) -> Mask:
     """Samples far from the median of the nine around them, a few in a row at most. (T, n)
 
     Args:
-        recording: The log.
         x: A signal. (T, n)
         away: Least distance, joint by joint. (n,)
+        step: Sample time. [s]
     """
-    found, step = np.zeros(x.shape, dtype=bool), recording.median_step
-    for j in range(x.shape[1]):
-        change = np.abs(np.diff(x[:, j]))
-        if not np.max(change) > 0.5 * away[j]:
-            continue
+    found = np.zeros(x.shape, dtype=bool)
+    for j, column in enumerate(x.T):
+        change = np.abs(np.diff(column))
         # Only beside a step of half the distance can a sample be so far away.
         steps = np.flatnonzero(change > 0.5 * away[j])
+        if not steps.size:
+            continue
         near = np.unique(steps[:, None] + np.arange(-FEW + 1, FEW + 1))
         near = near[(near >= 0) & (near < len(x))]
         around = np.clip(near[:, None] + np.arange(-4, 5), 0, len(x) - 1)
         noise = FAR * median(change) / (0.6745 * np.sqrt(2.0))
-        off = np.abs(x[near, j] - np.median(x[around, j], axis=1)) > max(away[j], noise)
-        column = np.zeros(len(x), dtype=bool)
-        column[near[off]] = True
-        for start, stop in runs_of(column):
-            if stop - start <= FEW and (stop - start) * step <= BRIEF:
-                found[start:stop, j] = True
+        off = np.abs(column[near] - np.median(column[around], axis=1))
+        found[near[off > max(away[j], noise)], j] = True
+        for start, stop in runs_of(found[:, j]):
+            if stop - start > FEW or (stop - start) * step > BRIEF:
+                found[start:stop, j] = False
     return found
 
 
 def blows(dq: Array, rows: Mask) -> Mask:
-    """Samples across which a joint's speed bends as it does where something hits the arm. (T,)"""
+    """Samples across which a joint's speed bends as if something hit the arm. (T,)"""
     found = np.zeros(len(dq), dtype=bool)
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
@@ -198,97 +189,76 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
     Of one joint three samples in a row, of all joints at once any.
     """
     zero = torque == 0.0
-    found = np.zeros(torque.shape, dtype=bool)
-    if not zero.any():
-        return found
-    every = zero.all(axis=1)
-    for j in range(torque.shape[1]):
+    every, found = zero.all(axis=1), np.zeros(zero.shape, dtype=bool)
+    for j in np.flatnonzero(zero.any(axis=0)):
         for start, stop in runs_of(zero[:, j]):
-            if start == 0 or stop == len(torque):
-                continue
             enough = stop - start >= FEW or every[start:stop].all()
-            if enough and min(abs(torque[start - 1, j]), abs(torque[stop, j])) > least[j]:
-                found[start:stop, j] = True
+            if start and stop < len(zero) and enough:
+                beside = np.abs(torque[[start - 1, stop], j])
+                found[start:stop, j] = beside.min() > least[j]
     return found
 
 
 def frozen_rows(recording: Recording) -> Mask:
     """Rows that repeat the row before in all that is measured while the arm moves. (T,)"""
-    found = np.zeros(recording.samples, dtype=bool)
-    dq = recording.require("dq")
-    same = recording.q[1:, 0] == recording.q[:-1, 0]
-    for name in ("q", "dq", *EFFORTS):
-        if (value := getattr(recording, name)) is not None and same.any():
-            rows = np.flatnonzero(same)
-            same[rows] = (value[rows + 1] == value[rows]).all(axis=1)
-    runs = runs_of(same)
-    if not runs:
-        return found
-    lengths = np.array([stop - start for start, stop in runs])
-    long = np.array([recording.t[stop] - recording.t[start] >= FROZEN for start, stop in runs])
-    usual = float(np.median(lengths[~long])) if not long.all() else 1.0
-    for (start, stop), enough in zip(runs, long & (lengths >= UNUSUAL * usual), strict=True):
-        if enough and np.max(np.abs(dq[start])) > REST:
-            found[start + 1 : stop + 1] = True
-    return found
+    t, dq = recording.t, recording.require("dq")
+    same = np.zeros(recording.samples - 1, dtype=bool)
+    same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
+    first, last = np.array(runs_of(same), dtype=np.intp).reshape(-1, 2).T
+    lengths, long = last - first, t[last] - t[first] >= FROZEN
+    usual = np.median(lengths[~long]) if not long.all() else 1.0
+    moves = np.max(np.abs(dq[first]), axis=1) > REST
+    frozen = long & (lengths >= UNUSUAL * usual) & moves
+    return covered(list(zip(first[frozen] + 1, last[frozen] + 1, strict=True)), len(t))
 
 
-class Slips(NamedTuple):
-    """Changes of position beyond what the velocities say."""
+def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
+    """Changes of position beyond what the velocities say, and which of them are jumps.
 
-    steps: Indices  #: The steps at which one may be a jump, by the sample before. (K,)
-    sizes: Array  #: How large they are. (K, n) [rad]
-    jumps: Mask  #: Which are jumps. (K, n)
-
-
-def slips_of(recording: Recording) -> Slips:
-    """Where positions change otherwise than the velocities say, and which of it are jumps.
-
-    A step of time may be off by what the steps around it are, and by a sample that was late.
+    The sample before each (K,), their sizes (K, n) [rad], and the jumps among them (K, n). A step
+    of time may be off by what the steps around it are, and by a sample that was late.
     """
-    t, q, dq = recording.t, recording.q, recording.require("dq")
-    steps, usual = np.diff(t), recording.median_step
-    near, noise = steps <= GAP_STEPS * usual, np.zeros(recording.joints)
-    large = np.zeros(len(steps), dtype=bool)
-    for j in range(recording.joints):
+    q, dq = recording.q, recording.require("dq")
+    steps, usual = np.diff(recording.t), recording.median_step
+    large, noise = np.zeros(len(steps), dtype=bool), np.zeros(recording.joints)
+    for j in range(recording.joints):  # a long log has no room for all joints at once
         change = np.diff(q[:, j])
-        fastest = float(np.max(np.abs(dq[:, j]))) * GAP_STEPS * usual
-        if max(float(np.max(change)), -float(np.min(change))) + fastest > SLIPPED:
+        fastest = np.max(np.abs(dq[:, j])) * GAP_STEPS * usual
+        if np.max(np.abs(change)) + fastest > SLIPPED:
             slip = np.abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
             large |= slip > SLIPPED
             noise[j] = FAR / 0.6745 * median(slip)
-    at: Indices = np.flatnonzero(large & near)
-    mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at][:, None]
+    at = np.flatnonzero(large & (steps <= GAP_STEPS * usual))
+    mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at, None]
     slips = q[at + 1] - q[at] - mean * dt
     around = np.clip(at[:, None] + np.arange(-1, 2), 0, len(steps) - 1)
-    off = np.max(np.abs(steps[around] - usual), axis=1, initial=0.0)[:, None]
+    off = np.max(np.abs(steps[around] - usual), axis=1, keepdims=True)
     slack = 0.5 * np.abs(dq[at + 1] - dq[at]) * dt + np.abs(mean) * np.maximum(off + usual, LATE)
-    return Slips(at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise))
+    return at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise)
 
 
 def without_turns(recording: Recording) -> Recording:
     """The recording, positions that jump by whole turns unwrapped, which is said."""
-    found = slips_of(recording)
-    turns = np.round(found.sizes / TURN)
-    whole = found.jumps & (np.abs(found.sizes - TURN * turns) < NEAR)
+    steps, sizes, jumps = slips_of(recording)
+    turns = np.round(sizes / TURN)
+    whole = jumps & (np.abs(sizes - TURN * turns) < NEAR)
     whole &= (turns != 0) & (np.abs(turns) <= TURNS)
-    if not whole.any() or len(found.steps) > SHARE * recording.samples:
+    if not whole.any() or len(steps) > SHARE * recording.samples:
         return recording
-    q = recording.q.copy()
-    for k, row in enumerate(found.steps.tolist()):
-        q[row + 1 :] -= TURN * np.where(whole[k], turns[k], 0.0)
-    joints = tuple(int(j) + 1 for j in np.flatnonzero(whole.any(axis=0)))
-    first = float(recording.t[found.steps[np.argmax(whole.any(axis=1))] + 1])
-    said = fact("turn-unwrapped", Where(joints=joints), at_s=first)
-    source = replace(recording.source, remarks=(*recording.source.remarks, said))
-    return replace(recording, q=q, source=source)
+    shift = np.zeros(recording.q.shape)
+    shift[steps + 1] = TURN * turns * whole
+    joints = tuple((np.flatnonzero(whole.any(axis=0)) + 1).tolist())
+    first = float(recording.t[steps[np.argmax(whole.any(axis=1))] + 1])
+    remark = fact("turn-unwrapped", Where(joints=joints), at_s=first)
+    source = replace(recording.source, remarks=(*recording.source.remarks, remark))
+    return replace(recording, q=recording.q - np.cumsum(shift, axis=0), source=source)
 
 
 def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
-    """Rows whose position is none of the motion's, and what lies around where recordings meet."""
-    found = slips_of(recording)
-    real = found.jumps.any(axis=1) & ~(frozen[found.steps] | frozen[found.steps + 1])
-    steps, slips, jumps = found.steps[real], found.sizes[real], found.jumps[real]
+    """Rows with a position outside the motion, and the time around where recordings meet."""
+    steps, slips, jumps = slips_of(recording)
+    real = jumps.any(axis=1) & ~(frozen[steps] | frozen[steps + 1])
+    steps, slips, jumps = steps[real], slips[real], jumps[real]
     if not steps.size or steps.size > max(2.0, SHARE * recording.samples):
         return
     t, q, dq = recording.t, recording.q, recording.require("dq")
@@ -297,14 +267,14 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
         first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1
         joints, size = jumps[group].any(axis=0), np.max(np.abs(slips[group]), axis=0)
-        over = q[last] - q[first] - 0.5 * (dq[last] + dq[first]) * (t[last] - t[first])
-        slack = SLIPPED + np.abs(dq[last] - dq[first]) * (t[last] - t[first])
-        slack += (np.abs(dq[last]) + np.abs(dq[first])) * max(recording.median_step, LATE)
+        lasts, speeds = t[last] - t[first], dq[[first, last]]
+        over = q[last] - q[first] - speeds.mean(axis=0) * lasts
+        slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
+        slack += np.abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
         if last - first > 1 and np.all((np.abs(over) < slack)[joints]):
             span, into = slice(first + 1, last), rows  # the motion goes on behind a few bad rows
         else:
-            start, stop = np.searchsorted(t, [t[first] - APART, t[last] + APART])
-            span, into = slice(int(start), int(stop)), meets
+            span, into = slice(*np.searchsorted(t, [t[first] - APART, t[last] + APART])), meets
         into[span, joints], sizes[span, joints] = True, size[joints]
     yield Bad("position-slip", rows, sizes)
     yield Bad("position-jump", meets, sizes, MOST)
@@ -319,17 +289,15 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     middle = recording.q[first + length // 2]
     gravity = momentum_terms(robot.loaded_chain, middle, np.zeros_like(middle)).gravity
     weight = np.sum(gravity**2, axis=1)
-    given = torque[: len(first) * length].reshape(len(first), length, -1).mean(axis=1)
+    rows = slice(len(first) * length)
+    given = torque[rows].reshape(len(first), length, -1).mean(axis=1)
     share = np.sum(given * gravity, axis=1) / np.maximum(weight, 1e-12)
-    fastest = np.max(np.abs(recording.require("dq")[: len(first) * length]), axis=1)
-    speed = np.maximum.reduceat(fastest, first)
+    speed = np.abs(recording.require("dq")[rows]).reshape(len(first), -1).max(axis=1)
     heavy = weight > HEAVY**2
-    held = heavy & (share > HELD)
     free = heavy & (speed < REST) & (np.abs(share) < LET_GO)
-    if not free.any() or np.count_nonzero(held) <= np.count_nonzero(free):
+    if not free.any() or np.count_nonzero(heavy & (share > HELD)) <= np.count_nonzero(free):
         return
-    rows = np.zeros(torque.shape, dtype=bool)
-    for k in np.flatnonzero(free):
-        # The drives let go and take hold again somewhere in the windows beside.
-        rows[max(0, first[k] - length) : first[k] + 2 * length] = True
-    yield Bad("brakes", rows, None, MOST)
+    # The drives let go and take hold again somewhere in the windows beside.
+    spans = [(start, start + length) for start in first[free].tolist()]
+    off = covered(spans, recording.samples, length)
+    yield Bad("brakes", np.repeat(off[:, None], recording.joints, axis=1), None, MOST)

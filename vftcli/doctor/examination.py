@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-from vftcli.doctor.arm import arm_findings
+from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.clock import clock_findings
 from vftcli.doctor.cuts import cut_findings
-from vftcli.doctor.fit import RobotMatch, profiles
+from vftcli.doctor.fit import RobotMatch, arm_findings, profiles
 from vftcli.doctor.lateness import LAGLESS, MISTIMED, effort_lag
 from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
@@ -28,11 +28,8 @@ REFUSING = NO_FIT | {
     "upside-down", "tilted-base", "time-unit", "clock-rate",
     "velocity-unit", "velocity-of-another-kind", "velocity-sign", "no-friction-in-effort",
 }  # fmt: skip
-#: Findings that an effort is something else, by which its size is explained.
-READINGS = frozenset({
-    "current-as-torque", "current-as-turned-torque", "torque-without-gravity",
-    "torque-as-current", "torque-as-turned-current", "milliamperes", "effort-sign",
-})  # fmt: skip
+#: Findings that say how large a current is: a model of the arm knows better than its numbers.
+SIZED = CORRECTIONS.keys() - {"torque-with-gravity"}
 #: Findings that every command says: nothing is wrong, and results stand on what is assumed.
 ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
@@ -43,7 +40,7 @@ class Examination(Shown):
 
     recording: Recording  #: The log.
     findings: tuple[Remark, ...]  #: Warnings before notes.
-    robots: tuple[RobotMatch, ...]  #: The arms that were compared with the log, best fit first.
+    robots: tuple[RobotMatch, ...]  #: The arms compared with the log, best first.
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
         """The findings with which no result means anything.
@@ -52,19 +49,16 @@ class Examination(Shown):
             fitting: Whether the arm must be the one of the model; identification makes it so.
         """
         codes = REFUSING if fitting else REFUSING - NO_FIT
-        unmeasured = self._unmeasured()
-        return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
-
-    def _unmeasured(self) -> tuple[Remark, ...]:
-        """The findings that at least half of the joints' effort was not measured, if all agree."""
+        # At least half of the joints' effort was not measured, if all efforts agree.
         joints, efforts = self.recording.joints, set(EFFORTS) & set(self.recording.signals)
-        zero = [finding for finding in self.warnings if finding.code == "zero-effort"]
-        found = tuple(finding for finding in zero if 2 * len(finding.where.joints) >= joints)
-        return found if len(found) == len(efforts) else ()
+        zero = [f for f in self.warnings if f.code == "zero-effort"]
+        half = [f for f in zero if 2 * len(f.where.joints) >= joints]
+        unmeasured = half if len(half) == len(efforts) else []
+        return tuple(f for f in self.warnings if f.code in codes or f in unmeasured)
 
     @property
     def assumptions(self) -> tuple[Remark, ...]:
-        """The findings that tell what the model takes for granted where the log says nothing."""
+        """The findings on what the model assumes where the log says nothing."""
         return tuple(finding for finding in self.findings if finding.code in ASSUMPTIONS)
 
     @property
@@ -74,12 +68,12 @@ class Examination(Shown):
 
     @property
     def distrusts(self) -> bool:
-        """Whether no size of a contact can be relied on: the velocities are not the motion's."""
+        """Whether the velocities are not the motion's, so no contact's size is reliable."""
         return any(finding.code in MISTIMED for finding in self.warnings)
 
     @property
     def load(self) -> tuple[float, float] | None:
-        """Mass and standard deviation of a load that the model lacks, None without one. [kg]"""
+        """Mass and standard deviation of a load that the model lacks, or None. [kg]"""
         for remark in self.findings:
             if "load_kg" in remark.values:
                 return float(remark.values["load_kg"]), float(remark.values["sd_kg"])
@@ -102,8 +96,7 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
-    if any(finding.code in READINGS for finding in by_arm):
-        # Large numbers alone look like mA; the model knows better.
+    if any(finding.code in SIZED for finding in by_arm):
         by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
     findings = [
         *cut_findings(recording),

@@ -1,9 +1,9 @@
-"""Examiner: who examines the logs of a command, each once, and turns the meaningless ones away."""
+"""Examiner: examines each log of a command once and refuses the meaningless ones."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from typing import NamedTuple
 
+from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import without_bad_samples
 from vftcli.doctor.examination import Examination, examine
 from vftcli.doctor.findings import in_words
@@ -18,30 +18,10 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 
-#: Signals that nothing but an examination looks at; temperatures where no friction follows them.
+#: Signals for the examination alone; temperatures where no friction follows them.
 ONLY_EXAMINED = frozenset(
     ("target_q", "target_dq", "target_current", "target_torque", "temperature")
 )
-
-
-class Correction(NamedTuple):
-    """What puts an effort right that is not what it is called."""
-
-    kind: str  #: What it is, one of `vftcli.signals.recording.EFFORTS`; "" for what it is called.
-    factor: float = 1.0  #: What its values are multiplied with.
-
-
-#: Finding that an effort is something else → what puts it right.
-CORRECTIONS = {
-    "current-as-torque": Correction("torque"),
-    "current-as-turned-torque": Correction("torque", -1.0),
-    "torque-as-current": Correction("current"),
-    "torque-as-turned-current": Correction("current", -1.0),
-    "torque-without-gravity": Correction("torque_without_gravity"),
-    "torque-with-gravity": Correction("torque"),
-    "milliamperes": Correction("current", 1e-3),
-    "effort-sign": Correction("", -1.0),
-}
 
 
 class Examiner:
@@ -87,7 +67,7 @@ class Examiner:
         return tuple(self._robots.values())
 
     def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
-        """A log laid on its robot, its effort taken for what the model explains best if it is open.
+        """A log in its robot's joints, its effort read as the model explains it best if it is open.
 
         Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
 
@@ -99,10 +79,8 @@ class Examiner:
             return recording
         for finding in examine(recording, robot).findings:
             if (right := CORRECTIONS.get(finding.code)) is not None:
-                called = effort_name(recording, robot)
-                return recording.with_effort(
-                    right.kind or called, source=called, factor=right.factor
-                )
+                name = effort_name(recording, robot)
+                return recording.with_effort(right.kind or name, source=name, factor=right.factor)
         return recording
 
     def examine(self, recording: Recording, robot: Robot) -> Examination:

@@ -1,34 +1,40 @@
-"""Which robot a log is from: every profile's dynamics against the torques of the log.
+"""The robot that a log is from, and the findings where it does not explain the log.
 
-The controller's own model (target_torque, or torque less the vendor's residual) tells most; a
-measured torque or current comes second, for friction changes from day to day and leaves several per
-cent open. An unknown load on the flange is fitted where the poses vary enough to tell one.
+Every profile's dynamics are held against the torques of the log.
+
+The controller's own model (target_torque, or torque less the vendor's residual) tells
+most; friction leaves several per cent of a measured effort open.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.doctor.case import Case, size_of
-from vftcli.doctor.effort import case_of
+from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
+from vftcli.doctor.findings import on_joints
+from vftcli.doctor.lateness import MISTIMED
+from vftcli.doctor.load import declared_payload, load_remarks
+from vftcli.doctor.signals import inverted_effort
 from vftcli.doctor.windows import Windows, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact, warning
 
-CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not told apart.
+CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not distinguished.
 #: Misfit up to which a profile fits: the maker's own model, and a measured effort.
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
 MAKER_LIMIT, MEASURED_LIMIT = 0.02, 0.15
-#: Misfit to the maker's own model up to which a profile is taken, and how much worse the next is.
+#: Misfit to the maker's own model up to which a profile settles the arm, and ratio to the next.
 #:
-#: UR10e logs fit their own profile to .1–.26 % and the next 30 times worse; FR3 and Panda are 2
-#: apart.
+#: UR10e logs fit their own to .1–.26 %, the next 30 times worse; FR3 and Panda are 2 apart.
 GUESSED, APART = 0.012, 5.0
 HEAVY = 5.0  #: A load from which a measured effort rather is another arm's. [kg]
 #: Torques that a model should explain, the most telling first.
@@ -37,16 +43,29 @@ MAKER, RESIDUAL, MEASURED = (
     "torque less the vendor's residual",
     "measured effort",
 )
+#: Misfit of a measured effort that no friction of a sound log makes; they stay below .12.
+#:
+#: Load and contact are left out of it.
+NO_FIT = 0.35
+DOUBTFUL = 0.15  #: Misfit from which other arms are compared.
+ANOTHER = 0.6  #: Share of the misfit that another profile may leave to be the log's own.
+GENERATION = 1.5  #: A load from which another generation of the arm is looked at first. [kg]
+MISTAKEN = 0.1  #: Misfit up to which a cause is believed where nobody said which arm it is.
+#: Share of what one sign leaves that the other may leave at most to be the right one.
+CLEARLY = 0.6
+FELT = 0.02  #: Size of the vendor's torque, relative to the effort, from which it tells its sign.
+#: Findings after which a joint's effort is no evidence.
+EFFORT = frozenset({"stuck-effort", "zero-effort", "saturation", "stuck-position"})
 
 
 @dataclass(frozen=True, kw_only=True)
 class RobotMatch:
-    """How well a profile explains a log."""
+    """Fit of a profile to a log."""
 
     robot: str  #: The profile's name.
-    misfit: float  #: What it cannot explain, relative to the torques; 0 is perfect.
+    misfit: float  #: Share of the torques that it cannot explain; 0 is perfect.
     fits: bool  #: Whether that is as good as the kind of evidence allows.
-    evidence: str  #: Which torque was explained, in words.
+    evidence: str  #: The torque that was explained, in words.
     load: float  #: Mass of the unknown load that was fitted, 0 if none. [kg]
     #: Whether the maker's own model was explained rather than a measured effort.
     by_maker: bool = False
@@ -55,6 +74,13 @@ class RobotMatch:
         """The fit in a few words."""
         load = f" with {self.load:.2g} kg on the flange" if self.load else ""
         return f"{self.robot} {100 * self.misfit:.3g} %{load} ({self.evidence})"
+
+
+class ArmFindings(NamedTuple):
+    """Findings by the model of an arm."""
+
+    findings: tuple[Remark, ...] = ()  #: The remarks.
+    robots: tuple[RobotMatch, ...] = ()  #: The arms that were compared, best fit first.
 
 
 def profiles() -> dict[str, Robot]:
@@ -67,83 +93,260 @@ def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMat
 
     A measured effort settles nothing: friction and loads leave several per cent of it open.
     """
-    fits = ranking(recording, profiles())
-    best = fits[0] if fits else None
-    if best is None or not best.by_maker or best.misfit > GUESSED:
+    fits = ranking(recording, profiles().values())
+    if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
         return None, fits
-    if len(fits) > 1 and fits[1].misfit < APART * best.misfit:
-        return None, fits
-    return best, fits
+    apart = len(fits) < 2 or fits[1].misfit >= APART * fits[0].misfit
+    return fits[0] if apart else None, fits
 
 
-def ranking(recording: Recording, robots: Mapping[str, Robot]) -> tuple[RobotMatch, ...]:
+def ranking(recording: Recording, robots: Iterable[Robot]) -> tuple[RobotMatch, ...]:
     """Robots with as many joints as the log, best fit first."""
     if not is_judgeable(recording):
         return ()
     fits = []
-    for name, robot in robots.items():
+    for robot in robots:
         with suppress(RobotError):  # joints of other names are another arm's
-            log = paired(recording, robot)
-            if log.joints == robot.joints and (fit := match_of(log, name, robot)):
-                fits.append(fit)
-    fits.sort(key=lambda fit: (not fit.fits, fit.misfit))
+            fits.append(match_of(paired(recording, robot), robot))
+    found = sorted(filter(None, fits), key=by_fit)
     return tuple(
-        replace(fit, fits=fit.fits and fit.misfit <= CLOSE * fits[0].misfit) for fit in fits
+        replace(fit, fits=fit.fits and fit.misfit <= CLOSE * found[0].misfit) for fit in found
     )
+
+
+def by_fit(match: RobotMatch) -> tuple[bool, float]:
+    """Key by which matches are sorted, the best first."""
+    return not match.fits, match.misfit
 
 
 def is_judgeable(recording: Recording) -> bool:
-    """Whether a log is long enough, and its numbers those of an arm, to be held against a model."""
-    if recording.dq is None or recording.samples < 10:
+    """Whether a log is long enough, and its numbers are those of an arm."""
+    if recording.dq is None or recording.samples < 10 or not 1e-2 < recording.duration < 1e9:
         return False
-    span = recording.duration
     effort = [x for name in EFFORTS if (x := getattr(recording, name)) is not None]
-    return bool(
-        1e-2 < span < 1e9
-        and np.abs(recording.q).max() < 1e4
-        and np.abs(recording.dq).max() < 1e4
-        and all(1e-9 < np.abs(x).max() < 1e9 for x in effort)
-    )
+    motion = max(np.abs(recording.q).max(), np.abs(recording.dq).max())
+    return bool(motion < 1e4 and all(1e-9 < np.abs(x).max() < 1e9 for x in effort))
 
 
-def match_of(recording: Recording, name: str, robot: Robot) -> RobotMatch | None:
-    """A robot's fit to the most telling torque of the log, or None without any."""
+def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
+    """A robot's fit to the most telling torque of the log, None without any or of other joints.
+
+    Args:
+        recording: The log.
+        robot: The robot.
+        ignored: Joints, from zero, with an effort that is no evidence.
+    """
+    if recording.joints != robot.joints:
+        return None
     windows = windows_of(recording, robot)
-    case = maker_case(recording, windows)
+    evidence, case = maker_case(recording, windows)
     by_maker = case is not None
+    case = case or case_of(recording, robot, windows, ignored)
     if case is None:
-        case = case_of(recording, robot, windows)
-    return None if case is None else match(name, case, by_maker=by_maker)
-
-
-def match(name: str, case: Case, *, by_maker: bool = False) -> RobotMatch:
-    """What a case says of its robot."""
+        return None
     load = float(case.loaded.values[0]) if case.carries_load else 0.0
-    fits = case.misfit < (MAKER_LIMIT if by_maker else MEASURED_LIMIT)
-    measured = RESIDUAL if by_maker and case.rubs else MEASURED
+    light = by_maker or load < HEAVY
     return RobotMatch(
-        robot=name,
+        robot=robot.name,
         misfit=case.misfit,
-        fits=fits and (by_maker or load < HEAVY),
-        evidence=measured if case.rubs else MAKER,
+        fits=light and case.misfit < (MAKER_LIMIT if by_maker else MEASURED_LIMIT),
+        evidence=evidence,
         load=load,
         by_maker=by_maker,
     )
 
 
-def maker_case(recording: Recording, windows: Windows) -> Case | None:
-    """The maker's own model of the arm as a log holds it, None where it does not."""
+def maker_case(recording: Recording, windows: Windows) -> tuple[str, Case | None]:
+    """The maker's own model of the arm as a log holds it, and its evidence; None where it does not.
+
+    A rigid-body model has no friction; torque less the residual has that before the sensor.
+    """
     target, torque, vendor = recording.target_torque, recording.torque, recording.tau_ext
     if target is not None and np.any(target):
-        given, rubs = windows.mean(target), False
+        evidence, windows = MAKER, replace(windows, motion=0.0 * windows.motion)
     elif torque is not None and vendor is not None and np.any(vendor):
-        # Friction between motor and sensor is in the torque; the vendor's model has none of it.
-        given, rubs = windows.mean(torque + vendor), True
+        evidence, target = RESIDUAL, torque + vendor
     else:
-        return None
+        return MEASURED, None
+    given, unit = windows.mean(target), np.ones(recording.joints)
     size = size_of(given)
     if not 0 < size < 1e9:
-        return None
-    return Case(
-        windows=windows, given=given, size=size, constant=np.ones(recording.joints), rubs=rubs
+        return MEASURED, None
+    return evidence, Case(windows=windows, given=given, size=size, constant=unit)
+
+
+def arm_findings(
+    recording: Recording, robot: Robot | None, known: Iterable[Remark] = ()
+) -> ArmFindings:
+    """Hold a log against its arm, or against the profiles where nobody says which it is."""
+    known = tuple(known)
+    if MISTIMED & {finding.code for finding in known} and recording.dq is not None:
+        # From the positions, so that the velocity hides nothing else.
+        recording = replace(recording, dq=np.gradient(recording.q, recording.t, axis=0))
+    ignored = sorted({j - 1 for f in known if f.code in EFFORT for j in f.where.joints})
+    if robot is None and recording.robot_hint in PROFILES:
+        robot = load_robot(str(recording.robot_hint))
+    if robot is not None:
+        if robot.joints != recording.joints or not is_judgeable(recording):
+            return ArmFindings()
+        return of_known_arm(recording, robot, ignored)
+    return of_unknown_arm(recording, ignored)
+
+
+def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> ArmFindings:
+    """Findings on a log of an arm that the user knows."""
+    diagnosis, own = diagnose(recording, robot, ignored), match_of(recording, robot, ignored)
+    if diagnosis is None or own is None:
+        return ArmFindings()
+    case, cause = diagnosis.case, diagnosis.cause
+    heavy = case.carries_load and case.loaded.values[0] > GENERATION
+    refuted = cause is not None and cause.code != "effort-offset"
+    others: list[RobotMatch] = []
+    if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
+        arms = (other for name, other in profiles().items() if name != robot.name)
+        others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
+        if (
+            others
+            and is_rather(others[0], own, diagnosis)
+            and (robot.path in PROFILES.values() or is_driven_by(recording, others[0], diagnosis))
+        ):
+            best, *more = others
+            remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
+            return ArmFindings((remark,), (best, replace(own, fits=False), *more))
+    robots = (own, *(replace(other, fits=False) for other in others))
+    return ArmFindings(tuple(explained(recording, robot, diagnosis, robots)), robots)
+
+
+def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
+    """Whether a log is another profile's: nothing else explains it as well."""
+    if other.by_maker:
+        return other.misfit < GUESSED and own.misfit > APART * other.misfit
+    if diagnosis.cause is not None and diagnosis.cause.code == "drive-scale" and not other.load:
+        share = AMBIGUOUS  # a factor disguises another generation's masses as a load does
+    else:
+        share = 1 / AMBIGUOUS if own.load > other.load + GENERATION else ANOTHER
+    return other.fits and other.misfit < share * diagnosis.healed.misfit
+
+
+def is_driven_by(recording: Recording, other: RobotMatch, diagnosis: Diagnosis) -> bool:
+    """Whether another arm explains the measured effort much better too.
+
+    A user's own file may be nearer to the arm than its maker's model.
+    """
+    robot = load_robot(other.robot)
+    case = case_of(recording, robot, windows_of(recording, robot))
+    return case is not None and case.misfit < ANOTHER * diagnosis.healed.misfit
+
+
+def explained(
+    recording: Recording, robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]
+) -> Iterator[Remark]:
+    """Findings on the cause, or on none; then on the log once it is put right."""
+    healed = diagnosis.healed
+    if diagnosis.cause is None and is_modelled(healed, robot):
+        yield warning("no-friction-in-effort", robot=robot.name)
+        return
+    if diagnosis.cause is not None:
+        yield cause_remark(recording, diagnosis, diagnosis.cause)
+    elif healed.gravity_range < RANGE:
+        yield fact("effort-unchecked", range_Nm=healed.gravity_range, least_Nm=RANGE)
+        yield from declared_payload(recording, robot)
+        return
+    if healed.misfit > NO_FIT and diagnosis.cause is None:
+        yield warning(
+            "no-robot-fits",
+            robot=robot.name,
+            misfit_percent=100 * healed.misfit,
+            ranked="; ".join(str(found) for found in robots),
+        )
+        return
+    if (other := diagnosis.unclear) is not None:
+        yield warning(
+            "effort-unclear",
+            other=other.code,
+            misfit_percent=100 * diagnosis.case.misfit,
+            other_percent=100 * other.case.misfit,
+        )
+    yield from declared_payload(recording, robot)
+    yield from load_remarks(recording, robot, healed)
+    yield from vendor_sign(recording, healed)
+
+
+def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
+    """Findings on a log of an unknown arm: by the profile that fits, or why none does."""
+    robots = profiles()
+    fits = ranking(recording, robots.values())
+    if not fits:
+        counts = sorted({robot.joints for robot in robots.values()})
+        if recording.joints in counts:
+            return ArmFindings()
+        return ArmFindings((warning("no-profile", joint_count=recording.joints, counts=counts),))
+    # A maker's own model that fits no profile is of another arm.
+    tried = fits[:1] if fits[0].fits else [fit for fit in fits if not fit.by_maker]
+    found = []
+    for robot in (robots[fit.robot] for fit in tried):
+        diagnosis = diagnose(recording, robot, ignored)
+        if diagnosis is not None and (fits[0].fits or is_mistaken(diagnosis)):
+            found.append((diagnosis.healed.misfit, robot, diagnosis))
+    if found:
+        _, robot, diagnosis = min(found, key=lambda one: one[0])
+        return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
+    if fits[0].fits:
+        return ArmFindings(robots=fits)
+    still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
+    code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
+    # Without an arm the work of its effort is all that tells its sign.
+    remark = warning(code, ranked="; ".join(map(str, fits)))
+    return ArmFindings((*inverted_effort(recording), remark), fits)
+
+
+def is_mistaken(diagnosis: Diagnosis) -> bool:
+    """Whether a cause explains a log so well that its arm is believed, which nobody named."""
+    return diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
+
+
+def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:
+    """The finding on the cause that explains a log."""
+    if cause.code == "milliamperes":
+        typical = float(np.percentile(np.abs(recording.require("current")), 99))
+        return warning(cause.code, typical_A=typical)
+    rival = diagnosis.rival
+    joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
+    by_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
+    return warning(
+        cause.code,
+        on_joints(cause.joints),
+        misfit_percent=100 * diagnosis.case.misfit,
+        healed_percent=100 * cause.misfit,
+        rival=" ".join([rival.code, *joints]) if rival is not None else "nothing else",
+        signal="current" if by_current else "torque",
+        column="current" if by_current else "tau",
+        width=recording.joints,
+        **cause.values,
     )
+
+
+def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
+    """That the vendor's torque fits the arm's only with its sign turned.
+
+    Moving the arm takes the effort plus the torque ON the robot.
+    """
+    if recording.tau_ext is None or recording.torque is None:
+        return
+    vendor = case.windows.mean(recording.tau_ext)
+    # A load that the vendor's model knows and the robot file does not is in neither of them.
+    vendor = vendor - np.median(vendor, axis=0)
+    if size_of(vendor) < FELT * case.size:
+        return
+    # What the arm leaves over in all windows, contact among them.
+    straight, turned = (
+        size_of(replace(case, given=given).best.rest)
+        for given in (case.given + vendor, case.given - vendor)
+    )
+    if turned < CLEARLY * straight:
+        yield warning(
+            "vendor-sign",
+            straight_Nm=straight,
+            turned_Nm=turned,
+            width=recording.joints,
+        )

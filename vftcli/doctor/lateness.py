@@ -6,20 +6,20 @@ a few numbers a joint: the model's own torque, dry and viscous friction, and rot
     ∫φ τ(t + lag) = c₁ ∫(−φ' p − φ (Cᵀq̇ − g)) + c₂ ∫φ tanh(q̇/ε) + c₃ ∫φ q̇ − c₄ ∫φ' q̇.
 
 The differences of neighbouring windows are fitted at every lag, joint by joint: they leave out what
-changes slowly, an offset, a load and most of a contact. A turn of the motion, where dry friction
-jumps and inertia is large, tells the lag; a wrong mass or drive constant shifts nothing.
+changes slowly, as a load does. Turns of the motion show the lag.
 """
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.doctor.findings import on_joints
+from vftcli.doctor.signals import effort_of
+from vftcli.doctor.windows import spread, trapezoids
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.rest import MOVES
@@ -36,15 +36,14 @@ KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be
 #: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
 COARSE = 3  #: One in so many lags tells whether any growth is worth a closer look.
-LONG = 60.0  #: What is looked at of a long log: a clock that is .5 % off loses 300 ms in it. [s]
-#: How much better a lag that grows explains the joints than a steady one; 1.00 on sound logs.
+LONG = 60.0  #: Part of a long log that is looked at: a clock .5 % off loses 300 ms in it. [s]
+#: Ratio of rests by which a lag that grows beats a steady one; 1.00 on sound logs.
 STEADY = 1.1
-LEAST_RATE = 30.0  #: Sample rate below which no lag of that size can be told. [Hz]
-#: Lag that is told. Friction that builds up behind a turn looks like 20 ms on real logs, and a
-#: simulation whose torque belongs to the step before like 30. [s]
+LEAST_RATE = 30.0  #: Sample rate below which no lag of that size shows. [Hz]
+#: Lag that is named: friction behind a turn looks like 20 ms, simulations like 30. [s]
 LATE = 0.035
-BETTER = 1.45  #: How much better a lag explains the joints, in the mean.
-#: Share and number of the joints whose own best lag is nearer to it than this share of it; half of
+BETTER = 1.45  #: Ratio of rests by which a lag beats none, in the mean over joints.
+#: Share and number of the joints with a best lag nearer to it than this share of it; half of
 #: the arm's have to tell one.
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
 #: Findings that the logged velocity is another motion's.
@@ -66,25 +65,28 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
     known = np.flatnonzero(np.isfinite(rest[:, 0]) & (rest.min(axis=1) > 0))
     if known.size < max(ENOUGH, 0.5 * recording.joints):
         return
-    together = np.log(rest[known]).mean(axis=0)
-    best, none = int(np.argmin(together)), int(np.argmin(np.abs(lags)))
-    start, short = float(recording.t[0]), recording.duration <= LONG
-    begin = late if short else lateness_of(recording.between(start, start + LONG), robot)
+    rest = rest[known]
+    together = np.log(rest).mean(axis=0)
+    begin: Lateness | None = late
+    if recording.duration > LONG:
+        begin = lateness_of(recording.between(recording.t[0], recording.t[0] + LONG), robot)
     if begin is not None and (found := begin.drift(known)) is not None:
         yield found
         return
-    lag, better = float(lags[best]), float(np.exp(together[none] - together[best]))
-    own = lags[np.argmin(rest[known], axis=1)]
-    alike = np.abs(own - lag) < max(NEAR * abs(lag), 1.5 * STEP)
-    if abs(lag) > LATE and better > BETTER and is_agreed(alike):
+    best = int(np.argmin(together))
+    lag = float(lags[best])
+    better = float(np.exp(together[np.argmin(np.abs(lags))] - together[best]))
+    alike = agreed(lags[np.argmin(rest, axis=1)], lag, STEP)
+    if abs(lag) > LATE and better > BETTER and alike.any():
         order = "later" if lag > 0 else "earlier"
-        joints = on_joints(known[alike])
-        yield warning("effort-lag", joints, lag_ms=1e3 * abs(lag), order=order, ratio=better)
+        values = {"lag_ms": 1e3 * abs(lag), "order": order, "ratio": better}
+        yield warning("effort-lag", on_joints(known[alike]), **values)
 
 
-def is_agreed(alike: Mask) -> bool:
-    """Whether enough joints agree on a lag. (K,)"""
-    return bool(alike.sum() >= ENOUGH and np.mean(alike) >= AGREE)
+def agreed(own: Array, best: float, step: float) -> Mask:
+    """Joints near to the best of all by steps of the trial; none if they are few. (K,)"""
+    near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
+    return np.asarray(near & (near.sum() >= ENOUGH) & (np.mean(near) >= AGREE))
 
 
 class Lateness(NamedTuple):
@@ -92,31 +94,28 @@ class Lateness(NamedTuple):
 
     lags: Array  #: Lags that are tried. (L,) [s]
     step: float  #: Sample time. [s]
-    starts: NDArray[np.intp]  #: First samples of the two windows of each pair. (W, 2)
+    starts: Indices  #: First samples of the two windows of each pair. (2, W)
     when: Array  #: When each pair is, from the log's first moment. (W,) [s]
-    model: Array  #: What the change of a joint's torque is made of. (W, n, 4)
+    model: Array  #: Parts of the change of a joint's torque. (W, n, 4)
     moves: Mask  #: Pairs in which a joint moves. (W, n)
     effort: Array  #: Means of the effort over the window that begins at each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
-        """What the model leaves of each joint's effort at every lag; NaN at rest. (n, L)
+        """Rest of each joint's effort beside the model at every lag; NaN at rest. (n, L)
 
         Args:
             rate: By how much the lag grows, from these lags at the log's first moment. [s/s]
         """
         tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(int)
-        first, second = (
-            np.clip(self.starts[:, k] + tried, 0, len(self.effort) - 1) for k in (0, 1)
-        )
-        change = self.effort[second] - self.effort[first]
+        rows = np.clip(self.starts[:, None] + tried, 0, len(self.effort) - 1)
+        change = self.effort[rows[1]] - self.effort[rows[0]]
         rest = np.full((self.effort.shape[1], len(self.lags)), np.nan)
-        for j in range(len(rest)):
-            moves = self.moves[:, j]
+        for j, moves in enumerate(self.moves.T):
             if moves.sum() >= LEAST:
                 rest[j] = rest_of(self.model[moves, j], change[:, moves, j].T)
         return rest
 
-    def drift(self, known: NDArray[np.intp]) -> Remark | None:
+    def drift(self, known: Indices) -> Remark | None:
         """The finding that the effort's lag grows along the log, None if it does not."""
         span = float(self.when[-1])
         coarse = self._replace(lags=self.lags[::COARSE])
@@ -124,17 +123,17 @@ class Lateness(NamedTuple):
         rough = [float(np.log(coarse.rest(g / span)[known]).mean(axis=0).min()) for g in tried]
         if not np.isfinite(rough).all() or rough[0] == min(rough):
             return None
-        rests = {g: self.rest(g / span)[known] for size in (0.0, *DRIFTS) for g in (size, -size)}
-        left = {grown: np.log(rest).mean(axis=0) for grown, rest in rests.items()}
-        grown = min(left, key=lambda g: float(left[g].min()))
-        least, none = left[grown].min(), left[0.0][np.argmin(np.abs(self.lags))]
-        each = np.array(list(rests))
-        own = each[np.argmin([rest.min(axis=1) for rest in rests.values()], axis=0)]
-        alike = np.abs(own - grown) < max(NEAR * abs(grown), 1.5 * DRIFTS[0])
-        steadily = np.exp(left[0.0].min() - least)
-        if min(steadily / STEADY, np.exp(none - least) / BETTER) < 1 or not is_agreed(alike):
+        each = np.array([g for size in (0.0, *DRIFTS) for g in dict.fromkeys((size, -size))])
+        rests = np.stack([self.rest(g / span)[known] for g in each])
+        left = np.log(rests).mean(axis=1)
+        best = int(np.argmin(left.min(axis=1)))
+        grown, least = float(each[best]), left[best].min()
+        alike = agreed(each[np.argmin(rests.min(axis=2), axis=0)], grown, DRIFTS[0])
+        better = np.exp(left[0, np.argmin(np.abs(self.lags))] - least)
+        steadily = np.exp(left[0].min() - least)
+        if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
-        first = float(self.lags[np.argmin(left[grown])])
+        first = float(self.lags[np.argmin(left[best])])
         return warning(
             "effort-drift",
             on_joints(known[alike]),
@@ -143,13 +142,13 @@ class Lateness(NamedTuple):
             first_ms=1e3 * first,
             last_ms=1e3 * (first + grown),
             span_s=span,
-            ratio=float(np.exp(none - least)),
+            ratio=float(better),
         )
 
 
 def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
-    """What a log tells of how late its effort is, None where that is nothing."""
-    effort = recording.torque if recording.torque is not None else recording.current
+    """Windows of a log that show how late its effort is, None where none do."""
+    effort = effort_of(recording)
     if effort is None or recording.dq is None or recording.samples < LEAST:
         return None
     t, step = recording.t, recording.median_step
@@ -161,86 +160,49 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
     if len(starts) < LEAST:
         return None
     rows = starts[:, None] + np.linspace(0, length, min(length, INSIDE) + 1).round().astype(int)
-    model, speed = model_columns(recording, robot, rows)
-    pairs = np.diff(starts) <= length // 2
-    return Lateness(
-        lags=lags * step,
-        step=step,
-        starts=np.stack([starts[:-1], starts[1:]], axis=1)[pairs],
-        when=(t[starts[:-1]] - t[0])[pairs],
-        model=np.diff(model, axis=0)[pairs],
-        moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
-        effort=by_hann(effort, length),
-    )
-
-
-def by_hann(x: Array, length: int) -> Array:
-    """Means of columns over every window of so many steps, by Hann's weights. (T - length, n)
-
-    By Fourier transform: a window of a fast log has a hundred samples and more.
-    """
-    weight = (1 - np.cos(2 * np.pi * np.arange(length + 1) / length)) / length
-    size = 1 << (len(x) + length).bit_length()
-    product = np.fft.rfft(np.ascontiguousarray(x.T), size) * np.fft.rfft(weight, size)
-    mean: Array = np.fft.irfft(product, size)[:, length : len(x)].T
-    return mean
-
-
-def window_starts(t: Array, length: int, earliest: int, latest: int) -> NDArray[np.intp]:
-    """First samples of windows that lie on an even clock at every lag. (W,)
-
-    Args:
-        t: Clock. (T,) [s]
-        length: Steps of a window.
-        earliest: The first lag, negative. [samples]
-        latest: The last lag. [samples]
-    """
-    starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
-    if len(starts) > WINDOWS:
-        blocks = np.linspace(0, len(starts) - BLOCK, WINDOWS // BLOCK).astype(int)
-        starts = starts[np.unique(blocks[:, None] + np.arange(BLOCK))]
-    whole = t[starts + length + latest] - t[starts + earliest]
-    usual = (length + latest - earliest) * median_step(t)
-    found: NDArray[np.intp] = starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
-    return found
-
-
-def model_columns(
-    recording: Recording, robot: Robot, rows: NDArray[np.intp]
-) -> tuple[Array, Array]:
-    """What a joint's torque is made of, window by window, and its rms speed. (W, n, 4), (W, n)
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        rows: Samples of each window at which the model is computed. (W, I)
-    """
-    times = recording.t[rows]
+    times, dq = t[rows], recording.dq[rows]
     since, span = times - times[:, :1], times[:, -1:] - times[:, :1]
-    steps = np.diff(times, axis=1) / span
-    shares = np.zeros_like(times)
-    shares[:, 1:] += steps / 2
-    shares[:, :-1] += steps / 2
-    turn = 2 * np.pi / span
+    turn, shares = 2 * np.pi / span, trapezoids(times)
     weight, slope = (1 - np.cos(turn * since)) * shares, turn * np.sin(turn * since) * shares
-    dq = recording.require("dq")[rows]
-    terms = momentum_terms(
-        robot.loaded_chain, recording.q[rows.ravel()], dq.reshape(-1, recording.joints)
-    )
-    momentum = terms.p.reshape(dq.shape)
+    joints = recording.q[rows.ravel()], dq.reshape(-1, recording.joints)
+    terms = momentum_terms(robot.loaded_chain, *joints)
     rate = (terms.coriolis_transpose_dq - terms.gravity).reshape(dq.shape)
 
     def mean(by: Array, of: Array) -> Array:
         return np.asarray((by[:, None] @ of)[:, 0])
 
-    rigid = -mean(slope, momentum) - mean(weight, rate)
+    rigid = -mean(slope, terms.p.reshape(dq.shape)) - mean(weight, rate)
     columns = (rigid, mean(weight, np.tanh(dq / SLOW)), mean(weight, dq), -mean(slope, dq))
     speed = np.sqrt(mean(weight, dq**2))
-    return np.stack(columns, axis=2), speed
+    pairs = np.diff(starts) <= length // 2
+    hann = (1 - np.cos(2 * np.pi * np.arange(length + 1) / length)) / length
+    return Lateness(
+        lags=lags * step,
+        step=step,
+        starts=np.stack([starts[:-1], starts[1:]])[:, pairs],
+        when=(t[starts[:-1]] - t[0])[pairs],
+        model=np.diff(np.stack(columns, axis=2), axis=0)[pairs],
+        moves=(np.maximum(speed[1:], speed[:-1]) > MOVES)[pairs],
+        effort=np.stack([np.convolve(column, hann, "valid") for column in effort[1].T], axis=1),
+    )
+
+
+def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
+    """First samples of windows that lie on an even clock at every lag. (W,)
+
+    The clock is t (T,) [s]; a window has so many steps, lags go from one number of samples, which
+    is negative, to another.
+    """
+    starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
+    starts = starts[spread(len(starts), WINDOWS, BLOCK)]
+    whole = t[starts + length + latest] - t[starts + earliest]
+    usual = (length + latest - earliest) * median_step(t)
+    found: Indices = starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
+    return found
 
 
 def rest_of(model: Array, effort: Array) -> Array:
-    """What a model leaves of an effort at every lag, rms over the better of its samples. (L,)
+    """Rest of an effort beside a model at every lag, rms over its better samples. (L,)
 
     Args:
         model: What the effort is made of. (W, 4)
@@ -249,7 +211,6 @@ def rest_of(model: Array, effort: Array) -> Array:
     size = np.sqrt(np.mean(model**2, axis=0))
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), dtype=bool)
-    rest = np.zeros_like(effort)
     for _ in range(2):
         solution = np.linalg.lstsq(columns[keep], effort[keep], rcond=1e-8)[0]
         rest = (effort - columns @ solution) ** 2

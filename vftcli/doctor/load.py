@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor.case import Case
-from vftcli.doctor.effort import RANGE
+from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.robust import RobustFit, solve
+from vftcli.doctor.windows import RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
@@ -23,7 +23,7 @@ USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives 
 #: [N·m/A]
 JOINT_CONSTANTS = np.array([3.571, 7.7, 9.839, 10.763, 11.976, 4.545, 9.312, 12.625, 13.13, 15.756])
 SAME = 0.02  #: Constants of one joint size scatter by this much from firmware to firmware.
-#: A load from which it is worth telling, as a hand or gripper is; and one that nobody overlooks.
+#: Load that is worth a remark, as a hand is; and one that nobody overlooks.
 #:
 #: Drive constants that are 3 % off look like .3 kg on a UR10e; hands weigh .5–1.1 kg. [kg]
 HAND, LOAD = 0.4, 1.2
@@ -31,36 +31,36 @@ SURE = 4.0  #: Standard deviations that a load has to be.
 EXPLAINED, PARTLY = 0.5, 0.8  #: Share of the misfit that such loads may leave.
 #: Share of the misfit that a load which changes may leave, and by how much it must [-, kg].
 #:
-#: Sound logs leave .7 and more, pushes of some seconds among them; 1.5 kg picked up half-way .2–.6.
+#: Sound logs leave .7 and more; 1.5 kg picked up half-way .2–.6.
 CHANGED, CHANGE = 0.6, 0.7
-#: Share that a change in the middle must leave for others to be tried, and between which shares of
-#: the log: what lasts for less than a third of it may be a push.
+#: Share that a change in the middle must leave for others to be tried, and the shares of the log
+#: between which they are: pushes last less than a third.
 HALVES, BETWEEN = 0.9, (1 / 3, 2 / 3)
 DECLARED = 0.1  #: A declared payload, or a difference from the mounted one, that is none. [kg]
-#: Relative difference between the log's own drive constants and the profile's that is reported.
+#: Relative difference between the log's drive constants and the profile's in a finding.
 RATIO = 0.05
 
 
-def drive_constants(recording: Recording) -> Array | None:
+def drive_constants(recording: Recording) -> Array:
     """The controller's own torque per current, target_torque over target_current. (n,) [N·m/A]
 
     The controller adds friction to its current while it moves, so only resting samples count; NaN
-    where they carry too little current. None if the log lacks either.
+    where they carry too little current, or where the log lacks either.
     """
     current, torque = recording.target_current, recording.target_torque
-    if current is None or torque is None:
-        return None
-    rest = resting(recording)
     constants = np.full(recording.joints, np.nan)
+    if current is None or torque is None:
+        return constants
+    rest = resting(recording)
     for j in range(recording.joints):
         use = rest & (np.abs(current[:, j]) > 0.02)
         if use.sum() >= 10:
             i, tau = current[use, j], torque[use, j]
             # Through the origin: no current, no torque.
-            slope = float(i @ tau / (i @ i))
-            size = max(float(np.std(tau)), float(np.abs(tau).mean()))
+            slope = i @ tau / (i @ i)
             # A joint that carries nothing has a target of zero and shows no constant.
-            constants[j] = slope if float(np.std(tau - slope * i)) < 0.05 * size else np.nan
+            if np.std(tau - slope * i) < 0.05 * max(np.std(tau), np.abs(tau).mean()):
+                constants[j] = slope
     return constants
 
 
@@ -78,7 +78,8 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
         yield changed
         return
     mass, sd = float(case.loaded.values[0]), float(case.loaded.sd[0])
-    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded):
+    carried = case.windows.load.columns @ case.loaded.values[:4]
+    if not case.carries_load or mass < max(HAND, SURE * sd) or not case.lasts(case.loaded, carried):
         return
     missing = missing_payload(recording, robot)
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
@@ -99,7 +100,7 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
 
 def load_change(case: Case) -> Remark | None:
     """The finding that a load is picked up or set down along the log, None without one."""
-    count, gravity = len(case.given), case.windows.gravity @ case.up
+    count = len(case.given)
     if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
         return None
     tried = {int(k): with_two_loads(case, int(k)) for k in np.linspace(*BETWEEN, 7) * count}
@@ -108,7 +109,7 @@ def load_change(case: Case) -> Remark | None:
     before, after = fit.values[0], fit.values[4]
     sd = float(np.hypot(fit.sd[0], fit.sd[4]))
     # In one pose any residual passes for a load.
-    varied = min(np.ptp(part, axis=0).max() for part in (gravity[:split], gravity[split:]))
+    varied = min(np.ptp(part, axis=0).max() for part in np.split(case.gravity, [split]))
     if fit.size > CHANGED * case.loaded.size or varied < RANGE:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
@@ -123,11 +124,11 @@ def load_change(case: Case) -> Remark | None:
 
 
 def with_two_loads(case: Case, split: int) -> RobustFit:
-    """What friction, a load before a window and another from it on leave over."""
-    load, late = case.windows.load, np.arange(len(case.given)) >= split
-    parts = [load._replace(columns=load.columns * mask[:, None, None]) for mask in (~late, late)]
-    both = parts[0].beside(parts[1])
-    return solve(case.given - case.needed, both.beside(case.friction))
+    """Fit by friction, a load before a window and another from it on."""
+    load, late = case.windows.load, (np.arange(len(case.given)) >= split)[:, None, None]
+    before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
+    by = before.beside(after).beside(case.windows.friction)
+    return solve(case.given - case.needed, by)
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
@@ -138,7 +139,7 @@ def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
 
 
 def missing_payload(recording: Recording, robot: Robot) -> float:
-    """How much more the log declares than the robot carries, 0 where it declares nothing. [kg]"""
+    """Payload declared beyond the mounted one, 0 where the log declares none. [kg]"""
     declared = recording.payload_mass or 0.0
     missing = declared - (0.0 if robot.payload is None else robot.payload.mass)
     slight = declared < DECLARED or abs(missing) < max(DECLARED, 0.1 * declared)
@@ -146,10 +147,10 @@ def missing_payload(recording: Recording, robot: Robot) -> float:
 
 
 def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[Remark]:
-    """Payload mismatch at rest, and the controller's drive constants against the robot file's."""
+    """Payload mismatch at rest; drive constants of controller and robot file."""
     constants = drive_constants(recording)
     yield from payload_mismatch(recording, constants)
-    if robot is None or robot.torque_constant is None or constants is None:
+    if robot is None or robot.torque_constant is None:
         return
     profile = np.asarray(robot.torque_constant)
     ratio = constants / profile - 1
@@ -167,27 +168,23 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
         )
 
 
-def payload_mismatch(recording: Recording, constants: Array | None) -> Iterator[Remark]:
+def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]:
     """Drives that carry another current at rest than the controller expects.
 
-    Args:
-        recording: The log.
-        constants: Its own drive constants, NaN where not known. (n,) [N·m/A]
+    The log's own drive constants are NaN where they are not known. (n,) [N·m/A]
     """
     rest = resting(recording)
     current, expected = recording.current, recording.target_current
     if current is None or expected is None or rest.sum() < 20:
         return
     carried, wanted = np.mean(current[rest], axis=0), np.mean(expected[rest], axis=0)
-    known = constants if constants is not None else np.full(recording.joints, np.nan)
-    torque = (carried - wanted) * np.where(np.isfinite(known), known, USUAL_CONSTANT)
+    torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
     # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint tell.
     heavy = np.flatnonzero(np.abs(torque[1:4]) > MISMATCH) + 1
     if heavy.size < 2:
         return
-    untold = recording.payload_mass is None
     yield warning(
-        "payload-mismatch-untold" if untold else "payload-mismatch",
+        "payload-mismatch" if recording.payload_mass is not None else "payload-mismatch-untold",
         on_joints(heavy),
         carried_A=carried[heavy].tolist(),
         expected_A=wanted[heavy].tolist(),

@@ -1,7 +1,6 @@
-"""Findings about the signals: what is missing, units and signs; and those of their own files."""
+"""Findings about the signals: missing ones, units and signs."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -14,20 +13,17 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.rest import NONZERO
 
-TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
 #: Net share of work from which a joint's effort counts as inverted.
 #:
-#: Joints hand energy to one another through gravity, so a single joint may well give some back.
+#: Through gravity joints hand energy to one another.
 STRONG = -0.4
-ALONE = -0.85  #: The same for a joint whose neighbours' effort is sound.
+ALONE = -0.85  #: `STRONG` for a joint among sound neighbours.
 ABSURD, FARTHEST = 1e9, 1e18  #: No measurement is this large, in whatever unit, and no time. [-, s]
 #: Sample times between which every recorder's lies, read in whatever unit. [s]
 STEPS = (1e-13, 1e10)
 SOME = 5000  #: Samples that tell how large a signal usually is.
-#: Share of the samples at which a signal runs straight on, from which it is interpolated; change of
-#: its slope that is none, relative to it; and share of values that have to change to judge by.
-#:
-#: No measured effort runs straight: its noise bends it at nearly every sample.
+#: Share of the samples at which an interpolated signal runs straight on; change of slope that
+#: is none, relative to it; and share of values that have to change.
 STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
 #: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
@@ -35,7 +31,7 @@ LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA 
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
-    """What leaves nothing else to be examined: numbers that no clock and no robot gives."""
+    """Numbers that no clock and no robot gives: nothing else is examined then."""
     t = recording.t
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)
@@ -80,36 +76,24 @@ def interpolated(recording: Recording) -> Iterator[Remark]:
         return
     middle = slice(max(0, (recording.samples - SOME) // 2), (recording.samples + SOME) // 2)
     t = recording.t[middle]
-    bends = [bends_of(t, value[middle]) for value in (recording.q, effort[1])]
-    if min(bend.straight for bend in bends) < STRAIGHT:
-        return
-    knots = t[1:-1][bends[1].rows]
-    if len(knots) > 2:
-        yield warning(
-            "interpolated",
-            rate_Hz=1 / float(np.median(np.diff(knots))),
-            logged_Hz=1 / recording.median_step,
-        )
+    shares, bends = zip(*(bends_of(t, x[middle]) for x in (recording.q, effort[1])), strict=True)
+    knots = t[1:-1][bends[1]]
+    if min(shares) >= STRAIGHT and len(knots) > 2:
+        rate = 1 / float(np.median(np.diff(knots)))
+        yield warning("interpolated", rate_Hz=rate, logged_Hz=1 / recording.median_step)
 
 
-class Bends(NamedTuple):
-    """Where a signal's columns bend."""
+def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
+    """Share of a signal's samples (T, n) in straight motion, and where any bends.
 
-    #: Share of the samples at which moving columns do not; 0 where hardly one moves.
-    straight: float
-    #: Whether any column bends at a sample, from the second to the last but one. (T - 2,)
-    rows: Mask
-
-
-def bends_of(t: Array, value: Array) -> Bends:
-    """Where a signal's columns bend. (T, n)"""
+    The share is 0 where hardly one moves; the samples are those from the second to the last but
+    one. (T - 2,)
+    """
     slope = np.diff(value, axis=0) / np.diff(t)[:, None]
-    size = np.abs(slope[1:]) + np.abs(slope[:-1])
-    bent = np.abs(np.diff(slope, axis=0)) > BEND * size
+    bent = np.abs(np.diff(slope, axis=0)) > BEND * (np.abs(slope[1:]) + np.abs(slope[:-1]))
     moves = (slope[1:] != 0) & (slope[:-1] != 0)
     enough = moves.sum() > MOVED * moves.size
-    straight = float(np.mean(~bent[moves])) if enough else 0.0
-    return Bends(straight, np.asarray((bent & moves).any(axis=1)))
+    return float(np.mean(~bent[moves])) if enough else 0.0, (bent & moves).any(axis=1)
 
 
 def work_shares(recording: Recording, effort: Array) -> Array:
@@ -132,47 +116,35 @@ def work_shares(recording: Recording, effort: Array) -> Array:
 
 
 def effort_of(recording: Recording) -> tuple[str, Array] | None:
-    """The log's effort and its name."""
+    """Name and values of the log's effort: torque before current."""
     for name in ("torque", "current"):
         if (value := getattr(recording, name)) is not None:
             return name, value
     return None
 
 
-def inverted_joints(recording: Recording) -> tuple[list[int], int]:
-    """Joints whose effort opposes friction, and how many joints could be judged."""
-    if (effort := effort_of(recording)) is None:
-        return [], 0
-    shares = work_shares(recording, effort[1])
-    judged = np.flatnonzero(np.isfinite(shares))
-    found = [int(j) for j in judged if shares[j] < STRONG]
-    if not is_most(len(found), judged.size):  # a few joints only: nearly all their work
-        found = [j for j in found if shares[j] < ALONE]
-    return found, int(judged.size)
-
-
-def is_most(count: int, judged: int) -> bool:
-    """Whether so many joints are most of those that could be judged, and not one by chance."""
-    return count >= max(2, round(0.6 * judged))
-
-
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
-    """Effort that takes energy out of a moving arm: friction only takes, so its sign is turned."""
-    found, judged = inverted_joints(recording)
+    """Effort of a turned sign: it takes energy out of a moving arm as friction does."""
     effort = effort_of(recording)
-    if not found or effort is None or recording.dq is None:
+    if effort is None or recording.dq is None:
         return
     name, value = effort
-    is_current = name == "current"
+    shares = work_shares(recording, value)
+    (found,) = np.nonzero(shares < STRONG)
+    most = found.size >= max(2, round(0.6 * np.isfinite(shares).sum()))
+    if not most:  # a few joints only: nearly all their work
+        (found,) = np.nonzero(shares < ALONE)
+    if not found.size:
+        return
     forward = recording.dq[:, found[0]] > NONZERO
     yield warning(
-        "effort-sign-by-work" if is_most(len(found), judged) else "effort-sign-of-some",
+        "effort-sign-by-work" if most else "effort-sign-of-some",
         on_joints(found),
         signal=name,
-        shares_percent=(100 * work_shares(recording, value)[found]).tolist(),
+        shares_percent=(100 * shares[found]).tolist(),
         mean=float(np.mean(value[forward, found[0]])) if forward.any() else float("nan"),
-        unit="A" if is_current else "N·m",
-        first=found[0] + 1,
-        column="current" if is_current else "tau",
+        unit="A" if name == "current" else "N·m",
+        first=int(found[0]) + 1,
+        column="current" if name == "current" else "tau",
         width=recording.joints,
     )

@@ -1,37 +1,112 @@
-"""What a robot's model says of a log, over short windows: the torque that moving and holding need.
+"""The torque that a robot's model needs over short windows of a log, and least squares over them.
 
 Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since ṗ = Cᵀq̇ − g + τ, and no
-acceleration has to be differentiated. Gravity stands apart, as a matrix times the direction that
-is up, so that its direction can be fitted: a base that is tilted, an arm that hangs, an effort from
-which gravity was taken off.
+acceleration has to be differentiated. Gravity is kept apart, as a matrix times the direction that
+is up, so that its direction can be fitted.
+
+Least squares set contact aside, with terms that cannot be negative. A round of trimming
+only adds up the normal equations of the windows that are kept.
 """
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.doctor.robust import Terms, terms
 from vftcli.robots import Robot
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.kinematics import LinkPoses, link_poses
 from vftcli.robots.regressor import load_regressor
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.least_squares import inverse_of
 from vftcli.signals.recording import Recording
 
-IntArray = NDArray[np.intp]
-
-WINDOW = 0.3
-WINDOWS = 200  #: Length of a window [s], and how many are looked at at most.
+WINDOW, WINDOWS = 0.3, 200  #: Length of a window [s], and how many are looked at at most.
 #: Instants of a window at which the model is asked: 50 ms apart nothing of it is missed.
 POINTS = 7
 GRAVITY = [0, 3, 6]  #: Those of them at which gravity is asked: between them it bends little.
 SIMPSON = np.array([1.0, 4.0, 1.0]) / 6  #: Their weights in the mean.
 SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
+FAST = 0.8  #: Mean direction of a window in which a joint moves.
 #: Mass [kg] and first moment [kg·m] that a load may well have, before the log says anything.
 LOAD = np.array([5.0, 0.5, 0.5, 0.5])
+KEPT = 0.7  #: Share of the windows that a fit is made from and judged by: the rest may be contact.
+ROUNDS = 4  #: Rounds of fitting and trimming; the kept windows no longer change by then.
+OVERLAP = 2.0  #: Windows that overlap by half count half.
+
+
+class Terms(NamedTuple):
+    """Torques that may explain another one, column by column."""
+
+    columns: Array  #: Torque per unit of each coefficient. (W, n, k)
+    positive: Mask  #: Coefficients that only make sense above zero, as friction's do. (k,)
+    prior: Array  #: Standard deviation that a coefficient has before any data; inf for none. (k,)
+
+    def beside(self, other: "Terms") -> "Terms":
+        """These terms and others."""
+        return Terms(
+            np.concatenate([self.columns, other.columns], axis=2),
+            np.append(self.positive, other.positive),
+            np.append(self.prior, other.prior),
+        )
+
+
+def terms(columns: Array, *, positive: bool = False, prior: Array | float = np.inf) -> Terms:
+    """Terms that are all alike."""
+    count = columns.shape[2]
+    return Terms(columns, np.full(count, positive), np.full(count, prior))
+
+
+class RobustFit(NamedTuple):
+    """A fit."""
+
+    values: Array  #: Coefficients. (k,)
+    sd: Array  #: Their standard deviations by the scatter of the kept windows. (k,)
+    rest: Array  #: Torque left over in all windows. (W, n) [N·m]
+    kept: Mask  #: Windows that the fit was made from. (W,)
+
+    @property
+    def size(self) -> float:
+        """Root mean square of the torque left over in the kept windows. [N·m]"""
+        return float(np.sqrt(np.mean(self.rest[self.kept] ** 2)))
+
+    @property
+    def by_joint(self) -> Array:
+        """That of each joint. (n,) [N·m]"""
+        size: Array = np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0))
+        return size
+
+
+def solve(target: Array, by: Terms) -> RobustFit:
+    """Fit of a torque by some terms, the windows that fit worst left out.
+
+    Args:
+        target: The torque. (W, n) [N·m]
+        by: The terms; their priors weigh beside a scatter of 1 N·m.
+    """
+    columns = by.columns
+    across = columns.swapaxes(1, 2)
+    gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
+    used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
+    kept = np.ones(len(target), dtype=bool)
+
+    def inverse() -> Array:
+        return inverse_of((gram[kept].sum(axis=0) + np.diag(by.prior**-2))[np.ix_(used, used)])
+
+    for _ in range(ROUNDS):
+        values = np.zeros(len(used))
+        values[used] = inverse() @ moment[kept].sum(axis=0)[used]
+        # Friction that would drive the arm is another error in disguise: it is left out.
+        wrong = by.positive & (values < 0)
+        used &= ~wrong
+        values[wrong] = 0.0
+        rest = target - columns @ values
+        left = np.einsum("wn,wn->w", rest, rest)
+        kept = left <= np.quantile(left, KEPT)
+    sd = np.zeros(len(used))
+    sd[used] = np.sqrt(np.diag(inverse()) * OVERLAP * np.mean(rest[kept] ** 2))
+    return RobustFit(values, sd, rest, kept)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,41 +115,33 @@ class Windows:
 
     recording: Recording  #: The log.
     chain: Chain  #: The arm with its payload.
-    first: IntArray  #: First sample of each window. (W,)
-    last: IntArray  #: Last sample of each window. (W,)
+    first: Indices  #: First sample of each window. (W,)
+    last: Indices  #: Last sample of each window. (W,)
     t: Array  #: Those instants. (W, K) [s]
     q: Array  #: Positions at a few instants of each window. (W, K, n) [rad]
     dq: Array  #: Velocities there. (W, K, n) [rad/s]
     motion: Array  #: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
 
-    def exchanged(self, i: int, j: int, most: int) -> "Windows":
-        """At most so many windows, all signals of two joints in them exchanged."""
-        few = spread(len(self.first), most)
+    def exchanged(self, i: int, j: int, few: Indices) -> "Windows":
+        """Some of the windows, all signals of two joints in them exchanged."""
         order = np.arange(self.q.shape[2])
         order[[i, j]] = j, i
+        q, dq, motion = self.q[few], self.dq[few], self.motion[:, few]
         return replace(
             self,
             first=self.first[few],
             last=self.last[few],
             t=self.t[few],
-            q=self.q[few][:, :, order],
-            dq=self.dq[few][:, :, order],
-            motion=self.motion[:, few][:, :, order],
+            q=q[:, :, order],
+            dq=dq[:, :, order],
+            motion=motion[:, :, order],
         )
 
-    @cached_property
-    def span(self) -> Array:
-        """Length of each window. (W, 1) [s]"""
-        return self.t[:, -1:] - self.t[:, :1]
-
-    @cached_property
-    def weights(self) -> Array:
-        """Weights of a window's instants in its mean, by trapezoids. (W, K)"""
-        steps = np.diff(self.t, axis=1)
-        weights = np.zeros(self.t.shape)
-        weights[:, :-1] += steps / 2
-        weights[:, 1:] += steps / 2
-        return np.asarray(weights / self.span)
+    @property
+    def ways(self) -> Indices:
+        """Windows in which each joint moves forth, and back. (2, n)"""
+        direction = self.motion[0]
+        return np.stack([(direction > FAST).sum(axis=0), (direction < -FAST).sum(axis=0)])
 
     @cached_property
     def inertial(self) -> Array:
@@ -82,8 +149,9 @@ class Windows:
         count, points, n = self.q.shape
         terms = momentum_terms(self.chain, self.q.reshape(-1, n), self.dq.reshape(-1, n))
         p = terms.p.reshape(count, points, n)
-        rise = (p[:, -1] - p[:, 0]) / self.span
-        return np.asarray(rise - self.average(terms.coriolis_transpose_dq))
+        rise = (p[:, -1] - p[:, 0]) / (self.t[:, -1:] - self.t[:, :1])
+        coriolis = terms.coriolis_transpose_dq.reshape(p.shape)
+        return np.asarray(rise - np.einsum("wk,wkn->wn", trapezoids(self.t), coriolis))
 
     @cached_property
     def gravity(self) -> Array:
@@ -92,31 +160,21 @@ class Windows:
         The third axis of "up" is the robot file's own.
         """
         few = self.q[:, GRAVITY]
-        held = gravity_regressor(self.chain, few.reshape(-1, self.q.shape[2]))
-        grouped = held.reshape(*few.shape[:2], *held.shape[1:])
+        held = gravity_by_up(self.chain, few.reshape(-1, few.shape[2]))
+        grouped = held.reshape(*few.shape, 3)
         return np.asarray(np.einsum("k,wk...->w...", SIMPSON, grouped))
 
     @cached_property
     def friction(self) -> Terms:
         """Coulomb and viscous friction of every joint, which only ever take energy."""
-        direction, speed = self.motion
-        n = direction.shape[1]
-        columns = np.zeros((len(direction), n, 2 * n))
-        joints = np.arange(n)
-        columns[:, joints, joints] = direction
-        columns[:, joints, n + joints] = speed
-        return terms(columns, positive=True)
+        each = [motion[:, :, None] * np.eye(motion.shape[1]) for motion in self.motion]
+        return terms(np.concatenate(each, axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:
         """Torque that carries a load, by its mass and its first moment about the flange."""
         middle = self.q[:, self.q.shape[1] // 2]
         return terms(-load_regressor(self.chain, middle), prior=LOAD)
-
-    def average(self, values: Array) -> Array:
-        """Mean over each window of what is known at its instants. (W · K, ...) → (W, ...)"""
-        grouped = values.reshape(*self.t.shape, *values.shape[1:])
-        return np.asarray(np.einsum("wk,wk...->w...", self.weights, grouped))
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
@@ -126,8 +184,7 @@ class Windows:
 def windows_of(recording: Recording, robot: Robot) -> Windows:
     """Cut a log with velocities into windows."""
     t, dq = recording.t, recording.require("dq")
-    length = max(1, round(WINDOW / recording.median_step))
-    length = min(length, max(1, (recording.samples - 1) // 3))
+    length = max(1, min(round(WINDOW / recording.median_step), (recording.samples - 1) // 3))
     first = np.arange(0, recording.samples - length, max(1, length // 2))
     first = first[spread(len(first), WINDOWS)]
     last = first + length
@@ -145,14 +202,21 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
     )
 
 
-def spread(count: int, most: int) -> IntArray:
-    """Numbers of at most so many of some things, evenly spread. (≤ most,)"""
+def spread(count: int, most: int, block: int = 1) -> Indices:
+    """Numbers of at most so many things, evenly spread in blocks of neighbours. (≤ most,)"""
     if count <= most:
         return np.arange(count)
-    return np.linspace(0, count - 1, most).astype(int)
+    first = np.linspace(0, count - block, most // block).astype(int)
+    return np.unique(first[:, None] + np.arange(block))
 
 
-def means(t: Array, value: Array, first: IntArray, last: IntArray) -> Array:
+def trapezoids(t: Array) -> Array:
+    """Weights of a window's instants (W, K) [s] in its mean. (W, K)"""
+    steps = np.diff(t, axis=1) / (2 * (t[:, -1:] - t[:, :1]))
+    return np.pad(steps, ((0, 0), (0, 1))) + np.pad(steps, ((0, 0), (1, 0)))
+
+
+def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
     steps = np.diff(t)[:, None]
     rise = (value[1:] + value[:-1]) / 2 * steps
@@ -160,24 +224,13 @@ def means(t: Array, value: Array, first: IntArray, last: IntArray) -> Array:
     return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
 
 
-def gravity_regressor(chain: Chain, q: Array) -> Array:
-    """Torque that holds the arm's links, by the components of "up". (N, n, 3) [N·m]
+def gravity_by_up(chain: Chain, q: Array) -> Array:
+    """Torque that holds the arm in poses q (N, n) [rad], by the components of "up". (N, n, 3) [N·m]
 
-    With S_j the first moment of all links from j on about the origin of frame j, holding them takes
-    (axis_j × S_j) · g₀ up. The third axis of "up" is the chain's own, −gravity.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (N, n) [rad]
+    It is linear in "up", the third axis of which is the chain's own, −gravity.
     """
-    poses: LinkPoses = link_poses(chain, q)
-    rotation, origin = poses.rotation[:, :-1], poses.translation[:, :-1]
-    com = origin + np.einsum("tnij,nj->tni", rotation, chain.com)
-    # Everything from j on: sums from the tip.
-    moment = np.cumsum((chain.mass[:, None] * com)[:, ::-1], axis=1)[:, ::-1]
-    mass = np.cumsum(chain.mass[::-1])[::-1]
-    about = moment - mass[:, None] * origin
-    return np.asarray(np.cross(rotation[:, :, :, 2], about) @ up_axes(chain.gravity))
+    turned = [replace(chain, gravity=-axis) for axis in up_axes(chain.gravity).T]
+    return np.stack([momentum_terms(one, q, np.zeros_like(q)).gravity for one in turned], axis=2)
 
 
 def up_axes(gravity: Array) -> Array:
