@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from vftcli.identification.identify import residual_tables, source_table, with_provenance
 from vftcli.identification.payload import LoadFit
-from vftcli.identification.provenance import residual_tables, source_table, with_provenance
 from vftcli.identification.result import (
     BASE,
     PARAMETERS,

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.identification.result import Trace, root_mean_square
+from vftcli.identification.processing import root_mean_square
+from vftcli.identification.result import Trace
 from vftcli.identification.scoring import (
     apparent_load,
     held_out_remarks,

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns
-from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
 from vftcli.identification.targets import (
     UNKNOWN,
     WRITTEN,
@@ -18,9 +17,12 @@ from vftcli.identification.targets import (
     constant_in_motion,
     controller_friction,
     controller_models,
+    gravity_remarks,
     refuse_guided,
     resolution,
     rotor_inertia,
+    target_remarks,
+    targets_method,
 )
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
@@ -196,15 +198,21 @@ def test_what_the_targets_leave_open_is_told(believed, codes):
         assert str(remark)  # every code has its words, every template its values
 
 
-def test_numbers_stand_beside_the_profiles():
-    numbers = target_numbers(1, model(), UR5)
-    assert [n.parameter for n in numbers] == [
-        *("torque_constant", "rotor_inertia"),
-        *("coulomb", "logarithmic"),
-    ]
-    assert numbers[0].profile == UR5.torque_constant[1]
-    assert numbers[1].profile == UR5.chain.rotor_inertia[1]
-    assert len(target_numbers(1, model(friction=False), UR5)) == 2
+def test_numbers_stand_beside_the_profiles(rubbing_data, monkeypatch):
+    believed = [model(), model(), model(friction=False), *[model()] * 3]
+    door = "vftcli.identification.targets.controller_models"
+    monkeypatch.setattr(door, lambda *_: believed)
+    found, arm = targets_method(rubbing_data), rubbing_data.robot
+    own = ["torque_constant", "rotor_inertia"]
+    numbers = [n for n in found.numbers if n.joint == 2]
+    assert [n.parameter for n in numbers] == [*own, "coulomb", "logarithmic"]
+    before = [arm.torque_constant[1], arm.chain.rotor_inertia[1], 4.0]
+    assert [n.profile for n in numbers[:3]] == before
+    assert [n.parameter for n in found.numbers if n.joint == 3] == own
+    np.testing.assert_array_equal(found.robot.torque_constant, KNOWN.value)
+    np.testing.assert_array_equal(found.robot.chain.rotor_inertia, KNOWN.value)
+    assert found.robot.friction[2] == arm.friction[2]
+    assert found.robot.friction[1].model == "coulomb-logarithmic"
 
 
 def test_gravity_is_averaged_by_its_spread_and_said_where_it_differs():

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.robot import Robot
-from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -18,18 +17,18 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.rest import NONZERO, faster
 from vftcli.signals.series import gaps_of
 
+#: Samples kept per period of the cutoff when the filtered log is decimated.
+OVERSAMPLING = 6.0
+STOP = 0.3  #: Length of a stop from which on it identifies nothing, because of stiction. [s]
+GAP = 10.0  #: Steps longer than this many median steps are left out.
+
 
 @dataclass(frozen=True, kw_only=True)
 class Processing:
-    """How signals are prepared. Everything a joint's torque is made of goes through one filter."""
+    """Filter and decimation: everything a joint's torque is made of goes through one filter."""
 
     #: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
     cutoff: float = 8.0
-    #: Samples kept per period of the cutoff when the filtered log is decimated.
-    oversampling: float = 6.0
-    #: Length of a stop from which on it identifies nothing, because of stiction. [s]
-    rest: float = 0.3
-    gap: float = 10.0  #: Steps longer than this many median steps are left out.
 
     def __post_init__(self) -> None:
         if not 0.0 < self.cutoff < 1e4:
@@ -54,7 +53,7 @@ class Processing:
 
     def stride(self, step: float) -> int:
         """Every how many samples of the filtered log are kept."""
-        return max(1, int(1.0 / (step * self.oversampling * self.cutoff) + 1e-9))
+        return max(1, int(1.0 / (step * OVERSAMPLING * self.cutoff) + 1e-9))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,7 +100,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         RobotError: If the number of joints differs.
         ClockError: If the log is too short for the filter.
     """
-    dq, torque = recording.require("dq"), drive_torque(recording, robot)
+    torque, dq = drive_torque(recording, robot), recording.require("dq")
     t, stride = recording.t, processing.stride(recording.median_step)
     # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
@@ -113,36 +112,26 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         columns["ddq"].append(derivative(t, velocity)[kept])
         for name, signal in (("q", recording.q), ("tau", torque)):
             columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
-    usable = usable_samples(t, dq, processing)[kept]
     return PreparedLog(
         recording=recording,
         processing=processing,
         kept=kept,
         t=t[kept],
-        usable=usable,
+        usable=usable_samples(t, dq, processing.cutoff)[kept],
         **{name: np.concatenate(parts, axis=1) for name, parts in columns.items()},
     )
 
 
-def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
+def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
-        usable[:, j] = ~covered(intervals(t, ~moves, least=processing.rest), len(t))
+        usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
     # What the filter makes of a gap reaches half a period of its cutoff to either side.
-    margin = 0.5 / processing.cutoff
-    for k in gaps_of(t, processing.gap):
+    margin = 0.5 / cutoff
+    for k in gaps_of(t, GAP):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
     return usable
-
-
-def friction_warmth(recording: Recording, robot: Robot) -> Array | None:
-    """What a log's joint temperatures make of the robot's friction. (T, n) [1]
-
-    None where the log has no temperatures, or the robot no law for them.
-    """
-    temperature = measured_temperature(recording)
-    return None if temperature is None else friction_factor(robot.friction, temperature)
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:
@@ -152,3 +141,9 @@ def gravity_torque(robot: Robot, q: Array) -> Array:
         span = slice(start, start + CHUNK)
         out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
     return out
+
+
+def root_mean_square(x: Array) -> Array:
+    """Root mean square of each column of x (M, n), in its unit. (n,)"""
+    value: Array = np.sqrt(np.mean(x**2, axis=0))
+    return value

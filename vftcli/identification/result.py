@@ -1,13 +1,12 @@
 """Identification: what was found, how well it predicts, and what the reader should know."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numpy as np
 import polars as pl
 
-from vftcli.identification.processing import PreparedLog
+from vftcli.identification.processing import PreparedLog, root_mean_square
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark
@@ -65,12 +64,6 @@ UNITS = {
 }
 
 
-def root_mean_square(x: Array) -> Array:
-    """Root mean square of each column of x (M, n), in its unit. (n,)"""
-    value: Array = np.sqrt(np.mean(x**2, axis=0))
-    return value
-
-
 class Number(NamedTuple):
     """One identified number; a row of `PARAMETERS`."""
 
@@ -87,8 +80,20 @@ def number(
     j: int, parameter: str, value: float, sd: float, profile: float, determined: bool
 ) -> Number:
     """An identified number of joint j (from 0), with its parameter's unit."""
-    unit = UNITS[parameter]
-    return Number(j + 1, parameter, float(value), float(sd), unit, float(profile), determined)
+    unit, known = UNITS[parameter], bool(determined)
+    return Number(j + 1, parameter, float(value), float(sd), unit, float(profile), known)
+
+
+class MethodResult(NamedTuple):
+    """What a method of identification hands back."""
+
+    method: str  #: Its name.
+    robot: Robot  #: The identified robot.
+    numbers: Sequence[Number] = ()  #: Its identified numbers.
+    remarks: Sequence[Remark] = ()  #: What the reader of the numbers should know.
+    shape_choices: Sequence[tuple[int, str, float, bool]] = ()  #: Rows of `SHAPE_CHOICES`.
+    base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
+    is_narrow: bool = False  #: Whether the motion tells the links too little.
 
 
 class Trace(NamedTuple):

@@ -4,15 +4,21 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
-from vftcli.identification.result import Trace, root_mean_square
+from vftcli.identification.processing import (
+    PreparedLog,
+    Processing,
+    gravity_torque,
+    prepare,
+    root_mean_square,
+)
+from vftcli.identification.result import Trace
 from vftcli.robots.drive import uses_current
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.robots.temperature import measured_temperature
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -61,32 +67,30 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: P
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
     before = root_mean_square(motion.tau - predicted_torque(profile, motion))
-    measured = motion.tau * constant_ratio(profile, robot, motion)
+    old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
+    # What was made from currents with the old constants is made with the new.
+    if old is not None and new is not None and uses_current(log, profile):
+        measured = measured * (new / old)
     return Trace(motion, role, measured, predicted_torque(robot, motion), before)
-
-
-def constant_ratio(profile: Robot, robot: Robot, motion: PreparedLog) -> Array | float:
-    """New over old drive constants, for torque that was made from currents with the old. (n,)"""
-    old, new = profile.torque_constant, robot.torque_constant
-    if old is None or new is None or not uses_current(motion.recording, profile):
-        return 1.0
-    ratio: Array = new / old
-    return ratio
 
 
 def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
     """What the scores mean: logs that got worse or repeat others, joints much worse elsewhere."""
     train = [trace for trace in traces if trace.role == "train"]
     held_out = [trace for trace in traces if trace.role == "held-out"]
-    remarks = [remark for trace in traces if (remark := worse_remark(trace)) is not None]
+    remarks = []
+    for trace in traces:
+        left, before = float(np.mean(trace.rms)), float(np.mean(trace.before))
+        if left > BEHIND * before > 0.0:
+            where = Where(trace.motion.recording.name)
+            remarks.append(
+                caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
+            )
     for test in held_out:
-        for other in train:
-            if (share := repeated_share(other.motion, test.motion)) >= REPEATED:
-                values = {
-                    "training_log": other.motion.recording.name,
-                    "share_percent": 100.0 * share,
-                }
-                where = Where(test.motion.recording.name)
+        where = Where(test.motion.recording.name)
+        for other in (trace.motion for trace in train):
+            if (share := repeated_share(other, test.motion)) >= REPEATED:
+                values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
                 remarks.append(caution("repeated-trajectory", where, **values))
     if not train:
         return remarks
@@ -96,17 +100,8 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
     return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
 
 
-def worse_remark(trace: Trace) -> Remark | None:
-    """That the profile explains a log better than what was identified, None where it does not."""
-    left, before = float(np.mean(trace.rms)), float(np.mean(trace.before))
-    if not left > BEHIND * before > 0.0:
-        return None
-    where = Where(trace.motion.recording.name)
-    return caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
-
-
 def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
-    """What a held-out log's residual looks like where it is much larger than in training.
+    """Causes of a held-out log's residual where it is much larger than in training.
 
     A load on the flange explains all joints at once and is looked for first; what is left is
     looked at joint by joint.
@@ -124,16 +119,12 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
         return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
-    resting = [j for j in worse if np.count_nonzero(in_motion(motion, j)) < ENOUGH]
+    moving = np.count_nonzero(motion.usable & faster(motion.dq), axis=0)
+    resting = [j for j in worse if moving[j] < ENOUGH]
     remarks = [joint_remark(trace, j, float(trained[j])) for j in worse if j not in resting]
     if resting:
         remarks.append(fact("resting-joints", Where(name, tuple(j + 1 for j in resting))))
     return remarks
-
-
-def in_motion(motion: PreparedLog, j: int) -> Mask:
-    """Where joint j (from 0) moves fast enough to tell its friction. (M,)"""
-    return motion.usable[:, j] & faster(motion.dq[:, j])
 
 
 def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:
@@ -149,7 +140,7 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
-    """How the residual of joint j (from 0) differs from the training's: by friction, or not.
+    """Whether friction explains how the residual of joint j (from 0) differs from training.
 
     Coulomb and viscous friction and an offset are fitted to the residual; where they explain
     `EXPLAINS` of it, friction is named as its cause.
@@ -163,7 +154,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     where = Where(motion.recording.name, (j + 1,))
     values = {"rms_Nm": size, "ratio": size / trained}
     dq = motion.recording.require("dq")[:, j]
-    used = in_motion(motion, j)
+    used = (motion.usable & faster(motion.dq))[:, j]
     sign = np.tanh(dq / SMOOTHING)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
     fit = fit_column(A, residual[:, j], used.astype(float))

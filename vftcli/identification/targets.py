@@ -1,31 +1,36 @@
-"""What a UR controller believes: K, rotor inertia and friction, read off its own targets.
+"""Method "targets": what a UR controller believes of its arm, read off its own targets.
 
 The controller logs the torque its inverse dynamics asks for (target_moment) and the current it
 expects (target_current). At rest their ratio is K; in motion target_moment less the maker's rigid
 body is J q̈, and K·target_current − target_moment is the controller's friction. Nothing of this
-needs free motion: a hand on the arm changes what is measured, not what was asked for.
+needs free motion: a hand on the arm changes the measured effort, not the one that was asked for.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, is_dissipative
+from vftcli.identification.friction_method import (
+    identified_friction,
+    profile_constant,
+    profile_friction,
+    temperature_remarks,
+)
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     FrictionColumns,
     Shape,
     bent,
+    friction_columns,
+    round_digits,
 )
-from vftcli.identification.processing import (
-    PreparedLog,
-    Processing,
-    friction_warmth,
-    gravity_torque,
-    prepare,
-)
+from vftcli.identification.processing import PreparedLog, Processing, gravity_torque, prepare
+from vftcli.identification.result import MethodResult, Number, number
 from vftcli.identification.scoring import rigid_torque
+from vftcli.identification.training import Training
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
@@ -34,6 +39,7 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 
 #: Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]
@@ -57,6 +63,8 @@ GUIDED = 0.4
 SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of the samples used, which must agree too. [rad/s]
 SETTLE = 0.1  #: Left out at both ends of a rest. [s]
 STEADY = 5e-3  #: Relative change of the target current during a rest up to which it is one.
+#: Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s².
+SAME_GRAVITY = 3e-4
 
 
 class Estimate(NamedTuple):
@@ -81,6 +89,64 @@ class ControllerModel(NamedTuple):
     gravity: Estimate  #: Its gravity torque over the profile's.
 
 
+def targets_method(data: Training) -> MethodResult:
+    """K, rotor inertia and friction as the controller itself uses them."""
+    robot = data.robot
+    models = controller_models(data.recordings, robot)
+    rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
+    constants = np.array(robot.torque_constant, dtype=float)
+    numbers: list[Number] = []
+    remarks: list[Remark] = []
+    for j, model in enumerate(models):
+        for name, (value, sd, known), before in (
+            ("torque_constant", model.constant, constants[j]),
+            ("rotor_inertia", model.rotor, rotor[j]),
+        ):
+            numbers.append(number(j, name, value, sd, before, known))
+        remarks += target_remarks(j, model, robot)
+        if model.constant.known:
+            constants[j] = round_digits(model.constant.value)
+        if model.rotor.known:
+            rotor[j] = round_digits(model.rotor.value)
+        if model.friction is not None:
+            frictions[j], more = identified_friction(data, j, *model.friction, "targets")
+            numbers += more
+    remarks += [*gravity_remarks(models), *temperature_remarks(data)]
+    chain = replace(robot.chain, rotor_inertia=rotor)
+    new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
+    return MethodResult("targets", new, numbers, remarks)
+
+
+def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
+    """What the targets leave open in joint j (from 0), so that the profile's numbers stay."""
+    remarks, where = [], Where(joints=(j + 1,))
+    if not model.constant.known:
+        found = {"profile_NmA": profile_constant(robot, j)}
+        if np.isfinite(model.constant.sd):
+            found |= {"found_NmA": model.constant.value, "sd_NmA": model.constant.sd}
+            remarks.append(caution("undetermined-drive-constant", where, **found))
+        else:
+            remarks.append(caution("unexcited-drive-constant", where, **found))
+    if not model.rotor.known:
+        J = float(robot.chain.rotor_inertia[j])
+        remarks.append(caution("unaccelerated-joint", where, profile_kgm2=J))
+    if model.friction is None:
+        remarks.append(caution("unexcited-friction", where))
+    return remarks
+
+
+def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
+    """A remark if the controller computes with another gravity than the profile."""
+    scales = [m.gravity for m in models if m.gravity.known]
+    if not scales:
+        return []
+    # All joints feel one gravity: their ratios are averaged by the inverse of their variances.
+    weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
+    ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
+    least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
+    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= least else []
+
+
 class Targets(NamedTuple):
     """One log's targets beside its motion, filtered alike."""
 
@@ -98,12 +164,11 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
     """Filter a log's targets like its motion."""
     wanted, asked = recording.require("target_current"), recording.require("target_torque")
     motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
-    load = gravity_torque(robot, recording.q)
     smooth = zero_phase(recording.t, asked, CUTOFF)
     return Targets(
         recording=recording,
         motion=motion,
-        columns=FrictionColumns(motion, np.abs(load), friction_warmth(recording, robot)),
+        columns=friction_columns(motion, robot),
         current=motion.filtered(wanted),
         moment=smooth[motion.kept],
         lead=derivative(recording.t, smooth)[motion.kept],
