@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli import readers
-from vftcli.evaluation.reference import zero_reference
+from vftcli.evaluation.reference_choice import zero_reference
 from vftcli.evaluation.touches import touched_remarks, touches
 from vftcli.repetition.free_run import ModelledRun
 from vftcli.robots import load_robot

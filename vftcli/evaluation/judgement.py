@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.errors import evaluate
-from vftcli.evaluation.joint_means import joint_means
-from vftcli.evaluation.reference import ReferenceLoad
-from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
+from vftcli.evaluation.errors import evaluate, joint_means
+from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceLoad, make_reference
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
@@ -23,7 +21,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
-from vftcli.virtual_sensor.frames import from_base
+from vftcli.virtual_sensor.frames import NOTHING, from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -71,11 +69,8 @@ def judge(
         ReferenceTorqueError: If the reference cannot be made.
     """
     recording, robot = motion.log.recording, motion.log.robot
-    source = ReferenceSource(motion=motion)
-    if sensed is not None:
-        mounting = sensed.sensor.mounting
-        source = ReferenceSource(motion=motion, mounting=mounting)
-    made = make_reference(source, choice)
+    mounting = NOTHING if sensed is None else sensed.sensor.mounting
+    made = make_reference(motion, choice, mounting)
     reference = made.torque
     errors = evaluate(recording.name, estimates, reference)
     if sensed is not None:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.free_run import ModelledRun
-from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.remarks import Remark, Where, warning
@@ -56,21 +55,16 @@ def touches(run: ModelledRun) -> tuple[ShownContact, ...]:
     level = np.abs(open_torque - np.median(open_torque, axis=0))
     quiet = np.median(level, axis=0)
     limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * drive.coulomb), LEAST)
-    return tuple(
-        touch_in(drive.t, level, limit, quiet, start, stop)
-        for start, stop in runs_of(np.asarray((level > limit).any(axis=1)))
-    )
-
-
-def touch_in(
-    t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int
-) -> ShownContact:
-    """The contact of a run of samples, told by the joint that exceeds its limit most."""
-    excess = (level[start:stop] / limit).max(axis=0)
-    joint = int(np.argmax(excess))
-    torque = float(level[start:stop, joint].max())
-    begin, end = float(t[start]), float(t[stop - 1])
-    return ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
+    found = []
+    for start, stop in runs_of(np.asarray((level > limit).any(axis=1))):
+        excess = (level[start:stop] / limit).max(axis=0)
+        joint = int(np.argmax(excess))
+        torque = float(level[start:stop, joint].max())
+        begin, end = float(drive.t[start]), float(drive.t[stop - 1])
+        found.append(
+            ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
+        )
+    return tuple(found)
 
 
 def touched_remarks(run: ModelledRun) -> tuple[Remark, ...]:
