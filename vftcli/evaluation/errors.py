@@ -90,11 +90,11 @@ class Scored(NamedTuple):
     #: Bootstrap draws of the mean squared errors, one column an observer, all in the same blocks:
     #: for comparing observers.
     paired: Resampled
-    #: The same of each observer in blocks of its own length, so that its interval does not depend
-    #: on who else is asked.
+    #: Draws of each observer in blocks of its own length, so that its interval does not depend on
+    #: who else is asked.
     own: tuple[Resampled, ...]
     lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
-    within: Array  #: Samples whose error lies within each observer's 95 % band. (m,)
+    within: Array  #: Samples with an error within each observer's 95 % band. (m,)
     #: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
     banded: Array
 
@@ -114,7 +114,7 @@ def evaluate(
     Args:
         recording: The log's name, for the first column.
         estimates: The observers' estimates, on the reference's clock.
-        reference: What they are judged by; its `floor` stands beside every error.
+        reference: The torque they are judged by; its `floor` is written beside every error.
 
     Raises:
         ShapeError: If an estimate and the reference have different shapes.
@@ -225,7 +225,7 @@ def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFr
 
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
     """One row an observer on one joint."""
-    error, found = joint.error, []
+    error, lines = joint.error, list[dict[str, object]]()
     best = int(np.argmin(np.mean(error**2, axis=0))) if len(error) else 0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
@@ -240,12 +240,12 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             own = np.ascontiguousarray(error[:, k])
             here |= {"missing": joint.missing[k] / len(own)}
             here |= sizes(joint, k, own, best) | trust(joint, k, own)
-        found.append(here)
-    return found
+        lines.append(here)
+    return lines
 
 
 def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
-    """How large the error is, how sure that is, and what shape it has.
+    """Size of the error with its interval, its bias, correlation, lag and rank.
 
     Args:
         joint: The scored joint.
@@ -269,7 +269,7 @@ def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
 
 
 def trust(joint: Scored, k: int, error: Array) -> dict[str, object]:
-    """How far the reference of this joint can be trusted, and the error where it can."""
+    """Trust in the reference of this joint, and the error where it moves."""
     share = float(np.mean(joint.moving))
     error = error[joint.moving]
     enough = joint.banded[k] >= LEAST

@@ -1,4 +1,4 @@
-"""Confidence intervals of an RMSE whose errors follow one another: moving-block bootstrap.
+"""Confidence intervals of an RMSE of errors that follow one another: moving-block bootstrap.
 
 Paired, it also tells whether one observer is better than another, or was lucky.
 """
@@ -22,7 +22,7 @@ MOST_BLOCKS = 300
 #: Blocks a repetition is put together from, at least, however long errors remember.
 LEAST_BLOCKS = 10
 MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
-#: Largest share taken off: the upper end of an interval is at most five times the RMSE.
+#: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
 LEVEL = 0.95  #: Coverage of the intervals.
 FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
@@ -44,7 +44,7 @@ class Resampled(NamedTuple):
     """Mean squares of resampled errors."""
 
     draws: Array  #: One mean square a repetition and column. (B, m)
-    blocks: int  #: How many blocks each repetition has: the effective number of independent pieces.
+    blocks: int  #: Blocks in each repetition: the effective number of independent pieces.
 
 
 def resample(squares: Array, length: int) -> Resampled:
@@ -106,7 +106,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     The scatter of a mean square is a share of the true value, not of the observed one: a log with
     few contacts shows both a small mean and a small scatter. With h, that share times Student's
     quantile for the number of blocks, the true value is at most observed/(1 − h); downwards, where
-    the mean square is skewed, its logarithm is taken: observed·e^{−h}.
+    the mean square is skewed, its logarithm is used: observed·e^{−h}.
 
     Args:
         mean_square: The observed mean square. [(N·m)²]

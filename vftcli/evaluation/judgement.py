@@ -27,9 +27,9 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
 class Judgement(NamedTuple):
-    """How the estimates of one log compare with a reference; fields of `vftcli.Analysis`."""
+    """Errors of one log's estimates against a reference; fields of `vftcli.Analysis`."""
 
-    reference: ExternalTorque  #: What they are judged by.
+    reference: ExternalTorque  #: The torque they are judged by.
     errors: pl.DataFrame  #: The tidy error table (`vftcli.evaluation.SCHEMA`).
     #: The wrenches, with the reference's beside them; None without wrenches.
     virtual_sensor: SensorReading | None
@@ -88,7 +88,7 @@ def reference_wrench(
 ) -> Wrench:
     """The wrench that estimates are judged by, in the virtual sensor's frame.
 
-    A sensor's and a file's wrench are taken as they are; any other reference is a torque, and goes
+    A sensor's and a file's wrench stay as they are; any other reference is a torque, and goes
     through least squares. Samples in which the pose cannot tell a wrench are masked alike.
     """
     torque = reference.torque

@@ -33,14 +33,14 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianJudgement:
-    """What a log of torques and a Jacobian tells."""
+    """Wrenches and errors by a log of torques and a Jacobian."""
 
     log: JacobianLog  #: The log.
     vendor: Compared  #: The vendor's torques, and their wrench through the Jacobian.
     #: The sensor's wrench, and its torques, or None where nothing is compared.
     sensor: Compared | None
     errors: pl.DataFrame | None  #: The tidy error table, None where nothing is compared.
-    remarks: tuple[Remark, ...]  #: What the numbers are.
+    remarks: tuple[Remark, ...]  #: Limits of the numbers.
 
 
 def judge_jacobian(

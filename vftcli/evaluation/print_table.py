@@ -19,8 +19,8 @@ SAME_FILTER = 1e-6
 class Published:
     """An RMSE table from print."""
 
-    title: str  #: What it is.
-    source: str  #: Where it stands.
+    title: str  #: Its name and content.
+    source: str  #: Paper and number.
     #: Observer's name here → printed RMSE of each joint. [N·m]
     rmse: Mapping[str, tuple[float, ...]]
 
@@ -48,7 +48,7 @@ class Comparison:
     ours: Mapping[str, Array]
     floor: Array  #: The reference's own error. (n,) [N·m]
     observers: Mapping[str, Observer]  #: The observers that ran, by name.
-    tunings: Mapping[str, Tuning]  #: What their gains mean at the log's sample time, by name.
+    tunings: Mapping[str, Tuning]  #: Meaning of their gains at the log's sample time.
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -61,7 +61,7 @@ class Comparison:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Where the two differ, and why a computation need not give these numbers."""
+        """Differences of the two, and why a computation need not give these numbers."""
         both = (*self.sizes(), *self.one_filter(), *self.kalman_delay()) if self.names else ()
         last = [row[5] for row in self.published.rmse.values()]
         at_floor = fact(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.evaluation.touches import touched_remarks
+from vftcli.evaluation.obvious_contacts import touched_remarks
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.free_run import ModelledRun
@@ -24,12 +24,12 @@ from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 from vftcli.virtual_sensor.log_wrench import in_base_axes, logged_wrench
 
-FILE = "file:"  #: The one reference whose name holds a path.
+FILE = "file:"  #: Head of the one reference with a path in its name.
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceLoad:
-    """What estimates are judged by, on the log's clock."""
+    """Torque and wrench that estimates are judged by, on the log's clock."""
 
     torque: ExternalTorque  #: The reference torque of every joint.
     #: The wrench it was made from, in base axes about the flange point, as force on the robot; None
@@ -118,9 +118,9 @@ def file_reference(
     mounting: Mounting,
     columns: str | None = None,
 ) -> ReferenceLoad:
-    """External torque, wrench or both from a table whose clock is the log's own.
+    """External torque, wrench or both from a table on the log's own clock.
 
-    A file without torques gives those of its wrench, Jᵀ w. A wrench is taken to be in base axes
+    A file without torques gives those of its wrench, Jᵀ w. A wrench is read as one in base axes
     about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
     """
     table = read_reference(path, columns)

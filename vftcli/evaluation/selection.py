@@ -20,7 +20,7 @@ FAST = 5.0
 
 
 class Facts(NamedTuple):
-    """What one observer does on one log."""
+    """Speed, noise and error of one observer on one log."""
 
     name: str  #: The observer.
     response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
@@ -37,10 +37,10 @@ class Facts(NamedTuple):
 class Advice(NamedTuple):
     """One guideline and what this log says of it."""
 
-    purpose: str  #: What the observer is wanted for.
-    criterion: str  #: What decides.
+    purpose: str  #: Use of the observer.
+    criterion: str  #: Deciding number.
     best: tuple[str, ...]  #: The observers that are best by it, alike within 2 %.
-    paper: str  #: What the paper advises.
+    paper: str  #: Advice of the paper.
 
 
 def facts(
@@ -50,7 +50,7 @@ def facts(
     errors: pl.DataFrame | None,
 ) -> tuple[Facts, ...]:
     """The facts of every observer that has a response of its own."""
-    step, noise, found = median_step(run.recording.t), run.noise, []
+    step, noise, each = median_step(run.recording.t), run.noise, list[Facts]()
     means = {} if errors is None else joint_means(errors).errors
     frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
     fast = frequency >= min(FAST, frequency[-1])
@@ -67,8 +67,8 @@ def facts(
                 rmse=means.get(observer.name, float("nan")),
                 parameter_count=tuning.parameter_count,
             )
-            found.append(one)
-    return tuple(found)
+            each.append(one)
+    return tuple(each)
 
 
 def step_response(observer: Observer, step: float, joints: int) -> Array:

@@ -10,7 +10,7 @@ from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, f
 from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.links import ParameterColumns, residuals
 from vftcli.identification.processing import PreparedLog
-from vftcli.identification.scoring import apparent_load
+from vftcli.identification.result import apparent_load
 from vftcli.identification.training import Training, TrainingLog
 from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
 from vftcli.robots.robot import JointFriction
@@ -104,7 +104,7 @@ class ContactSpan(NamedTuple):
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
-    """Stretches whose residual is far outside the rest of the log, neighbours joined.
+    """Stretches with a residual far outside the rest of the log, neighbours joined.
 
     Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
     exceeds that counts there.
@@ -145,7 +145,7 @@ def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Ar
 
 
 def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
-    """How much less free links leave than the profile's do, in joints that carry weight. (h,) [1]
+    """Residual of the profile's links over that of free ones, in joints with weight. (h,) [1]
 
     All inertial parameters are let go, be they physical or not, the structure of the friction
     held: what they leave is what no links explain, the noise of this log.
@@ -207,7 +207,7 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 
 
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """A remark on each log whose friction falls from third to third, with the joints that show it.
+    """A remark on each log with friction that falls from third to third, and its joints.
 
     Of what the fit leaves, the part that goes with the direction is the dry friction that a third
     has beyond the whole log's. A gear that warms up rubs less and less.

@@ -40,9 +40,9 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 #: Presliding lengths that compete with none, one for the whole arm. [rad]
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-#: What may stand beside the points of a bent line.
+#: Terms that may be beside the points of a bent line.
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
-#: Terms whose negative value would push the joint along.
+#: Terms that would push the joint along with a negative value.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
 #: Terms that are bounded at zero in the fit of a joint for which no candidate is friction.
 BOUNDED = ("coulomb", "viscous")
@@ -58,7 +58,7 @@ LISTENING = 2.0
 MARGIN = 1.01  #: A simpler model within this factor of the best cross-validated error is preferred.
 #: A shorter presliding length within this factor of the best is preferred, and none to all.
 LENGTH_MARGIN = 1.02
-LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be told. [N·m]
+LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be seen. [N·m]
 #: Share of a fit's cross-validated error from which down on the profile's friction is kept.
 KEPT = 0.85
 #: Relative standard deviation up to which a drive constant is fitted to free motion.
@@ -82,7 +82,7 @@ class JointData(NamedTuple):
     #: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque where
     #: the drive constant is. (M, f)
     fixed: Array
-    weights: Array  #: 0 where nothing is told, 1 elsewhere. (M,)
+    weights: Array  #: 0 where a sample says nothing, 1 elsewhere. (M,)
     sources: Sequence[FrictionColumns]  #: Friction columns of each log.
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
@@ -188,8 +188,8 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
 def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """The equations of joint j (from 0) over all logs.
 
-    With a drive constant to be found the rigid body's torque is a column whose coefficient would
-    be 1 if the profile's constant were right; without, it is subtracted.
+    With a drive constant to be found the rigid body's torque is a column with a coefficient that
+    would be 1 if the profile's constant were right; without, it is subtracted.
     """
 
     def joined(signal: Callable[[TrainingLog], Array]) -> Array:
@@ -212,7 +212,7 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
 
 
 def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
-    """What the friction fits leave of each log; zero for joints that are held. (M, n) each"""
+    """Residuals of the friction fits, log by log; zero for joints that are held. (M, n) each"""
     ends = np.cumsum([log.motion.samples for log in data.logs])
     whole = np.zeros((ends[-1], data.robot.joints))
     for j, fit in enumerate(fits):
@@ -226,7 +226,7 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
 
     It is chosen in the band in which an observer listens: what the play operator leaves at a
     reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
-    taken, which forgets soonest that it started undeflected.
+    used, which forgets soonest that it started undeflected.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # Of a joint that goes one way the play operator is a constant.
@@ -305,7 +305,7 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
     Args:
         best: Its smoothing, its bend and its presliding length stay.
         data: The joint's equations.
-        speed: The joint's highest speed, by which the points of a bent line are told. [rad/s]
+        speed: The joint's highest speed, which decides the points of a bent line. [rad/s]
     """
     shapes: list[Shape] = []
     line = bent(speed)

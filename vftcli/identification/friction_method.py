@@ -106,12 +106,12 @@ def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
 
 
 def rotor_remarks(J: Number, where: Where) -> list[Remark]:
-    """That a rotor inertia is not known to `DETERMINED`, and which one is used."""
+    """A remark on a rotor inertia that is not known to `DETERMINED`."""
     if J.determined and J.sd < DETERMINED * J.value:
         return []
-    found = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
+    values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
     code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
-    return [caution(code, where, **found)]
+    return [caution(code, where, **values)]
 
 
 def identified_friction(

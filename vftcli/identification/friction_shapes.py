@@ -34,14 +34,14 @@ MODELS = {
     "quadratic": "coulomb-viscous-quadratic",
     "offset": "coulomb-viscous-offset",
 }
-SIMPLEST = "coulomb-viscous"  #: That of a joint that has none of them.
-POINT = "point"  #: How the terms of a bent line begin: point1 is the torque at its first speed.
+SIMPLEST = "coulomb-viscous"  #: Model of a joint that has none of them.
+POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
 
 
 class Shape(NamedTuple):
     """The structure of one joint's friction: which terms, and its nonlinear numbers."""
 
-    #: Keys of the robot file whose values are coefficients, in order; those that begin with `POINT`
+    #: Keys of the robot file that hold coefficients, in order; those that begin with `POINT`
     #: are the torques of a bent line.
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]

@@ -26,8 +26,9 @@ from vftcli.identification.result import (
     MethodResult,
     Number,
     number,
+    score,
+    score_remarks,
 )
-from vftcli.identification.scoring import score, score_remarks
 from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
 from vftcli.identification.whole_arm import chosen_method, whole_arm
@@ -48,7 +49,7 @@ METHODS: dict[str, Callable[[Training], MethodResult]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What shall be identified."""
+    """Method and options of an identification."""
 
     method: str | None = "friction"  #: A name in `METHODS`, or None for a payload alone.
     name: str = ""  #: Name of the new robot.
@@ -205,13 +206,22 @@ def with_provenance(
             if key in table:
                 changed = (j, key) in determined or (links and key == "rotor_inertia")
                 table[f"{key}_source"] = new if changed else old
+    identified = found.residuals.filter(pl.col("model") == "identified")
     account: dict[str, Any] = {
         "method": found.method,
         "profile": profile.name,
         "logs": [log.name for log in logs],
         "sha256": [log.source.sha256 or "unknown" for log in logs],
         "processing": dict(found.processing),
-        "residuals": residual_tables(found.residuals),
+        # By index, not by name: two files called log.csv are two logs.
+        "residuals": [
+            {
+                "log": rows["log"][0],
+                "role": rows["role"][0],
+                "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]],
+            }
+            for _, rows in identified.group_by("log_index", maintain_order=True)
+        ],
     }
     if load is not None:
         document["payload"]["source"] = str(load.origin)
@@ -223,27 +233,14 @@ def with_provenance(
         }
     if found.base is not None:
         account["base_parameters"] = found.base.to_dicts()
-    sources = [source_table(k, log) for k, log in enumerate(logs, start=1)]
+    sources = [
+        {
+            "id": f"log-{k}",
+            "what": "what `identification` and the joints' confidence name",
+            "ref": f"{log.name}, {log.samples} samples, {log.duration:.3f} s",
+            "sha256": log.source.sha256 or "unknown",
+        }
+        for k, log in enumerate(logs, start=1)
+    ]
     tables = {"sources": [*document.get("sources", ()), *sources], "identification": account}
     return replace(named, document={**document, **tables})
-
-
-def source_table(index: int, recording: Recording) -> dict[str, Any]:
-    """One log as an entry of the robot file's ``[[sources]]``, numbered from 1."""
-    return {
-        "id": f"log-{index}",
-        "what": "what `identification` and the joints' confidence name",
-        "ref": f"{recording.name}, {recording.samples} samples, {recording.duration:.3f} s",
-        "sha256": recording.source.sha256 or "unknown",
-    }
-
-
-def residual_tables(residuals: pl.DataFrame) -> list[dict[str, Any]]:
-    """RMS per joint of each log under the identified robot, one table a log. [N·m]"""
-    tables = []
-    # By index, not by name: two files called log.csv are two logs.
-    identified = residuals.filter(pl.col("model") == "identified")
-    for _, rows in identified.group_by("log_index", maintain_order=True):
-        log, role = rows.row(0, named=True)["log"], rows.row(0, named=True)["role"]
-        tables.append({"log": log, "role": role, "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]]})
-    return tables

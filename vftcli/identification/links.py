@@ -7,7 +7,7 @@ combinations of inertial parameters that any motion can tell at all.
 """
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,10 +18,11 @@ from vftcli.identification.result import BASE
 from vftcli.identification.training import TrainingLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
 
+ROWS = 512  #: Samples that are stacked at once.
 REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
 #: Singular values below this share of the largest are left at the start (columns scaled).
 TRUNCATION = 1e-3
@@ -33,7 +34,7 @@ DOUBTFUL = 0.3
 
 
 class ParameterColumns(NamedTuple):
-    """Which unknown stands where."""
+    """Order of the unknowns in their vector."""
 
     chain: Chain  #: The arm's geometry.
     rotor: bool  #: Whether rotor inertias are unknowns: where torque is measured before the gear.
@@ -51,12 +52,12 @@ class ParameterColumns(NamedTuple):
 
     @property
     def rotor_places(self) -> slice:
-        """Where in the vector the rotor inertias stand."""
+        """Places of the rotor inertias."""
         return slice(self.inertial, self.inertial + self.rotors)
 
     @property
     def frictions(self) -> tuple[slice, ...]:
-        """Where in the vector each joint's friction coefficients stand, behind the rotors."""
+        """Places of each joint's friction coefficients, behind the rotors."""
         edges = np.cumsum([self.rotor_places.stop, *(len(s.terms) for s in self.shapes)])
         return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
 
@@ -161,21 +162,13 @@ def triangulate(
                 correlation.append(correlation_time(r[w > 0]))
         # Stretches are contiguous: neighbouring samples would tell each other's noise.
         for k, fold in enumerate(folds(log.motion.samples)):
-            for rows in weighted_rows(layout, log, scale, fold):
-                parts[k] = triangle(np.vstack([parts[k], rows]))
+            for start in range(fold.start, fold.stop, ROWS):
+                span = slice(start, min(start + ROWS, fold.stop))
+                A = np.concatenate([layout.rows(log, span), log.motion.tau[span, :, None]], axis=2)
+                rows = (A * scale[span, :, None]).reshape(-1, A.shape[2])
+                weighs = scale[span].ravel() > 0
+                parts[k] = triangle(np.vstack([parts[k], rows[weighs]]))
     return Triangles(layout, tuple(parts), float(np.mean(correlation)) if correlation else 1.0)
-
-
-def weighted_rows(
-    layout: ParameterColumns, log: TrainingLog, scale: Array, fold: slice, size: int = 512
-) -> Iterator[Array]:
-    """Rows [A y] times their weights, a chunk at a time; rows of no weight are dropped."""
-    for start in range(fold.start, fold.stop, size):
-        span = slice(start, min(start + size, fold.stop))
-        A = layout.rows(log, span)
-        rows = np.concatenate([A, log.motion.tau[span, :, None]], axis=2) * scale[span, :, None]
-        weighs: Mask = scale[span].ravel() > 0
-        yield rows.reshape(-1, rows.shape[2])[weighs]
 
 
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
@@ -201,7 +194,7 @@ def least_change(triangles: Triangles, start: Array) -> Array:
 
 
 class Grouping(NamedTuple):
-    """Which unknowns stand for themselves, and what each carries along."""
+    """Independent unknowns, and the share of the others that each carries along."""
 
     independent: tuple[int, ...]  #: Places of the independent unknowns. (b,)
     dependent: tuple[int, ...]  #: Places of the others. (d,)

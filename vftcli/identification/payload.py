@@ -42,7 +42,7 @@ DWELL = 0.5  #: Shortest rest that counts as a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
 APART = 0.1  #: Poses are different if a joint is this far elsewhere. [rad]
 MOST_NAMED = 4  #: Logs that are called by their names; there may be thousands of episodes.
-STRETCHES = 12  #: Stretches of a motion whose errors are taken as each other's strangers.
+STRETCHES = 12  #: Stretches of a motion with errors that count as independent.
 REACH = 1.0  #: A load's centre of mass further than this from the flange cannot be. [m]
 LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
 #: Shortest motion to be weighed: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by
@@ -58,7 +58,7 @@ def names_of(recordings: Sequence[Recording]) -> str:
 
 
 class NotSameMotionError(IdentificationError):
-    """Two logs that were taken for a pair do not repeat one motion."""
+    """Two logs of a supposed pair do not repeat one motion."""
 
 
 class TooFewPosesError(IdentificationError):
@@ -73,10 +73,10 @@ class LoadFit(NamedTuple):
     com_sd: Array  #: Standard deviations of the centre of mass in flange axes. (3,) [m]
     residual: Array  #: RMS torque left in each joint. (n,) [N·m]
     loaded: tuple[Recording, ...]  #: The logs that carry it.
-    origin: Remark  #: How it was found.
+    origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it. Logs are told apart as objects: their names may be equal."""
+        """Whether a log carries it. Logs differ as objects: their names may be equal."""
         return any(log is recording for log in self.loaded)
 
 
@@ -115,7 +115,7 @@ class JointsFit(NamedTuple):
     """Least squares over all joints, each divided by its own residual."""
 
     x: Array  #: The solution. (k,)
-    left: Array  #: What it leaves. (N, n)
+    left: Array  #: Its residual. (N, n)
     weights: Array  #: Of every sample and joint, 0 where it tells nothing. (N, n)
     A: Array  #: The columns times their weights. (N, n, k)
 
@@ -391,7 +391,7 @@ def weigh_motion(runs: Sequence[ModelledRun], carried: Array) -> tuple[Array, Ar
 
 
 def carrying(run: ModelledRun, x: Array) -> ModelledRun:
-    """A run whose model carries a load too, a point mass of x (4,) [kg, kg·m] in flange axes."""
+    """A run with a load in its model too, a point mass of x (4,) [kg, kg·m] in flange axes."""
     load = Payload(mass=float(x[0]), com=x[1:] / x[0], inertia=np.zeros((3, 3)))
     q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
     own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)

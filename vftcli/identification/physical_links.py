@@ -24,7 +24,7 @@ from vftcli.signals.errors import IdentificationError
 #: Weights of the distance to the profile, from hardly any pull to the profile itself.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
 MARGIN = 1.01  #: Factor of the least misfit within which a pull predicts as well as the best one.
-#: Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
+#: Pull of a maker's table with masses of 5 % standard deviation: the distance of
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
@@ -36,7 +36,7 @@ SMALLEST_RADIUS = 1e-3
 
 
 def basis() -> Array:
-    """How the pseudo-inertia P grows with each of a link's ten parameters, ∂P/∂φ_k. (10, 4, 4)"""
+    """∂P/∂φ_k of the pseudo-inertia P by each of a link's ten parameters. (10, 4, 4)"""
     out = np.zeros((LINK, 4, 4))
     out[0, 3, 3] = 1.0
     for k in range(3):
@@ -69,7 +69,7 @@ def is_physical(phi: Array) -> bool:
 
 
 def thicken_links(phi: Array) -> Array:
-    """The nearest parameters whose every link has some mass and some thickness. (10n,)
+    """The nearest parameters with some mass and some thickness in every link. (10n,)
 
     Profiles from rounded tables, or with point masses, touch the edge of what is physical.
     """

@@ -1,4 +1,4 @@
-"""From a log to the signals an identification is made from: filtered alike, without delay."""
+"""From a log to the torques an identification compares: filtered alike, without delay."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,10 @@ from numpy.typing import NDArray
 
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
+from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -61,8 +64,8 @@ class PreparedLog:
     """A log prepared for identification: M samples from the first to the last that moves."""
 
     recording: Recording  #: The log.
-    processing: Processing  #: How it was prepared.
-    kept: NDArray[np.int64]  #: Which samples of the log these are. (M,)
+    processing: Processing  #: Its filter.
+    kept: NDArray[np.int64]  #: Numbers of these samples in the log. (M,)
     t: Array  #: Time. (M,) [s]
     q: Array  #: Positions. (M, n) [rad]
     dq: Array  #: Velocities. (M, n) [rad/s]
@@ -105,20 +108,27 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
     # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
-    columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}
-    for j in range(recording.joints):
-        velocity = zero_phase(t, dq[:, j : j + 1], processing.cutoff)
-        columns["dq"].append(velocity[kept])
-        columns["ddq"].append(derivative(t, velocity)[kept])
-        for name, signal in (("q", recording.q), ("tau", torque)):
-            columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
+
+    def smooth(signal: Array) -> Array:
+        return zero_phase(t, signal[:, None], processing.cutoff)
+
+    joints = []
+    for position, speed, effort in zip(recording.q.T, dq.T, torque.T, strict=True):
+        velocity = smooth(speed)
+        signals = smooth(position), velocity, derivative(t, velocity), smooth(effort)
+        joints.append([signal[kept] for signal in signals])
+    q, velocities, ddq, tau = (np.concatenate(x, axis=1) for x in zip(*joints, strict=True))
+    usable = usable_samples(t, dq, processing.cutoff)[kept]
     return PreparedLog(
         recording=recording,
         processing=processing,
         kept=kept,
         t=t[kept],
-        usable=usable_samples(t, dq, processing.cutoff)[kept],
-        **{name: np.concatenate(parts, axis=1) for name, parts in columns.items()},
+        q=q,
+        dq=velocities,
+        ddq=ddq,
+        tau=tau,
+        usable=usable,
     )
 
 
@@ -141,6 +151,30 @@ def gravity_torque(robot: Robot, q: Array) -> Array:
         span = slice(start, start + CHUNK)
         out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
     return out
+
+
+def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
+    """Rigid-body torque of the loaded arm, without rotors. (M, n) [N·m]"""
+    phi = chain_parameters(robot.loaded_chain)
+    out = np.empty(motion.q.shape)
+    for span in motion.chunks():
+        state = motion.q[span], motion.dq[span], motion.ddq[span]
+        out[span] = torque_regressor(robot.chain, *state) @ phi
+    return out
+
+
+def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
+    """Torque the drives need by the robot's model, friction filtered like the log. (M, n) [N·m]"""
+    torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
+    if not robot.friction:
+        return torque
+    recording = motion.recording
+    load = gravity_torque(robot, recording.q)
+    friction = RunningFriction(robot.friction).torque(
+        recording.q, recording.require("dq"), load, measured_temperature(recording)
+    )
+    total: Array = torque + motion.filtered(friction)
+    return total
 
 
 def root_mean_square(x: Array) -> Array:

@@ -7,8 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_shapes import FrictionColumns, friction_columns
-from vftcli.identification.processing import PreparedLog, Processing, prepare
-from vftcli.identification.scoring import predicted_torque, rigid_torque
+from vftcli.identification.processing import (
+    PreparedLog,
+    Processing,
+    predicted_torque,
+    prepare,
+    rigid_torque,
+)
 from vftcli.robots.drive import uses_current
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask

@@ -34,8 +34,8 @@ from vftcli.identification.physical_links import (
     nearest_physical_links,
     predicts_best_unpulled,
 )
+from vftcli.identification.processing import rigid_torque
 from vftcli.identification.result import MethodResult, Number
-from vftcli.identification.scoring import rigid_torque
 from vftcli.identification.training import Training
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import chain_parameters, with_parameters
@@ -46,8 +46,8 @@ from vftcli.signals.remarks import caution, fact
 
 #: Share of undetermined base parameters from which on a motion tells the links too little.
 NARROW = 0.7
-#: The same where the weakest pull predicts best, as of rounds of one motion: each knows the others,
-#: whatever the links are.
+#: That share where the weakest pull predicts best, as of rounds of one motion: each knows the
+#: others, whatever the links are.
 MOST = 0.5
 #: Share of a joint's torque that its profile's links must leave before others are sought.
 MATTERS = 0.02
@@ -57,7 +57,7 @@ def whole_arm(data: Training) -> MethodResult:
     """Base parameters by weighted least squares, and the robot of the nearest physical links.
 
     Friction models are chosen twice: with the profile's links, and again with the links that come
-    out, so that an error of the profile is not taken for friction.
+    out, so that an error of the profile does not count as friction.
     """
     data, fits, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)
@@ -139,7 +139,7 @@ def with_vector(
 
 
 def chosen_method(data: Training) -> MethodResult:
-    """What "friction" finds, or "base" where the profile's links are not the arm's.
+    """Result of "friction", or of "base" where the profile's links are not the arm's.
 
     The links are identified too where they leave `OTHER_LINKS` times what free ones leave, the logs
     tell them, and nothing suggests a load or another arm.

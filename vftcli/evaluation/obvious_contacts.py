@@ -1,7 +1,7 @@
 """Touches: where a log shows contact by itself, so that nobody calls its motion free.
 
 The torque that the model leaves open is low-passed and compared with its own quiet level: friction
-that is missed spreads over a log, a contact stands out of it.
+that is missed spreads over a log, a contact sticks out of it.
 """
 
 from typing import NamedTuple
@@ -13,11 +13,11 @@ from vftcli.signals.filters import low_pass
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.remarks import Remark, Where, warning
 
-#: Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]
+#: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not. [Hz]
 CUTOFF = 2.0
-#: Multiple of a joint's median open torque from which it stands out.
+#: Multiple of a joint's median open torque from which it sticks out.
 #:
-#: Free UR10e logs reach more on joints whose friction is missed for a moment (13.8), but below
+#: Free UR10e logs reach more on joints with friction missed for a moment (13.8), but below
 #: their dry friction; logs of hands, and simulated pushes, reach 17–100.
 STANDING_OUT = 8.0
 #: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
