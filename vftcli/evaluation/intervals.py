@@ -17,16 +17,16 @@ from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
 SEED = 20250811  #: Seed of every bootstrap: the same log gives the same interval.
-#: Blocks a repetition is put together from, at most: more change nothing but the time it takes.
+#: Most blocks in a repetition: more change nothing but the time it takes.
 MOST_BLOCKS = 300
-#: Blocks a repetition is put together from, at least, however long errors remember.
+#: Fewest blocks in a repetition, however long errors remember.
 LEAST_BLOCKS = 10
 MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
 #: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
 LEVEL = 0.95  #: Coverage of the intervals.
 FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
-#: Columns of the significance table: RMSE of `observer` less that of `other`, 95 % interval, p.
+#: Columns of the significance table: RMSE less that of `other`, 95 % interval, p.
 SIGNIFICANCE: dict[str, type[pl.DataType]] = {
     "recording": pl.String,
     "joint": pl.Int64,

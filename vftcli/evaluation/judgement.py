@@ -1,4 +1,4 @@
-"""From estimates and wrenches to how they compare with a reference: one table of errors."""
+"""Estimates and wrenches beside a reference: one table of errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""A vendor's torques through the Jacobian that the log holds, beside the log's own sensor."""
+"""A vendor's torques through a log's own Jacobian, beside its sensor."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wr
 from vftcli.virtual_sensor.vendor import RESEMBLES, fit_axes
 
 VENDOR, SENSOR = "vendor", "sensor"
-#: The frame of such a wrench: axes and point are those of the log's Jacobian, whatever they are.
+#: The frame of such a wrench: axes and point of the log's Jacobian.
 AXES_OF_LOG = "jacobian"
 
 

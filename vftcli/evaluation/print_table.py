@@ -76,7 +76,7 @@ class Comparison:
         """Joints on which another observer is best than in print, and ours over the print."""
         printed = np.array([self.printed(name) for name in self.names])
         ours = np.array([self.ours[name] for name in self.names])
-        # A joint on which no observer is known has no best of its own: the first is named for it.
+        # Of a joint on which no observer is known the first is named.
         here = np.argmin(np.where(np.isfinite(ours), ours, np.inf), axis=0)
         other = [
             f"J{j} ({self.names[theirs]} in print, {self.names[own]} here)"

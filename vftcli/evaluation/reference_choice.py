@@ -1,4 +1,4 @@
-"""ReferenceLoad and ReferenceChoice: what estimates are judged by, and what each is made from."""
+"""ReferenceLoad and ReferenceChoice: torque that estimates are judged by, and its sources."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace

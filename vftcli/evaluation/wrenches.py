@@ -1,4 +1,4 @@
-"""Errors of wrenches against a reference wrench: rows below the joints' in the same table."""
+"""Errors of wrenches against a reference wrench: rows below the joints'."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Friction fitted on free motion alone: contacts left out, and a robot that is another doubted."""
+"""Friction fitted on free motion alone: contacts left out, another robot doubted."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
 #: Share of the torque's variation that the profile's links and fitted friction must explain in the
 #: joints that carry weight; with the right robot it is 0.99 or more.
 WRONG = 0.95
-LOAD_EXPLAINS = 0.8  #: Share of what the profile misses that a load must explain to be suspected.
+LOAD_EXPLAINS = 0.8  #: Share of the profile's misfit that a suspected load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest load that is suspected. [kg]
 #: A joint carries the arm's weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
@@ -36,9 +36,9 @@ HEAVY = 0.1
 #: 1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12.
 OTHER_LINKS = 3.0
 THIRDS = 3  #: Stretches in which a log's friction is compared, for a warm-up.
-#: Fall of the dry friction from the first to the last stretch that is remarked on, as a share.
+#: Share by which dry friction falls from the first to the last stretch of a warm-up.
 DRIFT = 0.05
-LEAST = 0.1  #: Smallest fall that is. [N·m]
+LEAST = 0.1  #: Smallest such fall. [N·m]
 
 
 class CleanFit(NamedTuple):
@@ -116,7 +116,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     """
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
-    # The zero-phase filter spreads what happens at standstill over about a period of its cutoff.
+    # The filter spreads what happens at standstill over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.processing.cutoff * median_step(motion.t))))
     sticks = near(slower(motion.dq, SLIDES), reach)
     excess = np.maximum(np.abs(residual) - np.abs(dry) * sticks, 0.0)
@@ -145,7 +145,7 @@ def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Ar
 
 
 def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
-    """Residual of the profile's links over that of free ones, in joints with weight. (h,) [1]
+    """Residual of the profile's links over that of free ones, of heavy joints. (h,) [1]
 
     All inertial parameters are let go, be they physical or not, the structure of the friction
     held: what they leave is what no links explain, the noise of this log.
@@ -169,7 +169,7 @@ def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
 
 
 def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
-    """Root of the weighted mean square of each joint over all logs; 0 of no weight. (n,) [N·m]"""
+    """Weighted RMS of each joint over all logs; 0 of no weight. (n,) [N·m]"""
     weights = np.concatenate([log.weights for log in data.logs])
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
     value: Array = np.sqrt(square / np.maximum(np.sum(weights, axis=0), 1e-12))
@@ -184,7 +184,7 @@ def heavy_joints(data: Training) -> Mask:
 
 
 def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """Remarks on logs with torque that the profile's links and fitted friction do not explain."""
+    """Remarks on torque that the profile's links and fitted friction do not explain."""
     doubts = list[Remark]()
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
@@ -207,7 +207,7 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 
 
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """A remark on each log with friction that falls from third to third, and its joints.
+    """Remarks on logs with friction that falls from third to third.
 
     Of what the fit leaves, the part that goes with the direction is the dry friction that a third
     has beyond the whole log's. A gear that warms up rubs less and less.

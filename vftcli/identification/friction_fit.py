@@ -1,4 +1,4 @@
-"""Friction, rotor inertia and drive constant of each joint, the links held: candidates, folds."""
+"""Friction, rotor inertia and drive constant of each joint, the links held."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -44,7 +44,7 @@ PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
 #: Terms that would push the joint along with a negative value.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
-#: Terms that are bounded at zero in the fit of a joint for which no candidate is friction.
+#: Terms bounded at zero in the fit of a joint for which no candidate is friction.
 BOUNDED = ("coulomb", "viscous")
 
 #: Velocities are turned where both terms push, so that the bound leaves this many times the power,
@@ -55,11 +55,11 @@ TURNED, PUSH = 2.0, 0.02
 SLIDING = 3e-3  #: Smoothing of the sign where presliding says what happens around rest. [rad/s]
 #: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
-MARGIN = 1.01  #: A simpler model within this factor of the best cross-validated error is preferred.
+MARGIN = 1.01  #: A simpler model is preferred within this factor of the best error.
 #: A shorter presliding length within this factor of the best is preferred, and none to all.
 LENGTH_MARGIN = 1.02
 LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be seen. [N·m]
-#: Share of a fit's cross-validated error from which down on the profile's friction is kept.
+#: Share of a fit's error below which the profile's friction is kept.
 KEPT = 0.85
 #: Relative standard deviation up to which a drive constant is fitted to free motion.
 CONSTANT_KNOWN = 0.02
@@ -87,7 +87,7 @@ class JointData(NamedTuple):
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
     speed_limit: float  #: Speed up to which its friction may not fall. [rad/s]
-    torque_limit: float = 0.0  #: The joint's largest torque, 0 where that is not known. [N·m]
+    torque_limit: float = 0.0  #: The joint's largest torque, 0 if not known. [N·m]
     #: Torque of the profile's friction and rotor; None where they do not compete. (M,) [N·m]
     profile: Array | None = None
 
@@ -165,7 +165,7 @@ def fit_frictions(data: Training) -> list[JointFit | None]:
     fits: list[JointFit | None] = [None] * data.robot.joints
     for j in moving:
         fit = fit_joint(data, j, presliding, data.fit_constants)
-        # A joint that carries little cannot tell its constant, the last coefficient, from friction.
+        # A joint with little load cannot tell its constant, the last value, from friction.
         if data.fit_constants and fit.fit.sd[-1] >= CONSTANT_KNOWN * abs(fit.fit.values[-1]):
             fit = fit_joint(data, j, presliding, False)
         fits[j] = fit
@@ -173,7 +173,7 @@ def fit_frictions(data: Training) -> list[JointFit | None]:
 
 
 def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: bool) -> JointFit:
-    """Choose and fit the model of joint j (from 0), with its drive constant or without."""
+    """Fit of joint j (from 0), with its drive constant or without."""
     given = data_of_joint(data, j, constant)
     if not data.rubs:
         return JointFit(Shape(()), given.fit(Shape(())), {}, constant, presliding)
@@ -212,7 +212,7 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
 
 
 def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
-    """Residuals of the friction fits, log by log; zero for joints that are held. (M, n) each"""
+    """Residuals of the friction fits, log by log; zero for held joints. (M, n) each"""
     ends = np.cumsum([log.motion.samples for log in data.logs])
     whole = np.zeros((ends[-1], data.robot.joints))
     for j, fit in enumerate(fits):
@@ -325,7 +325,7 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
 
 
 def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
-    """Drop what the motion cannot tell: growth with a load there is none of, offset one-way."""
+    """The terms that the motion can tell: no growth with no load, no offset one-way."""
     out = tuple(t for t in terms if t != "load_coulomb" or data.load_spread >= LIGHT)
     return out if data.reverses else tuple(t for t in out if t != "offset")
 

@@ -23,9 +23,9 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 #: Standard deviation over value up to which a number counts as determined by the logs.
 DETERMINED = 0.3
-#: Standard deviations from the profile's rotor inertia from which on the fitted one is used.
+#: Standard deviations off from which a profile's rotor inertia is replaced.
 REFUTED = 3.0
-#: Slope of measured over expected torque below which a current does not follow its torque.
+#: Measured over expected torque below which a current does not follow it.
 LEAST_SLOPE = 0.05
 
 
@@ -142,12 +142,12 @@ def identified_friction(
 
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
-    """A remark if the fitted friction would push joint j (from 0) at some speed, or falls."""
+    """A remark if the fitted friction of joint j (from 0) pushes at some speed, or falls."""
     motions = [log.motion for log in data.logs]
     speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(m.tau)[j] for m in motions)
-    # A hundredth of the torque's spread: friction of nothing comes out on either side of zero.
+    # A hundredth of the torque's spread: no friction comes out on either side of zero.
     if np.all(torque < -0.01 * noise):
         raise IdentificationError(
             f"{data.recordings[0].name}: friction of joint {j + 1} comes out as {torque[0]:.2g} to "
@@ -201,7 +201,7 @@ def fitted_result(
 
 
 def temperature_remarks(data: Training) -> list[Remark]:
-    """By what the joints' temperatures scaled friction, of each log that has them."""
+    """Remarks on the factors of friction by the joints' temperatures."""
     remarks = []
     for log in data.logs:
         if (warmth := log.columns.warmth) is not None:

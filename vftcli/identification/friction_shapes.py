@@ -1,4 +1,4 @@
-"""Friction as a sum of known shapes times coefficients: what is linear in it, and what is not.
+"""Friction as a sum of known shapes times coefficients.
 
 The shapes are evaluated on the log as it was recorded and then filtered like the torque, so that a
 reversal is rounded alike on both sides of the equation.
@@ -26,7 +26,7 @@ LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 BENDS = (0.01, 0.5, 1.5, 3.2)
 #: Share of the way between two points that a motion must cover to tell the faster one.
 SPANNED = 0.3
-#: Friction model that a robot file gets: that of the first of these terms that a joint has.
+#: Term → friction model in a robot file; the first that a joint has counts.
 MODELS = {
     "logarithmic": "coulomb-logarithmic",
     "stribeck": "coulomb-viscous-stribeck",
@@ -53,7 +53,7 @@ class Shape(NamedTuple):
 
     @property
     def model(self) -> str:
-        """Name of the friction model that the robot file gets: the simplest that has all terms."""
+        """Name of the simplest friction model that has all terms."""
         if self.points:
             return "points"
         return next((name for term, name in MODELS.items() if term in self.terms), SIMPLEST)
@@ -87,7 +87,7 @@ class Shape(NamedTuple):
                 parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
         if "presliding" in self.terms:
             parameters["presliding_length"] = self.presliding_length
-        # What was not fitted, as what slides where all of it is presliding's, is none of it.
+        # A dry torque that is all presliding's leaves none to what slides.
         required, _ = FRICTION_KEYS[self.model]
         parameters = {**dict.fromkeys(required, 0.0), **parameters}
         return JointFriction(
@@ -100,7 +100,7 @@ class Shape(NamedTuple):
 
 
 def bent(speed: float) -> Shape | None:
-    """The bent line whose points a motion up to a speed [rad/s] tells, None if fewer than two.
+    """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
 
     Between its points the line is straight, so that a motion well beyond one of them tells the
     next one too; behind its last point it goes on as it came.
@@ -154,7 +154,7 @@ class FrictionColumns:
         self.cache: dict[tuple[str, int, tuple[float, ...]], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One term of joint j (from 0), filtered like the torque and kept for later calls. (M,)"""
+        """One term of joint j (from 0), filtered like the torque, made once. (M,)"""
         # The key holds only what the term depends on, so that shapes share their columns.
         numbers = {
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
@@ -182,7 +182,7 @@ class FrictionColumns:
 
 
 def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
-    """A log's friction columns, by a robot's gravity and its law for the log's temperatures."""
+    """A log's friction columns, by a robot's gravity and temperature law."""
     temperature = measured_temperature(motion.recording)
     warmth = None if temperature is None else friction_factor(robot.friction, temperature)
     return FrictionColumns(motion, np.abs(gravity_torque(robot, motion.recording.q)), warmth)

@@ -132,7 +132,7 @@ def identify(
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
-    """Find the load: from a pair if there is one, else from poses at rest, else from motion."""
+    """The load, from a pair if there is one, else from poses, else from motion."""
     bare = robot.with_payload(None)
     if free is not None:
         fit = payload_from_pair(logs[0], free, bare)
@@ -183,7 +183,7 @@ def with_provenance(
     trained: Sequence[Recording],
     load: LoadFit | None,
 ) -> Robot:
-    """The identified robot under its own name, its document telling the source of every number."""
+    """The identified robot under its own name, with the source of every number."""
     profile = found.profile
     named = replace(
         found.robot,

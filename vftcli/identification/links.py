@@ -29,7 +29,7 @@ TRUNCATION = 1e-3
 PROBES = 400  #: Random states at which the structure of base parameters is found.
 #: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
 RANK_TOLERANCE = 1e-8
-#: A parameter with a standard deviation of more than this share of its size is not determined.
+#: Share of its size from which a parameter's deviation leaves it undetermined.
 DOUBTFUL = 0.3
 
 
@@ -93,7 +93,7 @@ class Triangles(NamedTuple):
 
     layout: ParameterColumns  #: The unknowns.
     parts: tuple[Array, ...]  #: R factor of each cross-validation stretch. (size+1, size+1) each
-    correlation: float  #: Samples that count as one, by the residual's correlation along time.
+    correlation: float  #: Samples that count as one, by the residual's correlation.
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
         """R (size, size) and the right-hand side (size,) of all stretches but one."""
@@ -143,7 +143,7 @@ def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -
 
 
 def joint_sigma(logs: Sequence[TrainingLog], left: Sequence[Array]) -> Array:
-    """Robust standard deviation of each joint's residual where it tells anything. (n,) [N·m]"""
+    """Robust deviation of each joint's weighted residual. (n,) [N·m]"""
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
     return np.array([max(float(robust_sd(r[w > 0])), 1e-9) for r, w in pairs])

@@ -238,7 +238,7 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] from the motion's clock to the other log's, and the difference left. [rad rms]"""
+    """Shift [s] from the motion's clock to the other log's, and what is left. [rad rms]"""
 
     def distance(shift: float) -> float:
         at = motion.t + shift

@@ -23,7 +23,7 @@ from vftcli.signals.errors import IdentificationError
 
 #: Weights of the distance to the profile, from hardly any pull to the profile itself.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
-MARGIN = 1.01  #: Factor of the least misfit within which a pull predicts as well as the best one.
+MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
 #: Pull of a maker's table with masses of 5 % standard deviation: the distance of
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0

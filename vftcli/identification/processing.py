@@ -90,7 +90,7 @@ class PreparedLog:
         return np.concatenate(columns, axis=1)
 
     def chunks(self, size: int = 1024) -> Iterator[slice]:
-        """Spans of at most `size` samples: a regressor of a whole log would not fit into memory."""
+        """Spans of `size` samples: a whole log's regressor would not fit into memory."""
         for start in range(0, self.samples, size):
             yield slice(start, min(start + size, self.samples))
 
@@ -164,7 +164,7 @@ def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
 
 
 def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
-    """Torque the drives need by the robot's model, friction filtered like the log. (M, n) [N·m]"""
+    """Drive torque by the robot's model, friction filtered like the log. (M, n) [N·m]"""
     torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
     if not robot.friction:
         return torque

@@ -100,7 +100,7 @@ class Number(NamedTuple):
     sd: float  #: Its standard deviation.
     unit: str  #: Unit of value, sd and profile.
     profile: float  #: The profile's number, nan where it has none.
-    determined: bool  #: Whether the logs determine it; a value that they do not is not written.
+    determined: bool  #: Whether the logs determine it; else it is not written.
 
 
 def number(
@@ -238,7 +238,7 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
 
 
 def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:
-    """Mass that would explain the residual, and the share of it that it explains. [kg], [1]"""
+    """Mass that would explain the residual, and the share explained. [kg], [1]"""
     Y = [
         torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s])[:, :, -LINK:]
         for s in motion.chunks()

@@ -50,7 +50,7 @@ from vftcli.signals.rest import NONZERO, SLIDES, faster
 CUTOFF = 4.0
 #: Relative standard deviation up to which a drive constant counts as determined.
 CONSTANT_KNOWN = 1e-2
-ROTOR_KNOWN = 2e-2  #: Relative standard deviation up to which a rotor inertia counts as determined.
+ROTOR_KNOWN = 2e-2  #: The relative deviation up to which a rotor inertia does.
 #: Friction shapes beside which the drive constants must agree.
 SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
@@ -144,7 +144,7 @@ def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
     scales = [m.gravity for m in models if m.gravity.known]
     if not scales:
         return []
-    # All joints feel one gravity: their ratios are averaged by the inverse of their variances.
+    # All joints feel one gravity: their ratios count by their inverse variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
     ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
     least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
@@ -315,7 +315,7 @@ def controller_friction(
 
 
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
-    """Raise an IdentificationError if a hand led the arm: the controller then uses less friction.
+    """Raise if a hand led the arm: the controller then uses less friction.
 
     Where the log has target velocities, they are zero while the arm moves; elsewhere the friction
     fed forward is a fraction of the law, .1 to 1.1 of it as the joint may be: one joint far below

@@ -1,4 +1,4 @@
-"""Training data: logs filtered, with what the profile says of them and which joints they move."""
+"""Training data: filtered logs, the profile's torques, and the joints that move."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

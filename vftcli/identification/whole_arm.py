@@ -44,7 +44,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import caution, fact
 
-#: Share of undetermined base parameters from which on a motion tells the links too little.
+#: Share of undetermined base parameters from which a motion is narrow.
 NARROW = 0.7
 #: That share where the weakest pull predicts best, as of rounds of one motion: each knows the
 #: others, whatever the links are.
@@ -67,7 +67,7 @@ def whole_arm(data: Training) -> MethodResult:
     layout, start = initial_columns(data, fits)
     triangles = stack(layout, data.logs, start)
     base = base_parameters(triangles, start)
-    behind = len(base) - layout.size  # what a friction coefficient's row lies behind its column
+    behind = len(base) - layout.size  # of a coefficient's row to its column
     count = layout.rotor_places.stop + behind
     undetermined = int((~base["determined"][:count]).sum())
     share = undetermined / max(count, 1)
@@ -82,7 +82,7 @@ def whole_arm(data: Training) -> MethodResult:
     for j, (fit, place) in enumerate(zip(fits, layout.frictions, strict=True)):
         if fit is not None and data.rubs:
             values = x[place]
-            # Beside the links' errors a rise may turn into a fall; the joint's own fit does not.
+            # Beside errors of the links a rise may fall; the joint's own fit does not.
             if not is_dissipative(fit.shape, values, data.top_speed(j)):
                 values = fit.fit.values[: len(fit.shape.terms)]
             sd = base["sd"].to_numpy()[place.start + behind : place.stop + behind]
@@ -95,7 +95,7 @@ def whole_arm(data: Training) -> MethodResult:
 
 
 def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
-    """The training data with other links: their rigid-body torque, their gravity as load."""
+    """The training data with other links: their rigid-body torque and load."""
     robot = with_vector(data.robot, layout, x, data.robot.friction)
     logs = [
         log._replace(
