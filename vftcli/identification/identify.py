@@ -61,7 +61,8 @@ class Task:
 
     def __post_init__(self) -> None:
         if self.method is not None and self.method not in METHODS:
-            raise ParameterError(f"--method {self.method!r}; there is {', '.join(METHODS)}")
+            there = ", ".join(METHODS)
+            raise ParameterError(f"--method {self.method!r}; there is {there}")
         if self.method is None and not self.find_payload:
             raise ParameterError(f"nothing to identify: give --method {'|'.join(METHODS)}")
         if self.fit_constants and self.method != "friction":
