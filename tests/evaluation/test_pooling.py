@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.evaluation import evaluate, evaluate_pooled
-from vftcli.evaluation.pooling import POOLED, PoolMember
+from vftcli.evaluation.errors import POOLED, PoolMember
 from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.008 * np.arange(1500)

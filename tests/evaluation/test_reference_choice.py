@@ -6,12 +6,11 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import reference_file
+from vftcli.evaluation import reference_choice
 from vftcli.evaluation.judgement import reference_wrench
 from vftcli.evaluation.reference_choice import (
     REFERENCES,
     ReferenceChoice,
-    ReferenceSource,
     make_reference,
 )
 from vftcli.readers.references import read_reference
@@ -28,7 +27,7 @@ T = 0.01 * np.arange(300)
 RNG = np.random.default_rng(3)
 Q = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]) + 0.2 * np.sin(np.outer(T, RNG.uniform(0.3, 1, 6)))
 RECORDING = Recording(t=T, q=Q, tau_ext=RNG.standard_normal((300, 6)))
-SOURCE = ReferenceSource(motion=FreeMotion(log=Run(recording=RECORDING, robot=ROBOT)))
+MOTION = FreeMotion(log=Run(recording=RECORDING, robot=ROBOT))
 WRENCH = 5.0 * RNG.standard_normal((300, 6))
 
 
@@ -60,10 +59,10 @@ def test_an_unknown_name_is_refused_before_any_log_is_read() -> None:
 
 
 def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
-    zero = make_reference(SOURCE, ReferenceChoice(name="zero")).torque
+    zero = make_reference(MOTION, ReferenceChoice(name="zero")).torque
     assert not zero.tau.any()
     assert zero.floor is None  # nobody knows how free the motion was
-    vendor = make_reference(SOURCE, ReferenceChoice(name="vendor")).torque
+    vendor = make_reference(MOTION, ReferenceChoice(name="vendor")).torque
     np.testing.assert_array_equal(vendor.tau, RECORDING.tau_ext)
     assert vendor.floor is None  # its error is not known
 
@@ -71,10 +70,10 @@ def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
 def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:
     reads = []
     monkeypatch.setattr(
-        reference_file, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
+        reference_choice, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
     )
     choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
-    reference = make_reference(SOURCE, choice)
+    reference = make_reference(MOTION, choice)
     wrench = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
     assert len(reads) == 1
     # A file of base axes, asked for in base axes, comes back as it is.
@@ -83,7 +82,7 @@ def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> Non
 
 def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) -> None:
     choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
-    tau = make_reference(SOURCE, choice).torque.tau
+    tau = make_reference(MOTION, choice).torque.tau
     J = flange_jacobian(ROBOT.chain, Q)
     np.testing.assert_allclose(tau[7], J[7].T @ WRENCH[7], atol=1e-12)
 
@@ -91,7 +90,7 @@ def test_a_wrench_alone_gives_the_torque_of_its_transposed_jacobian(tmp_path) ->
 def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
     """Zero throughout is a truth; of a log's own wrench it means that nothing was measured."""
     zero = np.zeros((300, 6))
-    both = make_reference(SOURCE, write_wrench(tmp_path / "x.parquet", zero, tau_ext=zero))
+    both = make_reference(MOTION, write_wrench(tmp_path / "x.parquet", zero, tau_ext=zero))
     assert not both.torque.tau.any()
     assert both.wrench is not None
     assert not both.wrench.values.any()
@@ -100,7 +99,7 @@ def test_a_file_may_say_that_nobody_touched_the_arm(tmp_path) -> None:
 def test_torques_of_a_file_go_before_its_wrench(tmp_path) -> None:
     tau = RNG.standard_normal((300, 6))
     choice = write_wrench(tmp_path / "truth.parquet", WRENCH, tau_ext=tau)
-    reference = make_reference(SOURCE, choice)
+    reference = make_reference(MOTION, choice)
     np.testing.assert_allclose(reference.torque.tau, tau, atol=1e-12)
     assert reference.wrench is not None
     remark = reference.torque.remarks[0]
@@ -111,7 +110,7 @@ def test_samples_beyond_the_file_are_unknown_half_a_sample_allowed(tmp_path) -> 
     """The file begins 4 ms after the log's 50th sample: half of the 10 ms step covers it."""
     t = T[50:200] + 0.004
     choice = write(tmp_path / "truth.parquet", t, tau_ext=np.repeat(t[:, None], 6, axis=1))
-    tau = make_reference(SOURCE, choice).torque.tau
+    tau = make_reference(MOTION, choice).torque.tau
     known = np.isfinite(tau).all(axis=1)
     np.testing.assert_array_equal(np.flatnonzero(known), np.arange(50, 200))
     np.testing.assert_allclose(tau[51:200, 0], T[51:200], atol=1e-12)  # linear between stamps
@@ -123,20 +122,20 @@ def test_a_clock_of_another_day_is_refused(tmp_path, what) -> None:
     choice = write_wrench(path, WRENCH) if what == "wrench" else write(path, tau_ext=WRENCH)
     pl.read_parquet(path).with_columns(pl.col("t") + 1e6).write_parquet(path)
     with pytest.raises(ReferenceTorqueError, match="does not overlap the log's"):
-        make_reference(SOURCE, choice)
+        make_reference(MOTION, choice)
 
 
 def test_a_file_of_another_arm_is_refused(tmp_path) -> None:
     choice = write(tmp_path / "truth.parquet", tau_ext=np.zeros((300, 7)))
     with pytest.raises(ReferenceTorqueError, match="7 torque columns for a log of 6 joints"):
-        make_reference(SOURCE, choice)
+        make_reference(MOTION, choice)
 
 
 def test_a_torque_becomes_a_wrench_by_least_squares(tmp_path) -> None:
     """Jᵀ w of a wrench, away from singular poses, gives the wrench back."""
     tau = np.einsum("tij,ti->tj", flange_jacobian(ROBOT.chain, Q), WRENCH)
     choice = write(tmp_path / "truth.parquet", tau_ext=tau)
-    reference = make_reference(SOURCE, choice)
+    reference = make_reference(MOTION, choice)
     assert reference.wrench is None
     solved = reference_wrench(RECORDING, ROBOT, reference, VirtualSensor(frame="base"))
     assert not solved.hidden.any()

@@ -9,10 +9,9 @@ from vftcli.evaluation.selection import (
     advice,
     best,
     facts,
-    mean_rmse,
     step_response,
 )
-from vftcli.observers import KalmanObserver, MomentumObserver
+from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
@@ -69,9 +68,12 @@ def test_an_observers_rmse_is_its_own_mean_over_joints() -> None:
             "rmse_Nm": [1.0, 3.0, None, 50.0, 70.0, 900.0],
         }
     )
-    assert mean_rmse("gmo", errors) == pytest.approx(2.0)
-    assert mean_rmse("fdo", errors) == pytest.approx(60.0)
-    assert np.isnan(mean_rmse("kfo-fe", errors))
+    observers = [MomentumObserver(gain=5.0), FilteredDynamicsObserver(omega=5.0), KalmanObserver()]
+    tunings = {o.name: o.tuning(STEP, 2) for o in observers}
+    gmo, fdo, kalman = facts(observers, tunings, run_of(terms()), errors)
+    assert gmo.rmse == pytest.approx(2.0)
+    assert fdo.rmse == pytest.approx(60.0)
+    assert np.isnan(kalman.rmse)
 
 
 def test_alike_within_two_per_cent_are_both_best() -> None:

@@ -1,25 +1,31 @@
 """Friction from free motion alone: contacts left out, wrong robots doubted."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from vftcli.identification.clean_fit import (
     OTHER_LINKS,
-    contacts_remark,
+    TOUCH_MARGIN,
+    TOUCH_TIME,
+    ContactSpan,
+    find_contacts,
     fit_without_contacts,
     fitted_dry_friction,
     heavy_joints,
     links_explain,
     model_doubts,
+    warm_up_remarks,
 )
-from vftcli.identification.excitation import ContactSpan
+from vftcli.identification.friction_fit import fit_frictions
 from vftcli.identification.processing import Processing
-from vftcli.identification.training import all_residuals, fit_frictions, prepare_training
+from vftcli.identification.training import prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.rest import SLIDES
 
 RUBBING = JointFriction(
     model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
@@ -45,31 +51,114 @@ def test_a_push_is_left_out_of_the_fit(recording):
     push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
     pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
     data = prepare_training([pushed], UR5, Processing(), fit_constants=False)
-    fits, weights, remarks = fit_without_contacts(data, strict=False)
-    assert [r.code for r in remarks] == ["suspected-contacts"]
-    t = data.motions[0].t
-    np.testing.assert_array_equal(weights[0][(t > 5) & (t < 6)], 0.0)
-    assert weights[0][(t < 4.5) | (t > 6.5)].all()
+    found, fits, (remark,) = fit_without_contacts(data, strict=False)
+    assert remark.code == "suspected-contacts"
+    t, weights = data.logs[0].motion.t, found.logs[0].weights
+    np.testing.assert_array_equal(weights[(t > 5) & (t < 6)], 0.0)
+    assert weights[(t < 4.5) | (t > 6.5)].all()
+    # the samples closer than the margin, steps of 24 ms
+    ends = np.array([remark.values["starts_s"][0], remark.values["stops_s"][0]])
+    lost = t[weights[:, 0] == 0.0][[0, -1]] - ends
+    np.testing.assert_allclose(lost, [-TOUCH_MARGIN, TOUCH_MARGIN], atol=0.025)
+    assert (remark.values["count"], remark.values["worst_joints"]) == (1, [2])
+    assert remark.values["total_s"] == ends[1] - ends[0]
     clean = fit_without_contacts(
         prepare_training([recording], UR5, Processing(), fit_constants=False), strict=False
     )
-    assert clean[2] == []
-    np.testing.assert_allclose(fits[1].fit.values[:2], clean[0][1].fit.values[:2], rtol=0.05)
+    assert clean.remarks == []
+    np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.05)
 
 
 @pytest.mark.slow
 def test_the_dry_friction_of_a_fit_is_what_a_joint_may_stick_with(data):
-    fits = fit_frictions(data, [m.usable.astype(float) for m in data.motions])
+    fits = fit_frictions(data)
     # noise of .1 N·m; Coulomb torque and the smoothing of the sign share the reversals
-    np.testing.assert_allclose(fitted_dry_friction(data, 0, fits), 4.0, atol=0.3)
+    np.testing.assert_allclose(fitted_dry_friction(data.logs[0], fits), 4.0, atol=0.3)
 
 
-def test_contacts_are_counted_and_timed(data):
-    spans = [ContactSpan(1.0, 2.5, 3, -8.0), ContactSpan(4.0, 4.5, 1, 5.0)]
-    remark = contacts_remark(data.motions[0], spans)
-    assert remark.values["count"] == 2
-    assert remark.values["total_s"] == 2.0
-    assert (remark.values["starts_s"], remark.values["worst_joints"]) == ([1.0, 4.0], [3, 1])
+T = np.arange(0, 10, 0.01)
+
+
+def touched(seconds, size, joint=1, base=1.0):
+    """Residual ±base in turn, whose robust sd is 1.48·base, and a push from 4 s on."""
+    residual = base * np.where(np.arange(len(T)) % 2, 1.0, -1.0)[:, None] * np.ones(3)
+    residual[(T >= 4.0) & (4.0 + seconds > T), joint] = size
+    return residual
+
+
+@pytest.mark.parametrize(
+    ("seconds", "size", "found"),
+    [
+        (0.5, 11.0, True),  # 7 · 1.4826 = 10.4
+        (0.5, 10.0, False),
+        (0.5, -11.0, True),
+        (TOUCH_TIME - 0.03, 11.0, False),
+    ],
+)
+def test_a_contact_is_seven_deviations_large_and_lasts(prepared, seconds, size, found):
+    motion = prepared(T, dq=np.full((len(T), 3), 0.5))
+    spans = find_contacts(motion, touched(seconds, size), np.zeros((len(T), 3)))
+    assert len(spans) == found
+    for span in spans:
+        assert (span.joint, span.size) == (2, size)
+        # first and last sample at or above it
+        assert (span.start, span.stop) == pytest.approx((4.0, 4.0 + seconds - 0.01), abs=1e-9)
+
+
+def test_what_dry_friction_can_hold_near_standstill_is_no_contact(prepared):
+    dry = np.full((len(T), 3), 30.0)
+    standing = prepared(T, dq=np.zeros((len(T), 3)))
+    running = prepared(T, dq=np.full((len(T), 3), 0.5))
+    assert not find_contacts(standing, touched(0.5, 35.0), dry)
+    assert find_contacts(standing, touched(0.5, 45.0), dry)  # 45 − 30 = 15 > 10.4
+    assert find_contacts(running, touched(0.5, 35.0), dry)
+
+
+def test_samples_that_tell_nothing_are_no_contact(prepared):
+    motion = prepared(T, dq=np.full((len(T), 3), 0.5), usable=np.abs(T - 4.25)[:, None] > [[0.3]])
+    usable = np.repeat(motion.usable, 3, axis=1)
+    motion = prepared(T, dq=motion.dq, usable=usable)
+    assert not find_contacts(motion, touched(0.5, 50.0), np.zeros((len(T), 3)))
+
+
+def test_standstill_is_spread_by_a_period_of_the_filter(prepared):
+    dq = np.full((len(T), 3), 0.5)
+    dq[500] = 0.9 * SLIDES
+    motion, dry = prepared(1.2 * T, dq=dq), np.full((len(T), 3), 30.0)
+    # 1 / 8 Hz is 10.4 samples of 12 ms: what friction of 30 may hold in 10 to either side
+    for first, last, starts in ((490, 510, []), (511, 530, [511]), (500, 530, [511])):
+        residual = touched(0.0, 0.0)
+        residual[first : last + 1, 1] = 20.0
+        spans = find_contacts(motion, residual, dry)
+        assert [span.start for span in spans] == [motion.t[k] for k in starts]
+
+
+def test_neighbours_are_joined_and_the_larger_one_names_them(prepared):
+    motion, residual = prepared(T, dq=np.full((len(T), 3), 0.5)), touched(0.0, 0.0)
+    gap = round(100 * 2 * TOUCH_MARGIN)
+    residual[100:201, 0] = -25.0
+    residual[200 + gap - 1 : 301, 1] = 20.0  # .59 s later
+    residual[300 + gap + 1 : 501, 2] = 15.0  # .61 s later
+    spans = find_contacts(motion, residual, np.zeros((len(T), 3)))
+    assert spans == [
+        ContactSpan(1.0, 3.0, 1, -25.0),
+        ContactSpan(pytest.approx(3.61), 5.0, 3, 15.0),
+    ]
+
+
+def test_the_worst_explained_heavy_joint_is_named(data):
+    """Shares of the torque's mean square that the fit leaves; its variance is what counts."""
+    (log,), residuals = data.logs, [0.9, 0.2, 0.04, 0.9, 0.9, 0.9]
+    tau = log.motion.tau
+    fits = [
+        SimpleNamespace(fit=SimpleNamespace(residual=np.sqrt(share) * tau[:, j]))
+        for j, share in enumerate(residuals)
+    ]
+    (remark,) = model_doubts(data, fits)
+    assert (remark.code, remark.where.joints) == ("unexplained-torque", (2,))
+    left = 0.2 * np.mean(tau[:, 1] ** 2) / np.var(tau[:, 1])
+    assert remark.values["share_percent"] == pytest.approx(100 * max(1 - left, 0.0), abs=1e-9)
+    assert model_doubts(replace(data, moves=np.zeros(6, dtype=bool)), fits) == []
 
 
 def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
@@ -80,8 +169,7 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
         extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
         log = replace(recording, current=recording.current + extra / UR5.torque_constant)
         data = prepare_training([log], UR5, Processing(), fit_constants=False)
-        ones = [np.ones(m.tau.shape) for m in data.motions]
-        remarks = list(model_doubts(data, [np.zeros(m.tau.shape) for m in data.motions], ones))
+        remarks = model_doubts(data, [None] * 6)
         assert [r.code for r in remarks] == ["unknown-load"] * doubted
         if doubted:
             assert remarks[0].values["mass_kg"] == pytest.approx(mass, rel=0.02)
@@ -93,18 +181,16 @@ def test_strict_methods_refuse_what_others_remark_on(recording):
     data = prepare_training([turned], UR5, Processing(), fit_constants=False)
     with pytest.raises(IdentificationError, match="Choose another --robot"):
         fit_without_contacts(data, strict=True)
-    codes = [r.code for r in fit_without_contacts(data, strict=False)[2]]
+    codes = [r.code for r in fit_without_contacts(data, strict=False).remarks]
     assert codes[-2:] == ["unexplained-torque", "absorbed-doubt"]
 
 
 @pytest.mark.slow
 def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(recording, data):
     """The same effort through a UR10e's links, and its own links under noise of 30 N·m."""
-    weights = [m.usable.astype(float) for m in data.motions]
 
     def ratio(training):
-        fits = fit_frictions(training, weights)
-        return np.max(links_explain(training, fits, all_residuals(training, fits), weights))
+        return np.max(links_explain(training, fit_frictions(training)))
 
     # 10 cosines of freedom a link against 2300 equations a joint: a few per cent
     assert ratio(data) == pytest.approx(1.0, abs=0.1)
@@ -115,7 +201,27 @@ def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(reco
     noise = 30.0 * rng.standard_normal(recording.q.shape) / UR5.torque_constant
     noisy = replace(recording, current=recording.current + noise)
     trained = prepare_training([noisy], UR5, Processing(), fit_constants=False)
-    remarks = fit_without_contacts(trained, strict=True)[2]
+    remarks = fit_without_contacts(trained, strict=True).remarks
     (said,) = [r for r in remarks if r.code == "noisy-effort"]
     assert said.values["ratio"] < 1.2
     np.testing.assert_array_equal(heavy_joints(data), [False, True, True, False, False, False])
+
+
+def remarks_of(recording, arm):
+    """What is said of a log's warm-up."""
+    data = prepare_training([recording], arm, Processing(), fit_constants=False)
+    return warm_up_remarks(data, fit_frictions(data))
+
+
+@pytest.mark.slow
+def test_a_joint_that_rubs_less_and_less_is_told(rubbing_arm, rubbing_log):
+    assert remarks_of(rubbing_log, rubbing_arm) == []
+    # 2 N·m more in joint 1 at the start, gone at the end: +.67 and −.67 in the outer thirds
+    more = 2.0 * np.linspace(1.0, 0.0, rubbing_log.samples) * np.sign(rubbing_log.dq[:, 0])
+    current = rubbing_log.current.copy()
+    current[:, 0] += more / rubbing_arm.torque_constant[0]
+    (said,) = remarks_of(replace(rubbing_log, current=current), rubbing_arm)
+    assert (said.code, said.where.joints) == ("warm-up", (1,))
+    # a swing of some seconds does not fill a third evenly
+    assert said.values["first_Nm"] == pytest.approx([0.67], abs=0.25)
+    assert said.values["last_Nm"] == pytest.approx([-0.67], abs=0.25)

@@ -105,9 +105,10 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
     t = np.arange(0, 20, 0.01)
     q = 0.8 * np.sin(2 * np.pi * 0.1 * t)[:, None]
     dq = np.gradient(q, t, axis=0)
-    line = bent(float(np.abs(dq).max()), ("offset", "presliding"))
-    assert line.terms == ("point1", "point2", "offset", "presliding")
-    shape = line._replace(smoothing=0.003, presliding_length=1e-3)
+    line = bent(float(np.abs(dq).max()))
+    assert line.terms == ("point1", "point2")
+    terms = (*line.terms, "offset", "presliding")
+    shape = line._replace(terms=terms, smoothing=0.003, presliding_length=1e-3)
     values = np.array([3.0, 5.0, 0.4, 2.0])
     friction = shape.friction(values)
     assert (friction.model, friction.speeds, friction.torques) == ("points", BENDS[:2], (3.0, 5.0))

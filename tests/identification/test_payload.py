@@ -8,19 +8,16 @@ import pytest
 from vftcli.identification.payload import (
     REACH,
     STRETCHES,
-    LoadSolution,
     NotSameMotionError,
     different_poses,
     find_time_shift,
     fit_all_joints,
-    gain_covariance,
     load_at_flange,
     load_friction,
     names_of,
     payload_from_pair,
     payload_from_poses,
     resting_poses,
-    stretch_covariance,
 )
 from vftcli.identification.processing import gravity_torque
 from vftcli.robots import Payload, load_robot
@@ -46,7 +43,7 @@ def still(seconds=2.0):
 def load(mass, com, sd=(0.01, 0.001, 0.002, 0.003), logs=()):
     """A load of this mass that was solved for at `com` in the last link's frame of a Panda."""
     x = np.array([mass, *(mass * np.array(com))])
-    return load_at_flange(LoadSolution(x, np.array(sd), np.zeros(7)), PANDA, logs, SOURCE)
+    return load_at_flange(x, np.array(sd), np.zeros(7), PANDA, logs, SOURCE)
 
 
 def test_the_load_is_moved_to_flange_axes():
@@ -90,12 +87,12 @@ def test_each_joint_counts_by_its_own_residual():
     noise = rng.standard_normal((400, 3)) * [0.01, 0.01, 10.0]
     y = np.einsum("knp,p->kn", A, x) + noise
     # the noisy joint hardly counts: 0.01/√800 = 4e-4
-    np.testing.assert_allclose(fit_all_joints(A, y, np.ones((400, 3))), x, atol=2e-3)
+    np.testing.assert_allclose(fit_all_joints(A, y, np.ones((400, 3))).x, x, atol=2e-3)
     usable = np.ones((400, 3))
     usable[:, 2] = 0.0
     spoilt = y.copy()
     spoilt[:, 2] = 1e6
-    np.testing.assert_allclose(fit_all_joints(A, spoilt, usable), x, atol=2e-3)
+    np.testing.assert_allclose(fit_all_joints(A, spoilt, usable).x, x, atol=2e-3)
 
 
 def test_friction_grows_with_the_load_where_the_joint_moves():
@@ -182,10 +179,10 @@ POSES = np.random.default_rng(3).uniform(-1, 1, (5, 6)) + np.array([0, -1, 1, 0,
 
 def test_rests_are_averaged_without_their_edges():
     recording = steps(POSES)
-    q, torque = resting_poses([recording, recording], UR5)
-    np.testing.assert_allclose(q, np.vstack([POSES, POSES]), atol=1e-12)
-    np.testing.assert_allclose(torque[:5], gravity_torque(UR5, POSES), atol=1e-9)
-    assert len(resting_poses([steps(POSES, dwell=0.45)], UR5)[0]) < 5  # shorter than a dwell
+    q, torque = resting_poses(recording, UR5)
+    np.testing.assert_allclose(q, POSES, atol=1e-12)
+    np.testing.assert_allclose(torque, gravity_torque(UR5, POSES), atol=1e-9)
+    assert len(resting_poses(steps(POSES, dwell=0.45), UR5)[0]) < 5  # shorter than a dwell
     moving = ~held(recording.q, recording.median_step)
     assert moving[100:120].all()
     assert not moving[130:209].any()  # half a window of 0.2 s inside the rest
@@ -209,7 +206,7 @@ def test_what_settles_at_the_edges_of_a_rest_does_not_count():
     for k in range(5):  # 0.2 s after each arrival, of which the window takes 0.1 s
         settling[120 * k : 120 * k + 20] += 1.0
     spoilt = Recording(t=recording.t, q=recording.q, dq=recording.dq, current=settling)
-    torque = resting_poses([spoilt], UR5)[1]
+    torque = resting_poses(spoilt, UR5)[1]
     np.testing.assert_allclose(torque, gravity_torque(UR5, POSES), atol=1e-9)
 
 
@@ -229,7 +226,7 @@ def test_a_joint_that_a_load_does_not_reach_counts_for_nothing():
     A[:, 0] = 0.0
     x = np.array([1.5, -0.5])
     found = fit_all_joints(A, np.einsum("knp,p->kn", A, x), np.ones((100, 3)))
-    np.testing.assert_allclose(found, x, rtol=1e-9)
+    np.testing.assert_allclose(found.x, x, rtol=1e-9)
 
 
 def test_the_spread_of_a_solution_counts_what_lasts():
@@ -242,10 +239,9 @@ def test_the_spread_of_a_solution_counts_what_lasts():
     usable, found, told = np.ones(A.shape[:2]), [], []
     for _ in range(200):
         noise = np.repeat(rng.standard_normal((STRETCHES, 1)), 100, axis=0) * [1.0, 1.0]
-        x = fit_all_joints(A, noise, usable)
-        left = noise - np.einsum("knp,p->kn", A, x)
-        found.append(x)
-        told.append(np.diag(stretch_covariance(A, left, usable)))
+        fit = fit_all_joints(A, noise, usable)
+        found.append(fit.x)
+        told.append(np.diag(fit.motion_covariance(noise, 0.0)))
     spread, expected = np.std(found, axis=0), np.sqrt(np.mean(told, axis=0))
     # twelve stretches for two unknowns: told some 20 % too small; 200 fits: 5 %
     np.testing.assert_allclose(expected, spread, rtol=0.35)
@@ -254,15 +250,14 @@ def test_the_spread_of_a_solution_counts_what_lasts():
 def test_drive_constants_scale_a_load():
     """One joint: y = A x times 1.03 is x times 1.03; two joints that share it half and half."""
     rng = np.random.default_rng(7)
-    x, usable = np.array([2.0, -0.3]), np.ones((300, 1))
+    x = np.array([2.0, -0.3])
     A = rng.standard_normal((300, 1, 2))
     y = np.einsum("knp,p->kn", A, x)
-    sd = np.sqrt(np.diag(gain_covariance(A, np.ones_like(y), y, usable, 0.03)))
+    sd = np.sqrt(np.diag(fit_all_joints(A, y, np.ones_like(y)).gain_covariance(y, 0.03)))
     np.testing.assert_allclose(sd, 0.03 * np.abs(x), rtol=1e-9)
     both, torque = np.repeat(A, 2, axis=1), np.repeat(y, 2, axis=1)
-    sd = np.sqrt(
-        np.diag(gain_covariance(both, np.ones_like(torque), torque, np.ones((300, 2)), 0.03))
-    )
+    fit = fit_all_joints(both, torque, np.ones_like(torque))
+    sd = np.sqrt(np.diag(fit.gain_covariance(torque, 0.03)))
     # half the variance is common, of the other half each joint's own quarter remains
     np.testing.assert_allclose(sd, 0.03 * np.abs(x) * np.sqrt(0.5 * (1 + 0.5)), rtol=1e-9)
 

@@ -68,7 +68,7 @@ def test_long_stops_and_gaps_tell_nothing():
     dq = np.full((len(t), 2), 0.5)
     dq[100:129, 0] = 0.0  # 0.28 s: short
     dq[200:232, 0] = 0.0  # 0.31 s: long
-    usable = usable_samples(t, dq, Processing())
+    usable = usable_samples(t, dq, 8.0)
     lost = np.flatnonzero(~usable[:, 0])
     # 1/16 s to either side of the gap: 4.9275 to 4.99 and 5.50 to 5.5625
     gap = list(range(493, 507))

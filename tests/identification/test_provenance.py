@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from vftcli.identification.identify import with_provenance
 from vftcli.identification.payload import LoadFit
-from vftcli.identification.provenance import residual_tables, source_table, with_provenance
 from vftcli.identification.result import (
     BASE,
     PARAMETERS,
@@ -102,15 +102,16 @@ def test_a_load_says_how_it_was_found_and_in_which_log():
 
 
 def test_residuals_are_one_table_a_log_even_of_one_name():
-    tables = residual_tables(found().residuals)
-    assert tables == [
+    robot = with_provenance(found(), "", [log("a.csv")], [log("a.csv")], None)
+    assert robot.document["identification"]["residuals"] == [
         {"log": "log.csv", "role": "train", "rms_Nm": [1.1235, 1.2469]},
         {"log": "log.csv", "role": "held-out", "rms_Nm": [2.1235, 2.2469]},
     ]
 
 
 def test_a_source_has_length_and_digest():
-    table = source_table(3, log("a/log.csv", ""))
+    logs = [log("b.csv"), log("c.csv"), log("a/log.csv", "")]
+    table = with_provenance(found(), "", logs, logs, None).document["sources"][-1]
     assert (table["id"], table["sha256"]) == ("log-3", "unknown")
     assert table["ref"] == "log.csv, 101 samples, 1.000 s"
 

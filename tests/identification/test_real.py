@@ -9,7 +9,7 @@ import pytest
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
 from vftcli.identification.processing import Processing, prepare
-from vftcli.identification.scoring import REPEATED, repeated_share
+from vftcli.identification.result import REPEATED, repeated_share
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot

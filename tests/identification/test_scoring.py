@@ -6,14 +6,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.identification.result import Trace, root_mean_square
-from vftcli.identification.scoring import (
+from vftcli.identification.processing import predicted_torque, rigid_torque, root_mean_square
+from vftcli.identification.result import (
+    Trace,
     apparent_load,
     held_out_remarks,
     joint_remark,
-    predicted_torque,
     repeated_share,
-    rigid_torque,
     score_remarks,
 )
 from vftcli.robots import Payload, load_robot

@@ -5,9 +5,12 @@ import pytest
 
 from vftcli.identification import Processing, Task, identify
 from vftcli.identification.physical_links import is_physical
-from vftcli.identification.processing import gravity_torque, prepare
-from vftcli.identification.result import root_mean_square
-from vftcli.identification.scoring import predicted_torque
+from vftcli.identification.processing import (
+    gravity_torque,
+    predicted_torque,
+    prepare,
+    root_mean_square,
+)
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters

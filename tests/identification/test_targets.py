@@ -7,20 +7,22 @@ import numpy as np
 import pytest
 
 from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns
-from vftcli.identification.target_method import gravity_remarks, target_numbers, target_remarks
 from vftcli.identification.targets import (
     UNKNOWN,
     WRITTEN,
     ControllerModel,
+    ControllerTargets,
     Estimate,
-    Targets,
     constant_at_rest,
     constant_in_motion,
     controller_friction,
     controller_models,
+    gravity_remarks,
     refuse_guided,
     resolution,
     rotor_inertia,
+    target_remarks,
+    targets_method,
 )
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
@@ -32,7 +34,7 @@ KNOWN = Estimate(2.0, 0.01, True)
 
 
 @pytest.fixture
-def targets(prepared, sines) -> Targets:
+def targets(prepared, sines) -> ControllerTargets:
     """One joint's targets of a controller of known K, J, gravity and friction, 20 s at 100 Hz."""
     t, q, dq, ddq = sines(seconds=20.0, rate=100.0, joints=1, seed=3)
     gravity = 20.0 * np.sin(q)
@@ -42,20 +44,19 @@ def targets(prepared, sines) -> Targets:
     motion = prepared(t, q=q, dq=dq, ddq=ddq)
     columns = FrictionColumns(motion, np.abs(gravity))
     current = (moment + motion.filtered(friction)) / K
-    recording = prepared(t, q=q, dq=dq, target_current=current, target_torque=moment).recording
     lead = np.gradient(moment, t, axis=0)
-    return Targets(recording, motion, columns, current, moment, lead, rigid, gravity)
+    return ControllerTargets((columns,), dq, ddq, current, moment, lead, rigid, gravity)
 
 
 def test_the_drive_constant_comes_from_currents_that_follow_moments(targets):
-    found = constant_in_motion(0, [targets])
+    found = constant_in_motion(0, targets)
     # smoothing .01 of the shapes is the friction's own: exact but for the reversals' filter
     assert found.value == pytest.approx(K, rel=1e-6)
     assert found.known
 
 
 def test_rotor_and_gravity_come_from_moments_beyond_the_rigid_body(targets):
-    rotor, gravity = rotor_inertia(0, [targets])
+    rotor, gravity = rotor_inertia(0, targets)
     assert rotor.value == pytest.approx(J, rel=1e-6)
     assert gravity.value == pytest.approx(GRAVITY, abs=1e-6)
     assert rotor.known
@@ -66,20 +67,20 @@ def test_gravity_that_hardly_changes_tells_no_scale(targets):
     """20 µN·m beside 1.5 N·m that stay, as at a wrist that keeps level; noise of 10 mN·m."""
     level = -1.5 + 1e-6 * targets.gravity
     noise = 0.01 * np.random.default_rng(5).standard_normal(level.shape)
-    _, gravity = rotor_inertia(0, [targets._replace(gravity=level, moment=targets.moment + noise)])
+    _, gravity = rotor_inertia(0, targets._replace(gravity=level, moment=targets.moment + noise))
     assert not gravity.known
 
 
 def test_a_shift_in_time_is_no_inertia(targets):
     late = targets._replace(moment=targets.moment + 0.002 * targets.lead)
-    rotor, gravity = rotor_inertia(0, [late])
+    rotor, gravity = rotor_inertia(0, late)
     # the derivative's column takes it up to second order, numerical differences to 1e-3
     assert rotor.value == pytest.approx(J, rel=2e-3)
     assert gravity.value == pytest.approx(GRAVITY, abs=2e-4)
 
 
 def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
-    dq = targets.recording.require("dq")
+    dq = targets.dq
     truth = JointFriction(
         model="points",
         parameters={"smoothing": 0.01, "load_coulomb": 0.05},
@@ -87,32 +88,31 @@ def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
         torques=(4.0, 7.0, 10.0),
     )
     law = friction_torque((truth,), dq, targets.gravity)
-    bent = targets._replace(current=(targets.moment + targets.motion.filtered(law)) / K)
-    shape, values, sd = controller_friction(0, [bent], K)
+    bent = targets._replace(current=(targets.moment + targets.sources[0].motion.filtered(law)) / K)
+    shape, values, sd = controller_friction(0, bent, K)
     assert (shape.model, shape.speeds) == ("points", truth.speeds)
     np.testing.assert_allclose(values, [4.0, 7.0, 10.0, 0.05], rtol=1e-6)
     assert np.all(sd < 1e-3)
     # too slow for a second point, a logarithm stands for the line; slower still, nothing does
-    slow = bent._replace(motion=slowed(targets, 0.12))
-    assert controller_friction(0, [slow], K)[0].logarithmic_velocity in LOGARITHMIC_VELOCITIES
-    assert controller_friction(0, [bent._replace(motion=slowed(targets, 0.04))], K) is None
+    slow = bent._replace(dq=slowed(targets, 0.12))
+    assert controller_friction(0, slow, K)[0].logarithmic_velocity in LOGARITHMIC_VELOCITIES
+    assert controller_friction(0, bent._replace(dq=slowed(targets, 0.04)), K) is None
 
 
 def guided_log(targets, share=1.0, asked=None):
     """The log of a controller that feeds a share of a UR5's first joint's friction forward."""
     arm = SimpleNamespace(friction=UR5.friction[:1], torque_constant=np.array([K]))
-    law = friction_torque(arm.friction, targets.motion.dq)
+    law = friction_torque(arm.friction, targets.dq)
     log = targets._replace(current=(targets.moment + share * law) / K)
-    if asked is not None:
-        log = log._replace(recording=replace(log.recording, target_dq=asked))
-    return log, arm
+    recording = log.sources[0].motion.recording
+    return replace(recording, target_dq=asked), log, arm
 
 
 @pytest.mark.parametrize("share", [0.7, 1.0, 1.3])
 def test_a_program_feeds_its_friction_forward(targets, share):
     refuse_guided(*guided_log(targets, share))
     # target velocities say more than a share of friction
-    dq = targets.recording.require("dq")
+    dq = targets.dq
     refuse_guided(*guided_log(targets, 0.1, asked=dq))
 
 
@@ -120,18 +120,17 @@ def test_a_hand_that_leads_the_arm_is_refused(targets):
     with pytest.raises(IdentificationError, match="a hand led the arm"):
         refuse_guided(*guided_log(targets, 0.3))
     with pytest.raises(IdentificationError, match="a hand led the arm"):
-        refuse_guided(*guided_log(targets, 1.0, asked=0.0 * targets.motion.dq))
+        refuse_guided(*guided_log(targets, 1.0, asked=0.0 * targets.dq))
 
 
 def slowed(targets, fastest):
     """The motion at other velocities, `fastest` at most."""
-    dq = targets.motion.dq
-    return replace(targets.motion, dq=dq * fastest / np.max(np.abs(dq)))
+    return targets.dq * fastest / np.max(np.abs(targets.dq))
 
 
 def test_a_joint_that_does_not_accelerate_tells_no_rotor(targets):
-    still = targets._replace(motion=replace(targets.motion, ddq=0.0 * targets.motion.ddq))
-    assert [e.known for e in rotor_inertia(0, [still])] == [False, False]
+    still = targets._replace(ddq=0.0 * targets.ddq)
+    assert [e.known for e in rotor_inertia(0, still)] == [False, False]
 
 
 def resting(prepared, moments, step=1e-3, wobble=0.0):
@@ -143,11 +142,11 @@ def resting(prepared, moments, step=1e-3, wobble=0.0):
     current = np.round((moment / K + wobble * np.sin(5 * t) + swing) / step) * step
     motion = prepared(t, dq=dq, target_current=current[:, None], target_torque=moment[:, None])
     nothing = 0 * dq
-    return Targets(motion.recording, motion, None, nothing, nothing, nothing, nothing, nothing)
+    return ControllerTargets((FrictionColumns(motion, nothing),), dq, *[nothing] * 6)
 
 
 def test_at_rest_the_constant_is_moment_over_current(prepared):
-    found = constant_at_rest(0, [resting(prepared, [20.0, -30.0, 10.0])])
+    found = constant_at_rest(0, resting(prepared, [20.0, -30.0, 10.0]))
     # rounding of 1 mA on 1 to 3 A
     assert found.value == pytest.approx(K, rel=1e-3)
     size = np.sqrt(2.0**2 + 3.0**2 + 1.0**2)
@@ -156,10 +155,10 @@ def test_at_rest_the_constant_is_moment_over_current(prepared):
 
 
 def test_rests_whose_current_wanders_or_is_small_tell_nothing(prepared):
-    assert not constant_at_rest(0, [resting(prepared, [20.0], wobble=0.1)]).known
+    assert not constant_at_rest(0, resting(prepared, [20.0], wobble=0.1)).known
     # below 20 steps of 1 mA
-    assert not constant_at_rest(0, [resting(prepared, [0.19])]).known
-    assert constant_at_rest(0, [resting(prepared, [0.25])]).value == pytest.approx(K, rel=0.03)
+    assert not constant_at_rest(0, resting(prepared, [0.19])).known
+    assert constant_at_rest(0, resting(prepared, [0.25])).value == pytest.approx(K, rel=0.03)
 
 
 def test_digits_are_the_smallest_step():
@@ -196,15 +195,21 @@ def test_what_the_targets_leave_open_is_told(believed, codes):
         assert str(remark)  # every code has its words, every template its values
 
 
-def test_numbers_stand_beside_the_profiles():
-    numbers = target_numbers(1, model(), UR5)
-    assert [n.parameter for n in numbers] == [
-        *("torque_constant", "rotor_inertia"),
-        *("coulomb", "logarithmic"),
-    ]
-    assert numbers[0].profile == UR5.torque_constant[1]
-    assert numbers[1].profile == UR5.chain.rotor_inertia[1]
-    assert len(target_numbers(1, model(friction=False), UR5)) == 2
+def test_numbers_stand_beside_the_profiles(rubbing_data, monkeypatch):
+    believed = [model(), model(), model(friction=False), *[model()] * 3]
+    door = "vftcli.identification.targets.controller_models"
+    monkeypatch.setattr(door, lambda *_: believed)
+    found, arm = targets_method(rubbing_data), rubbing_data.robot
+    own = ["torque_constant", "rotor_inertia"]
+    numbers = [n for n in found.numbers if n.joint == 2]
+    assert [n.parameter for n in numbers] == [*own, "coulomb", "logarithmic"]
+    before = [arm.torque_constant[1], arm.chain.rotor_inertia[1], 4.0]
+    assert [n.profile for n in numbers[:3]] == before
+    assert [n.parameter for n in found.numbers if n.joint == 3] == own
+    np.testing.assert_array_equal(found.robot.torque_constant, KNOWN.value)
+    np.testing.assert_array_equal(found.robot.chain.rotor_inertia, KNOWN.value)
+    assert found.robot.friction[2] == arm.friction[2]
+    assert found.robot.friction[1].model == "coulomb-logarithmic"
 
 
 def test_gravity_is_averaged_by_its_spread_and_said_where_it_differs():

@@ -5,22 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification import training
+from vftcli.identification import friction_fit
+from vftcli.identification.clean_fit import CleanFit
+from vftcli.identification.friction_fit import all_residuals, data_of_joint, fit_frictions
 from vftcli.identification.friction_method import (
     by_constant,
+    check_friction,
     friction_method,
+    rotor_number,
     rotor_remarks,
 )
-from vftcli.identification.method_result import check_friction, held_joints, rotor_number
+from vftcli.identification.links import stack
 from vftcli.identification.processing import Processing
-from vftcli.identification.training import (
-    all_residuals,
-    data_of_joint,
-    fit_frictions,
-    prepare_training,
-)
+from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.identification.whole_arm import (
-    check_size,
     initial_columns,
     whole_arm,
     with_links,
@@ -30,6 +28,7 @@ from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.remarks import Where
+from vftcli.signals.rest import MOVES
 
 RUBBING = JointFriction(
     model="coulomb-viscous-offset", parameters={"coulomb": 4.0, "viscous": 6.0, "offset": 0.5}
@@ -50,27 +49,53 @@ def data(rubbing_data):
     return rubbing_data
 
 
-@pytest.fixture
-def weights(data):
-    """Weight of every sample: all that is usable."""
-    return [motion.usable.astype(float) for motion in data.motions]
+T = np.arange(0, 10, 0.01)
 
 
-def test_the_equation_of_a_joint_is_torque_less_rigid_body(data, weights):
-    given = data_of_joint(data, 1, weights, constant=False)
-    motion = data.motions[0]
-    np.testing.assert_allclose(given.y, motion.tau[:, 1] - data.rigid[0][:, 1])
-    np.testing.assert_array_equal(given.fixed, motion.ddq[:, 1:2])
-    asked = data_of_joint(data, 1, weights, constant=True)
-    np.testing.assert_array_equal(asked.y, motion.tau[:, 1])
-    np.testing.assert_array_equal(asked.fixed[:, 1], data.rigid[0][:, 1])
+def speeds(**seconds):
+    """Velocities of three joints that run +0.5 and −0.5 rad/s for so many seconds each."""
+    dq = np.zeros((len(T), 3))
+    for name, (forwards, backwards) in seconds.items():
+        j = int(name[1:]) - 1
+        dq[forwards - 1e-9 > T, j] = 0.5
+        dq[(T >= 5) & (5 + backwards - 1e-9 > T), j] = -0.5
+    return dq
+
+
+def test_a_joint_moves_from_one_second_on_and_reverses_from_a_tenth_of_it(prepared):
+    dq = speeds(J1=(1.2, 0.2), J2=(1.2, 0.05), J3=(0.9, 0.0))
+    moves, reverses = moving_joints([prepared(T, dq=dq)])
+    assert moves.tolist() == [True, True, False]
+    assert reverses.tolist() == [True, False, False]
+
+
+def test_times_of_several_logs_add_up(prepared):
+    log = prepared(T, dq=speeds(J1=(0.6, 0.0)))
+    with pytest.raises(IdentificationError, match="no joint moves faster than"):
+        moving_joints([log])
+    assert moving_joints([log, log])[0].tolist() == [True, False, False]
+
+
+def test_a_slow_joint_does_not_move(prepared):
+    dq = np.column_stack([np.full(len(T), 0.9 * MOVES), np.full(len(T), 1.1 * MOVES)])
+    assert moving_joints([prepared(T, dq=dq)])[0].tolist() == [False, True]
+
+
+def test_the_equation_of_a_joint_is_torque_less_rigid_body(data):
+    given = data_of_joint(data, 1, constant=False)
+    (log,) = data.logs
+    np.testing.assert_allclose(given.y, log.motion.tau[:, 1] - log.rigid[:, 1])
+    np.testing.assert_array_equal(given.fixed, log.motion.ddq[:, 1:2])
+    asked = data_of_joint(data, 1, constant=True)
+    np.testing.assert_array_equal(asked.y, log.motion.tau[:, 1])
+    np.testing.assert_array_equal(asked.fixed[:, 1], log.rigid[:, 1])
     behind_gear = replace(data, robot=replace(UR5, torque_source="link_torque"))
-    assert data_of_joint(behind_gear, 1, weights, constant=False).fixed.shape[1] == 0
+    assert data_of_joint(behind_gear, 1, constant=False).fixed.shape[1] == 0
 
 
 @pytest.mark.slow
-def test_friction_and_rotor_of_every_joint_are_found(data, weights):
-    fits = fit_frictions(data, weights)
+def test_friction_and_rotor_of_every_joint_are_found(data):
+    fits = fit_frictions(data)
     for j, found in enumerate(fits):
         values = dict(zip(found.shape.terms, found.fit.values, strict=False))
         # noise .1 through the 8 Hz filter on 570 samples; offset and Coulomb share reversals
@@ -79,16 +104,16 @@ def test_friction_and_rotor_of_every_joint_are_found(data, weights):
         J = found.fit.values[len(found.shape.terms)]
         assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
     left = all_residuals(data, fits)
-    assert [x.shape for x in left] == [m.tau.shape for m in data.motions]
+    assert [x.shape for x in left] == [log.motion.tau.shape for log in data.logs]
 
 
 @pytest.mark.slow
 def test_residuals_are_cut_apart_log_by_log(recording):
     logs = [recording, recording.between(0.0, 7.0)]
     data = prepare_training(logs, UR5, Processing(), fit_constants=False)
-    fits = fit_frictions(data, [m.usable.astype(float) for m in data.motions])
+    fits = fit_frictions(data)
     first, second = all_residuals(data, fits)
-    assert (len(first), len(second)) == tuple(m.samples for m in data.motions)
+    assert (len(first), len(second)) == tuple(log.motion.samples for log in data.logs)
     whole = fits[3].fit.residual
     np.testing.assert_array_equal(np.concatenate([first[:, 3], second[:, 3]]), whole)
 
@@ -107,7 +132,7 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
         check_friction(0, pushing, data)
     crossing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0})
     (remark,) = check_friction(2, crossing, data)
-    speed = np.max(np.abs(data.motions[0].dq[:, 2]))
+    speed = np.max(np.abs(data.logs[0].motion.dq[:, 2]))
     assert remark.where.joints == (3,)
     assert remark.values["least_Nm"] == pytest.approx(-2.0 + 0.5 * speed)
     bent = {"coulomb": 1.0, "viscous": 5.0, "quadratic": -1.0}
@@ -123,8 +148,9 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
 def test_joints_that_are_held_are_told(data):
     moves = np.array([True, False, True, True, True, True])
     reverses = np.array([True, False, False, True, True, True])
-    excited = data.excited._replace(moves=moves, reverses=reverses)
-    told = [(r.code, r.where.joints) for r in held_joints(replace(data, excited=excited))]
+    held = replace(data, moves=moves, reverses=reverses, rubs=False)
+    remarks = friction_method(held, CleanFit(held, fit_frictions(held), [])).remarks
+    told = [(r.code, r.where.joints) for r in remarks if r.code.endswith("-joint")]
     assert told == [("static-joint", (2,)), ("one-way-joint", (3,))]
 
 
@@ -171,8 +197,8 @@ def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
 
 
 @pytest.mark.slow
-def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, weights):
-    fits = fit_frictions(data, weights)
+def test_the_whole_arm_starts_from_the_profile_and_the_fits(data):
+    fits = fit_frictions(data)
     layout, start = initial_columns(data, fits)
     np.testing.assert_array_equal(start[:60], chain_parameters(UR5.loaded_chain))
     assert start[60 + 1] == fits[1].fit.values[len(fits[1].shape.terms)]
@@ -185,9 +211,9 @@ def test_the_whole_arm_starts_from_the_profile_and_the_fits(data, weights):
 
 
 @pytest.mark.slow
-def test_a_vector_becomes_a_robot_without_its_payload(data, weights):
+def test_a_vector_becomes_a_robot_without_its_payload(data):
     load = Payload(mass=1.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
-    layout, start = initial_columns(data, fit_frictions(data, weights))
+    layout, start = initial_columns(data, fit_frictions(data))
     x = start.copy()
     x[10], x[60:66] = 9.5, 2.5
     robot = with_vector(UR5.with_payload(load), layout, x, UR5.friction)
@@ -195,9 +221,9 @@ def test_a_vector_becomes_a_robot_without_its_payload(data, weights):
     assert robot.chain.mass[1] == 9.5
     np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
     refined = with_links(data, layout, x)
-    motion = data.motions[0]
+    motion = data.logs[0].motion
     Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
-    np.testing.assert_allclose(refined.rigid[0], Y @ x[:60], atol=1e-9)
+    np.testing.assert_allclose(refined.logs[0].rigid, Y @ x[:60], atol=1e-9)
 
 
 @pytest.mark.slow
@@ -206,37 +232,34 @@ def test_the_whole_arm_says_how_it_was_made(data):
     assert "nearest-physical-model" in {r.code for r in base.remarks}
     (opened,) = [r for r in base.remarks if r.code == "undetermined-base-parameters"]
     assert opened.values["count"] == 40
-    assert opened.values["undetermined"] == 40 - sum(base.base.determined[:40])
+    assert opened.values["undetermined"] == 40 - base.base["determined"][:40].sum()
     # one robot made this log: the model predicts its torque to the noise
-    motion = data.motions[0]
+    motion = data.logs[0].motion
     Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
     change = Y @ (chain_parameters(base.robot.chain) - chain_parameters(UR5.chain))
     assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
 
 
 @pytest.mark.slow
-def test_too_short_logs_are_refused(data, weights):
-    from vftcli.identification.stacking import WeightedLog
-
-    layout, _ = initial_columns(data, fit_frictions(data, weights))
-    few = np.zeros_like(weights[0])
+def test_too_short_logs_are_refused(data):
+    layout, start = initial_columns(data, fit_frictions(data))
+    few = np.zeros_like(data.logs[0].weights)
     few.ravel()[: 4 * layout.size - 1] = 1.0
-    log = WeightedLog(data.motions[0], data.columns[0], few)
     with pytest.raises(IdentificationError, match="record a longer log"):
-        check_size(layout, [log])
+        stack(layout, [data.logs[0]._replace(weights=few)], start)
     few.ravel()[: 4 * layout.size] = 1.0
-    check_size(layout, [log])
+    assert stack(layout, [data.logs[0]._replace(weights=few)], start).layout is layout
 
 
 @pytest.mark.slow
-def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, weights, monkeypatch):
+def test_a_joint_that_the_profile_predicts_better_keeps_its_numbers(data, monkeypatch):
     """The log's own arm is its profile: what is fitted predicts as well as the truth, not worse."""
-    fits = fit_frictions(data, weights)
+    fits = fit_frictions(data)
     assert all(fit.errors[1] == pytest.approx(fit.errors[0], rel=0.1) for fit in fits)
     assert not any(fit.is_kept for fit in fits)
     assert fits[0]._replace(errors=(1.0, 0.84)).is_kept
     assert not fits[0]._replace(errors=(1.0, np.nan)).is_kept
-    monkeypatch.setattr(training, "KEPT", 2.0)
+    monkeypatch.setattr(friction_fit, "KEPT", 2.0)
     found = friction_method(data)
     told = [r.where.joints for r in found.remarks if r.code == "profile-kept"]
     assert told == [(j,) for j in range(1, 7)]

@@ -95,7 +95,7 @@ def compare(
     from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance
-    from vftcli.evaluation.pooling import PoolMember, evaluate_pooled
+    from vftcli.evaluation.errors import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
     from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.pipeline import analyse_logs

@@ -105,12 +105,12 @@ def truth_of(
     run: "Run", asked: "ReferenceChoice | None"
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
     """The torque and the wrench that are taken for true along a log, None where nothing says."""
-    from vftcli.evaluation.reference_choice import ReferenceSource, make_reference
+    from vftcli.evaluation.reference_choice import make_reference
     from vftcli.repetition.free_motion import FreeMotion
 
     if asked is None:
         return None, None
-    made = make_reference(ReferenceSource(motion=FreeMotion(log=run)), asked)
+    made = make_reference(FreeMotion(log=run), asked)
     return made.torque, made.wrench
 
 

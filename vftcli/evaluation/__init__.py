@@ -1,8 +1,7 @@
 """Evaluation: errors of estimates against a reference, with intervals, lags and significance."""
 
-from vftcli.evaluation.errors import SCHEMA, correlation, evaluate, rmse
-from vftcli.evaluation.pooling import evaluate_pooled
-from vftcli.evaluation.significance import paired_significance
+from vftcli.evaluation.errors import SCHEMA, correlation, evaluate, evaluate_pooled, rmse
+from vftcli.evaluation.intervals import paired_significance
 from vftcli.evaluation.wrenches import (
     WRENCH_SCHEMA,
     evaluate_wrenches,

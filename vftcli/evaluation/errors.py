@@ -1,4 +1,8 @@
-"""Errors of estimates against a reference: one tidy table, the unit in each column's name."""
+"""Errors of estimates against a reference: one tidy table, the unit in each column's name.
+
+Several logs of one arm are one experiment, with pooled rows below those of each log; over the
+joints of a log there is one mean, of those with a reference to be trusted.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -6,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.intervals import Resampled, block_lengths, interval, resample
-from vftcli.evaluation.significance import p_value
+from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
 from vftcli.signals.arrays import Array, Mask, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
@@ -46,6 +49,7 @@ SCHEMA: dict[str, type[pl.DataType]] = {
 TRUSTED_SHARE = 0.5  #: A joint's reference is trusted if at least this share of its samples is.
 #: Fewest samples that a coverage is stated of: fewer tell a share to no better than ±30 %.
 LEAST = 10
+POOLED = "pooled"  #: Name of the pooled rows in the column `recording`.
 
 
 def rmse(estimate: Array, reference: Array) -> Array:
@@ -86,11 +90,11 @@ class Scored(NamedTuple):
     #: Bootstrap draws of the mean squared errors, one column an observer, all in the same blocks:
     #: for comparing observers.
     paired: Resampled
-    #: The same of each observer in blocks of its own length, so that its interval does not depend
-    #: on who else is asked.
+    #: Draws of each observer in blocks of its own length, so that its interval does not depend on
+    #: who else is asked.
     own: tuple[Resampled, ...]
     lag: Array  #: Best-fitting delay of each observer, NaN where nothing fits. (m,) [s]
-    within: Array  #: Samples whose error lies within each observer's 95 % band. (m,)
+    within: Array  #: Samples with an error within each observer's 95 % band. (m,)
     #: Samples in which it has a band and the joint moves: `within` is a part of them. (m,)
     banded: Array
 
@@ -110,7 +114,7 @@ def evaluate(
     Args:
         recording: The log's name, for the first column.
         estimates: The observers' estimates, on the reference's clock.
-        reference: What they are judged by; its `floor` stands beside every error.
+        reference: The torque they are judged by; its `floor` is written beside every error.
 
     Raises:
         ShapeError: If an estimate and the reference have different shapes.
@@ -221,7 +225,7 @@ def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFr
 
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
     """One row an observer on one joint."""
-    error, found = joint.error, []
+    error, lines = joint.error, list[dict[str, object]]()
     best = int(np.argmin(np.mean(error**2, axis=0))) if len(error) else 0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
@@ -236,12 +240,12 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             own = np.ascontiguousarray(error[:, k])
             here |= {"missing": joint.missing[k] / len(own)}
             here |= sizes(joint, k, own, best) | trust(joint, k, own)
-        found.append(here)
-    return found
+        lines.append(here)
+    return lines
 
 
 def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
-    """How large the error is, how sure that is, and what shape it has.
+    """Size of the error with its interval, its bias, correlation, lag and rank.
 
     Args:
         joint: The scored joint.
@@ -265,7 +269,7 @@ def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
 
 
 def trust(joint: Scored, k: int, error: Array) -> dict[str, object]:
-    """How far the reference of this joint can be trusted, and the error where it can."""
+    """Trust in the reference of this joint, and the error where it moves."""
     share = float(np.mean(joint.moving))
     error = error[joint.moving]
     enough = joint.banded[k] >= LEAST
@@ -280,3 +284,99 @@ def trust(joint: Scored, k: int, error: Array) -> dict[str, object]:
 def number(value: float) -> float | None:
     """A finite number, or None, which tables and JSON can hold."""
     return float(value) if np.isfinite(value) else None
+
+
+class PoolMember(NamedTuple):
+    """One log's estimates and what they are judged by."""
+
+    robot: str  #: The arm's name.
+    estimates: Sequence[ExternalTorque]  #: One an observer.
+    reference: ExternalTorque  #: On the same clock.
+
+
+def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
+    """Rows over all samples of several logs together, each log resampled on its own.
+
+    An error is an arm's: logs of two arms are not pooled, nor those of other observers; the table
+    is then empty, as it is for fewer than two logs.
+    """
+    kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
+    if len(members) < 2 or len(kinds) != 1:
+        return pl.DataFrame(schema=SCHEMA)
+    each = [list(scored(member.estimates, member.reference)) for member in members]
+    references = list(dict.fromkeys(member.reference.name for member in members))
+    return table(
+        POOLED, " + ".join(references), [together(joints) for joints in zip(*each, strict=True)]
+    )
+
+
+def together(parts: Sequence[Scored]) -> Scored:
+    """One joint's samples of several logs as one series."""
+    parts = [p for p in parts if len(p.reference)] or list(parts[:1])
+    weight = np.array([len(p.reference) for p in parts], dtype=np.float64)
+    share = weight / max(weight.sum(), 1.0)
+    lag = np.array([p.lag for p in parts])
+    # A log in which no lag fits says nothing of it: the others' shares are weighed anew.
+    weights = np.isfinite(lag) * share[:, None]
+    total = weights.sum(axis=0)
+    mean_lag = np.nansum(lag * weights, axis=0) / np.where(total > 0, total, np.nan)
+    return parts[0]._replace(
+        estimates=np.concatenate([p.estimates for p in parts]),
+        missing=np.sum([p.missing for p in parts], axis=0),
+        reference=np.concatenate([p.reference for p in parts]),
+        moving=np.concatenate([p.moving for p in parts]),
+        floor=float(np.sqrt(np.sum(share * np.array([p.floor for p in parts]) ** 2))),
+        paired=weighed([p.paired for p in parts], share),
+        own=tuple(weighed(each, share) for each in zip(*(p.own for p in parts), strict=True)),
+        lag=mean_lag,
+        within=np.sum([p.within for p in parts], axis=0),
+        banded=np.sum([p.banded for p in parts], axis=0),
+    )
+
+
+def weighed(parts: Sequence[Resampled], share: Array) -> Resampled:
+    """Draws of several logs as those of one; each log has a share of the samples. (L,)"""
+    draws = sum(w * p.draws for w, p in zip(share, parts, strict=True))
+    return Resampled(np.asarray(draws), sum(p.blocks for p in parts))
+
+
+class JointMeans(NamedTuple):
+    """Means over the joints of one log."""
+
+    #: Observer → mean RMSE; those of which one is known, in the table's order. [N·m]
+    errors: dict[str, float]
+    floor: float  #: Mean of the reference's own error, NaN where it is not known. [N·m]
+    #: Joints that are left out, because the reference is not to be trusted there.
+    without: tuple[int, ...]
+
+    @property
+    def least(self) -> tuple[str, float] | None:
+        """The observer with the smallest mean and that mean, None without any. [N·m]"""
+        return min(self.errors.items(), key=lambda item: item[1], default=None)
+
+    @property
+    def left_out(self) -> str:
+        """The joints that are left out, as " without J5"; "" for none."""
+        return f" without {', '.join(f'J{j}' for j in self.without)}" if self.without else ""
+
+
+def joint_means(errors: pl.DataFrame) -> JointMeans:
+    """The mean RMSE of every observer, over the joints with a reference to be trusted.
+
+    Where none can, over all: a mean is wanted, and every joint of it is marked.
+    """
+    rows = errors.filter(pl.col("joint").is_not_null())
+    joints = set(rows["joint"])
+    doubted = set[int]()
+    if "reference_trusted" in rows.columns:
+        doubted = set(rows.filter(~pl.col("reference_trusted").fill_null(value=True))["joint"])
+    without = doubted if joints - doubted else set[int]()
+    used = rows.filter(~pl.col("joint").is_in(list(without)))
+    known = used.filter(pl.col("rmse_Nm").is_finite())
+    means = known.group_by("observer", maintain_order=True).agg(pl.col("rmse_Nm").mean())
+    floor = float("nan")
+    if "reference_floor_Nm" in used.columns:
+        floors = used.unique("joint")["reference_floor_Nm"].drop_nulls().to_numpy()
+        floors = floors[np.isfinite(floors)]
+        floor = float(floors.mean()) if len(floors) else floor
+    return JointMeans(dict(means.iter_rows()), floor, tuple(sorted(without)))

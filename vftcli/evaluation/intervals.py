@@ -1,31 +1,50 @@
-"""Confidence intervals of an RMSE whose errors follow one another: moving-block bootstrap."""
+"""Confidence intervals of an RMSE of errors that follow one another: moving-block bootstrap.
 
+Paired, it also tells whether one observer is better than another, or was lucky.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
 SEED = 20250811  #: Seed of every bootstrap: the same log gives the same interval.
-#: Blocks a repetition is put together from, at most: more change nothing but the time it takes.
+#: Most blocks in a repetition: more change nothing but the time it takes.
 MOST_BLOCKS = 300
-#: Blocks a repetition is put together from, at least, however long errors remember.
+#: Fewest blocks in a repetition, however long errors remember.
 LEAST_BLOCKS = 10
 MEMORY = 5.0  #: Length of a block in correlation times of the squared error.
-#: Largest share taken off: the upper end of an interval is at most five times the RMSE.
+#: Largest share subtracted: the upper end of an interval is at most five times the RMSE.
 WIDEST = 0.96
 LEVEL = 0.95  #: Coverage of the intervals.
 FIRST_LAGS = 1024  #: Lags over which an autocorrelation is looked at first. [samples]
+#: Columns of the significance table: RMSE less that of `other`, 95 % interval, p.
+SIGNIFICANCE: dict[str, type[pl.DataType]] = {
+    "recording": pl.String,
+    "joint": pl.Int64,
+    "observer": pl.String,
+    "other": pl.String,
+    "difference_Nm": pl.Float64,
+    "low_Nm": pl.Float64,
+    "high_Nm": pl.Float64,
+    "p": pl.Float64,
+}
+SAME = 1e-9  #: RMSEs that differ by less than this share are the same number twice.
 
 
 class Resampled(NamedTuple):
     """Mean squares of resampled errors."""
 
     draws: Array  #: One mean square a repetition and column. (B, m)
-    blocks: int  #: How many blocks each repetition has: the effective number of independent pieces.
+    blocks: int  #: Blocks in each repetition: the effective number of independent pieces.
 
 
 def resample(squares: Array, length: int) -> Resampled:
@@ -87,7 +106,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     The scatter of a mean square is a share of the true value, not of the observed one: a log with
     few contacts shows both a small mean and a small scatter. With h, that share times Student's
     quantile for the number of blocks, the true value is at most observed/(1 − h); downwards, where
-    the mean square is skewed, its logarithm is taken: observed·e^{−h}.
+    the mean square is skewed, its logarithm is used: observed·e^{−h}.
 
     Args:
         mean_square: The observed mean square. [(N·m)²]
@@ -101,3 +120,43 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     quantile = float(stdtrit(blocks - 1, 0.5 + 0.5 * LEVEL)) * np.sqrt(blocks / (blocks - 1.0))
     half = min(quantile * float(np.std(draws)) / mean_square, WIDEST)
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
+
+
+def paired_significance(
+    recording: str, estimates: Sequence[ExternalTorque], reference: ExternalTorque
+) -> pl.DataFrame:
+    """Every pair of observers on every joint: difference of RMSE, its interval, and p.
+
+    Both observers' errors are resampled in the same blocks, so that what they share (contacts,
+    the reference's own error) cancels. A sample without an answer counts as the answer 0.
+    """
+    rows = []
+    for j in range(reference.joints):
+        known = np.isfinite(reference.tau[:, j])
+        answers = np.column_stack([e.tau[known, j] for e in estimates])
+        answers[~np.isfinite(answers)] = 0.0
+        errors = answers - reference.tau[known, j, None]
+        if len(errors) < 2:
+            continue
+        squares = errors**2
+        draws = np.sqrt(resample(squares, int(block_lengths(squares).max())).draws)
+        observed = np.sqrt(np.mean(errors**2, axis=0))
+        for a, b in combinations(range(len(estimates)), 2):
+            difference = draws[:, a] - draws[:, b]
+            low, high = np.quantile(difference, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])
+            pair = estimates[a].name, estimates[b].name
+            sizes = float(observed[a] - observed[b]), float(low), float(high)
+            rows.append((recording, j + 1, *pair, *sizes, p_value(draws[:, a], draws[:, b])))
+    return pl.DataFrame(rows, schema=SIGNIFICANCE, orient="row")
+
+
+def p_value(first: Array, second: Array) -> float:
+    """Two-sided p that two mean squares differ by chance, from paired draws.
+
+    At least one over the number of draws; 1 where both are the same number.
+    """
+    size = max(float(np.mean(np.abs(first))), float(np.mean(np.abs(second))), 1e-300)
+    if np.max(np.abs(first - second)) <= SAME * size:
+        return 1.0
+    above = float(np.mean(first > second))
+    return float(np.clip(2.0 * min(above, 1.0 - above), 1.0 / len(first), 1.0))

@@ -1,4 +1,4 @@
-"""From estimates and wrenches to how they compare with a reference: one table of errors."""
+"""Estimates and wrenches beside a reference: one table of errors."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -7,10 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.errors import evaluate
-from vftcli.evaluation.joint_means import joint_means
-from vftcli.evaluation.reference import ReferenceLoad
-from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceSource, make_reference
+from vftcli.evaluation.errors import evaluate, joint_means
+from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceLoad, make_reference
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
@@ -23,15 +21,15 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
-from vftcli.virtual_sensor.frames import from_base
+from vftcli.virtual_sensor.frames import NOTHING, from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 
 class Judgement(NamedTuple):
-    """How the estimates of one log compare with a reference; fields of `vftcli.Analysis`."""
+    """Errors of one log's estimates against a reference; fields of `vftcli.Analysis`."""
 
-    reference: ExternalTorque  #: What they are judged by.
+    reference: ExternalTorque  #: The torque they are judged by.
     errors: pl.DataFrame  #: The tidy error table (`vftcli.evaluation.SCHEMA`).
     #: The wrenches, with the reference's beside them; None without wrenches.
     virtual_sensor: SensorReading | None
@@ -71,11 +69,8 @@ def judge(
         ReferenceTorqueError: If the reference cannot be made.
     """
     recording, robot = motion.log.recording, motion.log.robot
-    source = ReferenceSource(motion=motion)
-    if sensed is not None:
-        mounting = sensed.sensor.mounting
-        source = ReferenceSource(motion=motion, mounting=mounting)
-    made = make_reference(source, choice)
+    mounting = NOTHING if sensed is None else sensed.sensor.mounting
+    made = make_reference(motion, choice, mounting)
     reference = made.torque
     errors = evaluate(recording.name, estimates, reference)
     if sensed is not None:
@@ -93,7 +88,7 @@ def reference_wrench(
 ) -> Wrench:
     """The wrench that estimates are judged by, in the virtual sensor's frame.
 
-    A sensor's and a file's wrench are taken as they are; any other reference is a torque, and goes
+    A sensor's and a file's wrench stay as they are; any other reference is a torque, and goes
     through least squares. Samples in which the pose cannot tell a wrench are masked alike.
     """
     torque = reference.torque

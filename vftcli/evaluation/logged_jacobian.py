@@ -1,4 +1,4 @@
-"""A vendor's torques through the Jacobian that the log holds, beside the log's own sensor."""
+"""A vendor's torques through a log's own Jacobian, beside its sensor."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -20,7 +20,7 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wr
 from vftcli.virtual_sensor.vendor import RESEMBLES, fit_axes
 
 VENDOR, SENSOR = "vendor", "sensor"
-#: The frame of such a wrench: axes and point are those of the log's Jacobian, whatever they are.
+#: The frame of such a wrench: axes and point of the log's Jacobian.
 AXES_OF_LOG = "jacobian"
 
 
@@ -33,14 +33,14 @@ class Compared(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class JacobianJudgement:
-    """What a log of torques and a Jacobian tells."""
+    """Wrenches and errors by a log of torques and a Jacobian."""
 
     log: JacobianLog  #: The log.
     vendor: Compared  #: The vendor's torques, and their wrench through the Jacobian.
     #: The sensor's wrench, and its torques, or None where nothing is compared.
     sensor: Compared | None
     errors: pl.DataFrame | None  #: The tidy error table, None where nothing is compared.
-    remarks: tuple[Remark, ...]  #: What the numbers are.
+    remarks: tuple[Remark, ...]  #: Limits of the numbers.
 
 
 def judge_jacobian(

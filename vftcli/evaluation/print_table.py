@@ -1,6 +1,6 @@
 """Published error tables, to set beside one's own."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,13 +19,23 @@ SAME_FILTER = 1e-6
 class Published:
     """An RMSE table from print."""
 
-    title: str  #: What it is.
-    source: str  #: Where it stands.
+    title: str  #: Its name and content.
+    source: str  #: Paper and number.
     #: Observer's name here → printed RMSE of each joint. [N·m]
     rmse: Mapping[str, tuple[float, ...]]
-    #: Why a computation need not give these numbers: each gives a remark, or None if it does not
-    #: apply to what was run.
-    reasons: tuple[Callable[["Comparison"], Remark | None], ...]
+
+
+TABLE_1 = Published(
+    title="Table I of the paper: RMSE of the observers on a UR5",
+    source="Huang et al., IEEE/ASME T-Mech 2025, doi 10.1109/TMECH.2025.3595612, Table I",
+    rmse={
+        "fdo": (5.6601, 4.2443, 4.6620, 1.5379, 1.2137, 0.9443),
+        "gmo": (5.2106, 3.8767, 5.1080, 1.2939, 1.1976, 0.9322),
+        "kfo-fe": (4.7472, 3.6219, 4.0874, 1.3828, 1.3221, 0.9355),
+        "kfo-zoh": (4.8555, 3.6475, 4.1538, 1.3345, 1.3164, 0.9440),
+    },
+)
+TABLES = {"table1": TABLE_1}  #: Name at the command line → printed table.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +48,7 @@ class Comparison:
     ours: Mapping[str, Array]
     floor: Array  #: The reference's own error. (n,) [N·m]
     observers: Mapping[str, Observer]  #: The observers that ran, by name.
-    tunings: Mapping[str, Tuning]  #: What their gains mean at the log's sample time, by name.
+    tunings: Mapping[str, Tuning]  #: Meaning of their gains at the log's sample time.
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -51,90 +61,64 @@ class Comparison:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """Where the two differ and why."""
-        found = [best_of_each(self), sizes(self), *(why(self) for why in self.published.reasons)]
-        return tuple(remark for remark in found if remark is not None)
+        """Differences of the two, and why a computation need not give these numbers."""
+        both = (*self.sizes(), *self.one_filter(), *self.kalman_delay()) if self.names else ()
+        last = [row[5] for row in self.published.rmse.values()]
+        at_floor = fact(
+            "print-noise-floor",
+            least_Nm=min(last),
+            most_Nm=max(last),
+            floor_Nm=float(self.floor[5]),
+        )
+        return (*both, at_floor)
 
+    def sizes(self) -> tuple[Remark, Remark]:
+        """Joints on which another observer is best than in print, and ours over the print."""
+        printed = np.array([self.printed(name) for name in self.names])
+        ours = np.array([self.ours[name] for name in self.names])
+        # Of a joint on which no observer is known the first is named.
+        here = np.argmin(np.where(np.isfinite(ours), ours, np.inf), axis=0)
+        other = [
+            f"J{j} ({self.names[theirs]} in print, {self.names[own]} here)"
+            for j, (theirs, own) in enumerate(
+                zip(printed.argmin(axis=0), here, strict=True), start=1
+            )
+            if theirs != own
+        ]
+        joints = len(here)
+        winners = fact("print-same-best", joints=joints)
+        if other:
+            same = joints - len(other)
+            winners = fact("print-other-best", same=same, joints=joints, differing=other)
+        ratio = ours / printed
+        return winners, fact(
+            "print-sizes",
+            median=float(np.nanmedian(ratio)),
+            least=float(np.nanmin(ratio)),
+            most=float(np.nanmax(ratio)),
+        )
 
-def best_of_each(found: Comparison) -> Remark | None:
-    """On which joints another observer is best than in print."""
-    if not found.names:
-        return None
-    printed = np.array([found.printed(n) for n in found.names])
-    ours = np.array([found.ours[n] for n in found.names])
-    other: list[str] = []
-    for j in range(printed.shape[1]):
-        best = found.names[int(np.argmin(printed[:, j]))]
-        # A joint on which no observer is known has no best of its own: the first stands for it.
-        here = found.names[int(np.argmin(np.where(np.isfinite(ours[:, j]), ours[:, j], np.inf)))]
-        if best != here:
-            other.append(f"J{j + 1} ({best} in print, {here} here)")
-    joints = printed.shape[1]
-    if not other:
-        return fact("print-same-best", joints=joints)
-    return fact("print-other-best", same=joints - len(other), joints=joints, differing=other)
+    def one_filter(self) -> list[Remark]:
+        """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
+        if not {"fdo", "gmo"} <= set(self.names):
+            return []
+        gap = np.abs(self.ours["fdo"] - self.ours["gmo"])
+        alike = np.flatnonzero(gap <= SAME_FILTER * self.ours["fdo"])
+        if not len(alike):
+            return []
+        printed = np.abs(self.printed("fdo") - self.printed("gmo"))[alike]
+        where = Where(joints=tuple(int(j) + 1 for j in alike))
+        return [fact("print-one-filter", where, printed_Nm=float(printed.max()))]
 
-
-def sizes(found: Comparison) -> Remark | None:
-    """How large the computed errors are against the printed ones."""
-    if not found.names:
-        return None
-    ratio = np.array([found.ours[n] / found.printed(n) for n in found.names])
-    return fact(
-        "print-sizes",
-        median=float(np.nanmedian(ratio)),
-        least=float(np.nanmin(ratio)),
-        most=float(np.nanmax(ratio)),
-    )
-
-
-def one_filter(found: Comparison) -> Remark | None:
-    """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
-    if not {"fdo", "gmo"} <= set(found.names):
-        return None
-    gap = np.abs(found.ours["fdo"] - found.ours["gmo"])
-    alike = np.flatnonzero(gap <= SAME_FILTER * found.ours["fdo"])
-    if not len(alike):
-        return None
-    printed = np.abs(found.printed("fdo") - found.printed("gmo"))[alike]
-    joints = tuple(int(j) + 1 for j in alike)
-    return fact("print-one-filter", Where(joints=joints), printed_Nm=float(printed.max()))
-
-
-def kalman_delay(found: Comparison) -> Remark | None:
-    """The noise convention sets the Kalman filters' bandwidth, and with it the ranking."""
-    tuning = found.tunings.get("kfo-fe")
-    if tuning is None or "kfo-fe" not in found.names:
-        return None
-    convention = getattr(found.observers.get("kfo-fe"), "noise_convention", "density")
-    code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
-    return fact(code, convention=convention, delay_ms=1e3 * float(tuning.delay[0]))
-
-
-def alike_at_floor(found: Comparison) -> Remark:
-    """J6 is at the reference's noise in print."""
-    printed = np.array([found.printed(n)[5] for n in found.published.rmse])
-    return fact(
-        "print-noise-floor",
-        least_Nm=float(printed.min()),
-        most_Nm=float(printed.max()),
-        floor_Nm=float(found.floor[5]),
-    )
-
-
-TABLE_1 = Published(
-    title="Table I of the paper: RMSE of the observers on a UR5",
-    source="Huang et al., IEEE/ASME T-Mech 2025, doi 10.1109/TMECH.2025.3595612, Table I",
-    rmse={
-        "fdo": (5.6601, 4.2443, 4.6620, 1.5379, 1.2137, 0.9443),
-        "gmo": (5.2106, 3.8767, 5.1080, 1.2939, 1.1976, 0.9322),
-        "kfo-fe": (4.7472, 3.6219, 4.0874, 1.3828, 1.3221, 0.9355),
-        "kfo-zoh": (4.8555, 3.6475, 4.1538, 1.3345, 1.3164, 0.9440),
-    },
-    reasons=(one_filter, kalman_delay, alike_at_floor),
-)
-
-TABLES = {"table1": TABLE_1}  #: Name at the command line → printed table.
+    def kalman_delay(self) -> list[Remark]:
+        """The noise convention sets the Kalman filters' bandwidth, and with it the ranking."""
+        tuning = self.tunings.get("kfo-fe")
+        if tuning is None or "kfo-fe" not in self.names:
+            return []
+        convention = getattr(self.observers.get("kfo-fe"), "noise_convention", "density")
+        code = "print-kalman-discrete" if convention == "discrete" else "print-kalman-density"
+        delay = 1e3 * float(tuning.delay[0])
+        return [fact(code, convention=convention, delay_ms=delay)]
 
 
 def check_published(name: str, reference: str | None) -> None:
@@ -164,12 +148,11 @@ def compare_with(
         )
     ours: dict[str, Array] = {}
     floor = np.full(joints, np.nan)
-    for row in rows.iter_rows(named=True):
-        values = ours.setdefault(str(row["observer"]), np.full(joints, np.nan))
-        if row["rmse_Nm"] is not None:
-            values[row["joint"] - 1] = row["rmse_Nm"]
-        if row["reference_floor_Nm"] is not None:
-            floor[row["joint"] - 1] = row["reference_floor_Nm"]
+    known = rows.select("observer", "joint", "rmse_Nm", "reference_floor_Nm")
+    for observer, j, error, own in known.iter_rows():
+        values = ours.setdefault(observer, np.full(joints, np.nan))
+        values[j - 1] = np.nan if error is None else error
+        floor[j - 1] = floor[j - 1] if own is None else own
     return Comparison(
         published=published,
         recording=str(rows["recording"][0]),

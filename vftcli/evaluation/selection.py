@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.joint_means import joint_means
+from vftcli.evaluation.errors import joint_means
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
@@ -20,7 +20,7 @@ FAST = 5.0
 
 
 class Facts(NamedTuple):
-    """What one observer does on one log."""
+    """Speed, noise and error of one observer on one log."""
 
     name: str  #: The observer.
     response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
@@ -37,10 +37,10 @@ class Facts(NamedTuple):
 class Advice(NamedTuple):
     """One guideline and what this log says of it."""
 
-    purpose: str  #: What the observer is wanted for.
-    criterion: str  #: What decides.
+    purpose: str  #: Use of the observer.
+    criterion: str  #: Deciding number.
     best: tuple[str, ...]  #: The observers that are best by it, alike within 2 %.
-    paper: str  #: What the paper advises.
+    paper: str  #: Advice of the paper.
 
 
 def facts(
@@ -50,33 +50,25 @@ def facts(
     errors: pl.DataFrame | None,
 ) -> tuple[Facts, ...]:
     """The facts of every observer that has a response of its own."""
-    step = median_step(run.t)
-    return tuple(
-        facts_of(observer, tunings[observer.name], run.noise, step, errors)
-        for observer in observers
-        if observer.name in tunings
-    )
-
-
-def facts_of(
-    observer: Observer,
-    tuning: Tuning,
-    noise: Array,
-    step: float,
-    errors: pl.DataFrame | None,
-) -> Facts:
-    """One observer's facts."""
+    step, noise, each = median_step(run.recording.t), run.noise, list[Facts]()
+    means = {} if errors is None else joint_means(errors).errors
     frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
-    gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
-    return Facts(
-        name=observer.name,
-        response=float(np.max(step_response(observer, step, len(noise)))),
-        delay=float(np.max(tuning.delay)),
-        noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
-        passed=float(np.mean(np.sqrt(gain[frequency >= min(FAST, frequency[-1])].mean(axis=0)))),
-        rmse=mean_rmse(observer.name, errors),
-        parameter_count=tuning.parameter_count,
-    )
+    fast = frequency >= min(FAST, frequency[-1])
+    for observer in observers:
+        if observer.name in tunings:
+            tuning = tunings[observer.name]
+            gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
+            one = Facts(
+                name=observer.name,
+                response=float(np.max(step_response(observer, step, len(noise)))),
+                delay=float(np.max(tuning.delay)),
+                noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
+                passed=float(np.mean(np.sqrt(gain[fast].mean(axis=0)))),
+                rmse=means.get(observer.name, float("nan")),
+                parameter_count=tuning.parameter_count,
+            )
+            each.append(one)
+    return tuple(each)
 
 
 def step_response(observer: Observer, step: float, joints: int) -> Array:
@@ -89,11 +81,6 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
     times: Array = np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
     return times
-
-
-def mean_rmse(name: str, errors: pl.DataFrame | None) -> float:
-    """An observer's mean RMSE over the joints, NaN where there is none. [N·m]"""
-    return float("nan") if errors is None else joint_means(errors).errors.get(name, float("nan"))
 
 
 def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:

@@ -1,4 +1,4 @@
-"""Errors of wrenches against a reference wrench: rows below the joints' in the same table."""
+"""Errors of wrenches against a reference wrench: rows below the joints'."""
 
 from collections.abc import Iterable
 
@@ -109,22 +109,13 @@ def with_contacts(
 ) -> pl.DataFrame:
     """The errors, and below them one row an observer: how it tells contacts."""
     rows = [
-        {
-            "recording": recording,
-            "observer": score.name,
-            "reference": reference,
-            "signal": score.signal,
-            "contacts": score.detection.contacts,
-            "listed_contacts": score.detection.listed,
-            "found_contacts": score.detection.found,
-            "missed_contacts": score.detection.missed,
-            "merged_contacts": score.detection.merged,
-            "split_contacts": score.detection.split,
-            "false_alarms": score.detection.false_alarms,
-            "false_alarms_per_h": number(score.detection.false_alarms_per_h),
-            "detection_delay_s": number(score.detection.mean_delay),
-            "longest_delay_s": number(score.detection.longest_delay),
-        }
+        (
+            *(recording, score.name, reference, score.signal),
+            *(of.contacts, of.listed, of.found, of.missed, of.merged, of.split, of.false_alarms),
+            *map(number, (of.false_alarms_per_h, of.mean_delay, of.longest_delay)),
+        )
         for score in contacts
+        for of in (score.detection,)
     ]
-    return pl.concat([errors, pl.DataFrame(rows, schema=CONTACT_SCHEMA)], how="diagonal")
+    table = pl.DataFrame(rows, schema=CONTACT_SCHEMA, orient="row")
+    return pl.concat([errors, table], how="diagonal")

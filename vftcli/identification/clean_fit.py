@@ -1,169 +1,234 @@
-"""Friction fitted on free motion alone: contacts left out, and a robot that is another doubted."""
+"""Friction fitted on free motion alone: contacts left out, another robot doubted."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.excitation import (
-    ContactSpan,
-    find_contacts,
-    outside_contacts,
-    unexplained_torque,
-)
-from vftcli.identification.friction_fit import LIGHT
+from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, fit_frictions
 from vftcli.identification.friction_shapes import Shape
+from vftcli.identification.links import ParameterColumns, residuals
 from vftcli.identification.processing import PreparedLog
-from vftcli.identification.scoring import apparent_load, predicted_torque
-from vftcli.identification.stacking import ParameterColumns, WeightedLog, residuals
-from vftcli.identification.training import JointFit, Training, all_residuals, fit_frictions
-from vftcli.identification.warm_up import warm_up_remarks
-from vftcli.robots.friction import dry_torque
+from vftcli.identification.result import apparent_load
+from vftcli.identification.training import Training, TrainingLog
+from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
+from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.least_squares import NormalEquations, normal_equations
+from vftcli.signals.intervals import intervals, near
+from vftcli.signals.least_squares import NormalEquations, folds, normal_equations, robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+from vftcli.signals.rest import SLIDES, slower
+from vftcli.signals.series import median_step
 
-LOAD_EXPLAINS = 0.8  #: Share of what the profile misses that a load must explain to be suspected.
+TOUCH = 7.0  #: Residual that counts as contact, in robust standard deviations of its joint.
+TOUCH_TIME = 0.15  #: Time it must last. [s]
+TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
+#: Share of the torque's variation that the profile's links and fitted friction must explain in the
+#: joints that carry weight; with the right robot it is 0.99 or more.
+WRONG = 0.95
+LOAD_EXPLAINS = 0.8  #: Share of the profile's misfit that a suspected load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest load that is suspected. [kg]
 #: A joint carries the arm's weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
 #: Times what free links leave from which on the profile's links are another arm's: of right ones
 #: 1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12.
 OTHER_LINKS = 3.0
-#: The fits, the weights of every sample (M, n) a log, and remarks.
-CleanFit = tuple[list[JointFit | None], list[Array], list[Remark]]
+THIRDS = 3  #: Stretches in which a log's friction is compared, for a warm-up.
+#: Share by which dry friction falls from the first to the last stretch of a warm-up.
+DRIFT = 0.05
+LEAST = 0.1  #: Smallest such fall. [N·m]
+
+
+class CleanFit(NamedTuple):
+    """Friction fits of free motion."""
+
+    data: Training  #: The training data, contacts without weight.
+    fits: list[JointFit | None]  #: One a joint, None where it does not move.
+    remarks: list[Remark]  #: Contacts, drift and doubts.
 
 
 def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
-    """Fit friction, leave out contacts, and fit again without them.
+    """Friction fitted twice, the second time without contacts.
 
-    Returns:
-        The fits, the weights of every sample (M, n) a log, and remarks.
+    Raises:
+        IdentificationError: If other links explain what the profile's do not, and it is `strict`.
     """
-    weights = [m.usable.astype(float) for m in data.motions]
-    fits = fit_frictions(data, weights)
-    left, remarks = all_residuals(data, fits), list[Remark]()
-    for k, (motion, residual) in enumerate(zip(data.motions, left, strict=True)):
-        if found := find_contacts(motion, residual, fitted_dry_friction(data, k, fits)):
-            weights[k] = weights[k] * outside_contacts(motion, found)[:, None]
-            remarks.append(contacts_remark(motion, found))
+    fits, remarks = fit_frictions(data), list[Remark]()
+    logs = list(data.logs)
+    for k, (log, residual) in enumerate(zip(data.logs, all_residuals(data, fits), strict=True)):
+        t, name = log.motion.t, log.motion.recording.name
+        if contacts := find_contacts(log.motion, residual, fitted_dry_friction(log, fits)):
+            touched = [(t > c.start - TOUCH_MARGIN) & (t < c.stop + TOUCH_MARGIN) for c in contacts]
+            free = ~np.any(touched, axis=0)
+            logs[k] = log._replace(weights=log.weights * free[:, None])
+            values = {
+                "count": len(contacts),
+                "total_s": sum(c.stop - c.start for c in contacts),
+                "starts_s": [c.start for c in contacts],
+                "stops_s": [c.stop for c in contacts],
+                "worst_joints": [c.joint for c in contacts],
+                "residuals_Nm": [c.size for c in contacts],
+            }
+            remarks.append(caution("suspected-contacts", Where(name), **values))
     if remarks:
-        fits = fit_frictions(data, weights)
-        left = all_residuals(data, fits)
-    remarks += warm_up_remarks(data, left, weights, fits)
-    doubts = model_doubts(data, left, weights)
+        data = replace(data, logs=tuple(logs))
+        fits = fit_frictions(data)
+    remarks += warm_up_remarks(data, fits)
+    doubts = model_doubts(data, fits)
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
-        shares = links_explain(data, fits, left, weights)
-        if np.max(shares, initial=0.0) > OTHER_LINKS:
+        ratio = float(np.max(links_explain(data, fits), initial=0.0))
+        if ratio > OTHER_LINKS:
             raise IdentificationError(
                 f"{doubts[0]}. Choose another --robot, find the load with --find-payload, or let "
                 "--method base identify the links too"
             )
         # What other links would not explain either is not the links' fault.
         doubts = [doubt for doubt in doubts if doubt.code != "unexplained-torque"]
-        doubts.append(caution("noisy-effort", ratio=float(np.max(shares, initial=0.0))))
+        doubts.append(caution("noisy-effort", ratio=ratio))
     for doubt in doubts:
         remarks.append(doubt)
         if not strict:
             remarks.append(fact("absorbed-doubt", Where(doubt.where.about)))
-    return fits, weights, remarks
+    return CleanFit(data, fits, remarks)
 
 
-def links_explain(
-    data: Training,
-    fits: Sequence[JointFit | None],
-    left: Sequence[Array],
-    weights: Sequence[Array],
-) -> Array:
-    """How much less free links leave than the profile's do, in joints that carry weight. (h,) [1]
+class ContactSpan(NamedTuple):
+    """A stretch in which something seems to touch the arm."""
+
+    start: float  #: First instant. [s]
+    stop: float  #: Last instant. [s]
+    joint: int  #: Joint with the largest residual, from 1.
+    size: float  #: Its residual there. [N·m]
+
+
+def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
+    """Stretches with a residual far outside the rest of the log, neighbours joined.
+
+    Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
+    exceeds that counts there.
+
+    Args:
+        motion: The prepared log.
+        residual: Torque that the fitted model does not explain. (M, n) [N·m]
+        dry: Coulomb torque of each joint. (M, n) [N·m]
+    """
+    usable = motion.usable
+    sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
+    # The filter spreads what happens at standstill over a period of its cutoff.
+    reach = max(1, round(1.0 / (motion.processing.cutoff * median_step(motion.t))))
+    sticks = near(slower(motion.dq, SLIDES), reach)
+    excess = np.maximum(np.abs(residual) - np.abs(dry) * sticks, 0.0)
+    z = excess * usable / np.maximum(sd, 1e-9)
+    found: list[ContactSpan] = []
+    for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
+        k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
+        begin, end = float(motion.t[start]), float(motion.t[stop - 1])
+        contact = ContactSpan(begin, end, int(j) + 1, float(residual[start + k, j]))
+        if found and begin - found[-1].stop < 2 * TOUCH_MARGIN:
+            before = found.pop()
+            larger = max(before, contact, key=lambda c: abs(c.size))
+            contact = larger._replace(start=before.start, stop=end)
+        found.append(contact)
+    return found
+
+
+def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Array:
+    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
+    load = log.columns.load[log.motion.kept]
+    out = np.zeros(load.shape)
+    for j, fit in enumerate(fits):
+        if fit is not None:
+            out[:, j] = dry_torque(fit.friction, load[:, j])
+    return out
+
+
+def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
+    """Residual of the profile's links over that of free ones, of heavy joints. (h,) [1]
 
     All inertial parameters are let go, be they physical or not, the structure of the friction
     held: what they leave is what no links explain, the noise of this log.
-
-    Args:
-        data: The training logs.
-        fits: The friction fits.
-        left: What they leave of each log with the profile's links. (M, n) each [N·m]
-        weights: Weight of every sample. (M, n) each
     """
-    moves = data.excited.moves
     shapes = tuple(Shape(()) if fit is None else fit.shape for fit in fits)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)
-    used = [w * moves for w in weights]
-    before = weighted_rms(left, used)
+    logs = [log._replace(weights=log.weights * data.moves) for log in data.logs]
+    data = replace(data, logs=tuple(logs))
+    before = weighted_rms(data, all_residuals(data, fits))
     parts = []
-    for motion, columns, w in zip(data.motions, data.columns, used, strict=True):
-        for span in motion.chunks():
-            A = layout.rows(motion, columns, span).reshape(-1, layout.size)
-            rest = (w[span] / np.where(before > 0, before, 1.0) ** 2).ravel()
-            parts.append(normal_equations(A, motion.tau[span].ravel(), rest))
+    for log in logs:
+        for span in log.motion.chunks():
+            A = layout.rows(log, span).reshape(-1, layout.size)
+            weights = (log.weights[span] / np.where(before > 0, before, 1.0) ** 2).ravel()
+            parts.append(normal_equations(A, log.motion.tau[span].ravel(), weights))
     x = NormalEquations(*(sum(sums) for sums in zip(*parts, strict=True))).solution()
-    freed = [
-        residuals(layout, WeightedLog(motion, columns, w), x)
-        for motion, columns, w in zip(data.motions, data.columns, used, strict=True)
-    ]
+    freed = weighted_rms(data, [residuals(layout, log, x) for log in logs])
     heavy = heavy_joints(data)
-    share: Array = before[heavy] / np.maximum(weighted_rms(freed, used)[heavy], 1e-12)
+    share: Array = before[heavy] / np.maximum(freed[heavy], 1e-12)
     return share
 
 
-def weighted_rms(residual: Sequence[Array], weights: Sequence[Array]) -> Array:
-    """Root of the weighted mean square of each joint over all logs; 0 of no weight. (n,) [N·m]"""
-    square = sum(np.sum(w * r**2, axis=0) for r, w in zip(residual, weights, strict=True))
-    total = sum(np.sum(w, axis=0) for w in weights)
-    value: Array = np.sqrt(square / np.maximum(total, 1e-12))
+def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
+    """Weighted RMS of each joint over all logs; 0 of no weight. (n,) [N·m]"""
+    weights = np.concatenate([log.weights for log in data.logs])
+    square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
+    value: Array = np.sqrt(square / np.maximum(np.sum(weights, axis=0), 1e-12))
     return value
 
 
 def heavy_joints(data: Training) -> Mask:
     """Joints that move and carry the arm's weight. (n,)"""
-    spread = np.std(np.concatenate([c.load for c in data.columns]), axis=0)
-    heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.excited.moves
+    spread = np.std(np.concatenate([log.columns.load for log in data.logs]), axis=0)
+    heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves
     return heavy
 
 
-def contacts_remark(motion: PreparedLog, found: Sequence[ContactSpan]) -> Remark:
-    """A remark on the stretches of a log that are left out of the fit."""
-    return caution(
-        "suspected-contacts",
-        Where(motion.recording.name),
-        count=len(found),
-        total_s=sum(c.stop - c.start for c in found),
-        starts_s=[c.start for c in found],
-        stops_s=[c.stop for c in found],
-        worst_joints=[c.joint for c in found],
-        residuals_Nm=[c.size for c in found],
-    )
-
-
-def model_doubts(data: Training, left: Sequence[Array], weights: Sequence[Array]) -> list[Remark]:
-    """Remarks on logs whose torque the profile's links do not explain.
-
-    Args:
-        data: The training logs.
-        left: What the friction fits leave of each log. (M, n) each [N·m]
-        weights: Weight of every sample, 0 where it tells nothing. (M, n) each
-    """
-    heavy, doubts = heavy_joints(data), list[Remark]()
-    for motion, residual, w in zip(data.motions, left, weights, strict=True):
-        used, name = np.where(w > 0, residual, 0.0), motion.recording.name
+def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
+    """Remarks on torque that the profile's links and fitted friction do not explain."""
+    doubts = list[Remark]()
+    heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
+    for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
+        tau, name = log.motion.tau, log.motion.recording.name
         # A load is looked for in what the profile leaves before friction is fitted: Coulomb
         # friction would take some of it up.
-        before = motion.tau - predicted_torque(data.robot, motion)
-        mass, explained = apparent_load(data.robot, motion, before)
+        mass, explained = apparent_load(robot, log.motion, tau - (log.rigid + log.losses))
         if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
-            load = {"mass_kg": mass, "robot": data.robot.name, "share_percent": 100.0 * explained}
+            load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}
             doubts.append(warning("unknown-load", Where(name), **load))
-        if remark := unexplained_torque(name, data.robot.name, motion.tau, used, heavy):
-            doubts.append(remark)
+        left = np.where(log.weights > 0, residual, 0.0)[:, heavy]
+        shares = 1.0 - np.mean(left**2, axis=0) / np.maximum(np.var(tau[:, heavy], axis=0), 1e-12)
+        if (worst := np.min(shares, initial=1.0)) < WRONG:
+            where = Where(name, (int(heavy[np.argmin(shares)]) + 1,))
+            share = 100.0 * max(float(worst), 0.0)
+            doubts.append(
+                warning("unexplained-torque", where, robot=robot.name, share_percent=share)
+            )
     return doubts
 
 
-def fitted_dry_friction(data: Training, log: int, fits: Sequence[JointFit | None]) -> Array:
-    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
-    motion, load = data.motions[log], data.columns[log].load
-    out = np.zeros(motion.q.shape)
-    for j, fit in enumerate(fits):
-        if fit is not None:
-            out[:, j] = dry_torque(fit.friction, load[motion.kept, j])
-    return out
+def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
+    """Remarks on logs with friction that falls from third to third.
+
+    Of what the fit leaves, the part that goes with the direction is the dry friction that a third
+    has beyond the whole log's. A gear that warms up rubs less and less.
+    """
+    models = [JointFriction() if fit is None else fit.friction for fit in fits]
+    dry = dry_friction(models, data.robot.joints)
+    remarks = []
+    for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
+        sign = np.tanh(log.motion.dq / SMOOTHING) * log.weights
+        more = np.array(
+            [
+                np.sum(sign[part] * residual[part], axis=0)
+                / np.maximum(np.sum(np.abs(sign[part]), axis=0), 1e-9)
+                for part in folds(log.motion.samples, THIRDS)
+            ]
+        )
+        fall = more[0] - more[-1]
+        falls = np.all(np.diff(more, axis=0) < 0.0, axis=0) & data.moves
+        joints = np.flatnonzero(falls & (fall > np.maximum(DRIFT * dry, LEAST)))
+        if joints.size:
+            where = Where(log.motion.recording.name, tuple(int(j) + 1 for j in joints))
+            values = {"first_Nm": more[0, joints].tolist(), "last_Nm": more[-1, joints].tolist()}
+            remarks.append(caution("warm-up", where, **values))
+    return remarks

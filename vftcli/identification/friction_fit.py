@@ -1,6 +1,6 @@
-"""Friction, rotor inertia and optionally the drive constant of each joint, the links held."""
+"""Friction, rotor inertia and drive constant of each joint, the links held."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +13,13 @@ from vftcli.identification.friction_shapes import (
     Shape,
     bent,
 )
-from vftcli.identification.result import root_mean_square
+from vftcli.identification.processing import root_mean_square
+from vftcli.identification.training import Training, TrainingLog
 from vftcli.robots.friction import SMOOTHING, falling_speed
+from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
-from vftcli.signals.least_squares import cross_validated, fit_column, left_out
+from vftcli.signals.least_squares import ColumnFit, cross_validated, fit_column, left_out
 from vftcli.signals.rest import MOVES
 
 PLAIN = ("coulomb", "viscous", "offset")
@@ -29,7 +31,7 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     PLAIN,
     (*PLAIN, "quadratic"),
     (*PLAIN, "load_coulomb"),
-    (*PLAIN, "quadratic", "load_coulomb"),
+    RICHEST,
     (*PLAIN, "stribeck"),
     CURVED,
     (*CURVED, "load_coulomb"),
@@ -38,11 +40,11 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 #: Presliding lengths that compete with none, one for the whole arm. [rad]
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-#: What may stand beside the points of a bent line.
+#: Terms that may be beside the points of a bent line.
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
-#: Terms whose negative value would push the joint along.
+#: Terms that would push the joint along with a negative value.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
-#: Terms that are bounded at zero in the fit of a joint for which no candidate is friction.
+#: Terms bounded at zero in the fit of a joint for which no candidate is friction.
 BOUNDED = ("coulomb", "viscous")
 
 #: Velocities are turned where both terms push, so that the bound leaves this many times the power,
@@ -53,22 +55,17 @@ TURNED, PUSH = 2.0, 0.02
 SLIDING = 3e-3  #: Smoothing of the sign where presliding says what happens around rest. [rad/s]
 #: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
-MARGIN = 1.01  #: A simpler model within this factor of the best cross-validated error is preferred.
+MARGIN = 1.01  #: A simpler model is preferred within this factor of the best error.
 #: A shorter presliding length within this factor of the best is preferred, and none to all.
 LENGTH_MARGIN = 1.02
-LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be told. [N·m]
+LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be seen. [N·m]
+#: Share of a fit's error below which the profile's friction is kept.
+KEPT = 0.85
+#: Relative standard deviation up to which a drive constant is fitted to free motion.
+CONSTANT_KNOWN = 0.02
 
 
-class ShapeChoice(NamedTuple):
-    """One candidate's cross-validated error."""
-
-    joint: int  #: Joint, from 1.
-    shape: Shape  #: The candidate.
-    error: float  #: RMS on the stretches left out. [N·m]
-    chosen: bool = False  #: Whether it was taken.
-
-
-class PreslidingChoice(NamedTuple):
+class PreslidingScore(NamedTuple):
     """The presliding length of an arm."""
 
     length: float  #: The chosen one, 0 for none. [rad]
@@ -78,66 +75,169 @@ class PreslidingChoice(NamedTuple):
 
 
 class JointData(NamedTuple):
-    """What one joint's fit is made from, over all training logs."""
+    """The equations of one joint, over all training logs."""
 
+    joint: int  #: Joint, from 0.
     y: Array  #: Torque that friction and rotor shall explain. (M,) [N·m]
     #: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque where
     #: the drive constant is. (M, f)
     fixed: Array
-    weights: Array  #: 0 where nothing is told, 1 elsewhere. (M,)
+    weights: Array  #: 0 where a sample says nothing, 1 elsewhere. (M,)
     sources: Sequence[FrictionColumns]  #: Friction columns of each log.
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
     speed_limit: float  #: Speed up to which its friction may not fall. [rad/s]
-    torque_limit: float = 0.0  #: The joint's largest torque, 0 where that is not known. [N·m]
+    torque_limit: float = 0.0  #: The joint's largest torque, 0 if not known. [N·m]
     #: Torque of the profile's friction and rotor; None where they do not compete. (M,) [N·m]
     profile: Array | None = None
 
     @property
-    def lengths(self) -> tuple[int, ...]:
-        """Rows of each log."""
-        return tuple(source.motion.samples for source in self.sources)
+    def speeds(self) -> list[float]:
+        """Speed that the joint exceeds in a hundredth of each log. [rad/s]"""
+        each = (np.abs(source.motion.dq[:, self.joint]) for source in self.sources)
+        return [float(np.quantile(speed, 0.99)) for speed in each]
 
-    def speeds(self, j: int) -> list[float]:
-        """Speed that joint j (from 0) exceeds in a hundredth of each log. [rad/s]"""
-        return [float(np.quantile(np.abs(source.motion.dq[:, j]), 0.99)) for source in self.sources]
-
-    def parts(self, j: int) -> list[Array]:
-        """The rows that cross-validation of joint j (from 0) leaves out in turn."""
-        return left_out(self.lengths, [speed > MOVES for speed in self.speeds(j)])
+    @property
+    def parts(self) -> list[Array]:
+        """The rows that cross-validation leaves out in turn."""
+        lengths = [source.motion.samples for source in self.sources]
+        return left_out(lengths, [speed > MOVES for speed in self.speeds])
 
     def slow(self, signals: Array) -> Array:
         """Signals in the band in which an observer listens, each log by itself. (M, k)"""
-        parts, start = [], 0
-        for source, length in zip(self.sources, self.lengths, strict=True):
-            part, start = signals[start : start + length], start + length
-            wide = source.motion.processing.cutoff > LISTENING
-            parts.append(low_pass(source.motion.t, part, LISTENING) if wide else part)
-        return np.concatenate(parts)
+        motions = [source.motion for source in self.sources]
+        cuts = np.cumsum([motion.samples for motion in motions])[:-1]
+        return np.concatenate(
+            [
+                low_pass(motion.t, part, LISTENING)
+                if motion.processing.cutoff > LISTENING
+                else part
+                for motion, part in zip(motions, np.split(signals, cuts), strict=True)
+            ]
+        )
 
-    def columns(self, j: int, shape: Shape) -> Array:
+    def columns(self, shape: Shape) -> Array:
         """Friction columns, then the fixed ones. (M, k + f)"""
-        friction = np.concatenate([source.joint(j, shape) for source in self.sources])
+        friction = np.concatenate([source.joint(self.joint, shape) for source in self.sources])
         return np.hstack([friction, self.fixed])
 
+    def fit(self, shape: Shape) -> ColumnFit:
+        """Robust least squares of a shape's coefficients and the fixed columns'."""
+        return fit_column(self.columns(shape), self.y, self.weights)
 
-def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoice:
+
+class JointFit(NamedTuple):
+    """Friction of one joint, with what was fitted beside it."""
+
+    shape: Shape  #: The chosen structure.
+    fit: ColumnFit  #: Friction coefficients, then q̈'s, then the rigid torque's.
+    #: Candidate → RMS of what it misses of stretches left out; empty where none competed. [N·m]
+    scores: dict[Shape, float]
+    constant: bool  #: Whether the drive constant was fitted too.
+    presliding: PreslidingScore  #: The arm's presliding length, which all joints share.
+    #: RMS of what the model misses of stretches left out, and what the profile's friction and rotor
+    #: miss there; NaN where they were not compared. [N·m]
+    errors: tuple[float, float] = (np.nan, np.nan)
+
+    @property
+    def friction(self) -> JointFriction:
+        """The joint's friction by this fit."""
+        return self.shape.friction(self.fit.values[: len(self.shape.terms)])
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """The friction terms that sit at their bound of zero."""
+        rubs = not self.scores and self.shape.terms
+        return tuple(t for t in BOUNDED if rubs and t not in self.shape.terms)
+
+    @property
+    def is_kept(self) -> bool:
+        """Whether the profile's friction and rotor predict clearly better."""
+        return self.errors[1] < KEPT * self.errors[0]
+
+
+def fit_frictions(data: Training) -> list[JointFit | None]:
+    """Fit every joint that moves, the links held at the profile; None for the others."""
+    moving = [j for j in range(data.robot.joints) if data.moves[j]]
+    presliding = choose_presliding(
+        [data_of_joint(data, j, data.fit_constants) for j in moving if data.rubs]
+    )
+    fits: list[JointFit | None] = [None] * data.robot.joints
+    for j in moving:
+        fit = fit_joint(data, j, presliding, data.fit_constants)
+        # A joint with little load cannot tell its constant, the last value, from friction.
+        if data.fit_constants and fit.fit.sd[-1] >= CONSTANT_KNOWN * abs(fit.fit.values[-1]):
+            fit = fit_joint(data, j, presliding, False)
+        fits[j] = fit
+    return fits
+
+
+def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: bool) -> JointFit:
+    """Fit of joint j (from 0), with its drive constant or without."""
+    given = data_of_joint(data, j, constant)
+    if not data.rubs:
+        return JointFit(Shape(()), given.fit(Shape(())), {}, constant, presliding)
+    shape, scores = choose_shape(given, presliding.length)
+    fit, errors = given.fit(shape), (np.nan, np.nan)
+    if given.profile is not None and scores:
+        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / np.sum(fit.weights))
+        errors = (scores[shape], float(np.sqrt(miss)))
+    return JointFit(shape, fit, scores, constant, presliding, errors)
+
+
+def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
+    """The equations of joint j (from 0) over all logs.
+
+    With a drive constant to be found the rigid body's torque is a column with a coefficient that
+    would be 1 if the profile's constant were right; without, it is subtracted.
+    """
+
+    def joined(signal: Callable[[TrainingLog], Array]) -> Array:
+        return np.concatenate([signal(log)[:, j] for log in data.logs])
+
+    torque, rigid = joined(lambda log: log.motion.tau), joined(lambda log: log.rigid)
+    fixed = [joined(lambda log: log.motion.ddq)] * data.rotor + [rigid] * constant
+    return JointData(
+        joint=j,
+        y=torque if constant else torque - rigid,
+        fixed=np.reshape(fixed, (-1, len(torque))).T,
+        weights=joined(lambda log: log.weights),
+        sources=[log.columns for log in data.logs],
+        load_spread=float(np.std(joined(lambda log: log.columns.load))),
+        reverses=bool(data.reverses[j]),
+        speed_limit=data.top_speed(j),
+        torque_limit=float(np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0)),
+        profile=None if constant else joined(lambda log: log.losses),
+    )
+
+
+def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
+    """Residuals of the friction fits, log by log; zero for held joints. (M, n) each"""
+    ends = np.cumsum([log.motion.samples for log in data.logs])
+    whole = np.zeros((ends[-1], data.robot.joints))
+    for j, fit in enumerate(fits):
+        if fit is not None:
+            whole[:, j] = fit.fit.residual
+    return np.split(whole, ends[:-1])
+
+
+def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
     """Choose one presliding length for the whole arm by cross-validation, or none.
 
     It is chosen in the band in which an observer listens: what the play operator leaves at a
     reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
-    taken, which forgets soonest that it started undeflected.
+    used, which forgets soonest that it started undeflected.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # Of a joint that goes one way the play operator is a constant.
-    turning = [(j, data) for j, data in joints if data.reverses]
+    turning = [data for data in joints if data.reverses]
     if not turning:
-        return PreslidingChoice(0.0, {0.0: 1.0})
+        return PreslidingScore(0.0, {0.0: 1.0})
     ratios = np.empty((len(turning), len(lengths)))
-    for i, (j, data) in enumerate(turning):
-        terms, parts = tellable_terms(RICHEST, data), data.parts(j)
+    for i, data in enumerate(turning):
+        terms, parts = tellable_terms(RICHEST, data), data.parts
         y = data.slow(data.y[:, None])[:, 0]
-        plain = data.slow(data.columns(j, Shape(terms, SLIDING)))
+        plain = data.slow(data.columns(Shape(terms, SLIDING)))
         # Weights of outliers are held: all lengths must answer for the same samples.
         weights = fit_column(plain, y, data.weights).weights
         # What a smoother sign explains as well is not presliding's; one smoother than that is
@@ -147,41 +247,39 @@ def choose_presliding(joints: Sequence[tuple[int, JointData]]) -> PreslidingChoi
             Shape((*terms, "presliding"), SLIDING, presliding_length=length)
             for length in PRESLIDING_LENGTHS
         ]
-        found = [
-            cross_validated(data.slow(data.columns(j, shape)), y, weights, parts)
+        errors = [
+            cross_validated(data.slow(data.columns(shape)), y, weights, parts)
             for shape in (*rivals, *sliding)
         ]
-        none = min(found[: len(rivals)])
-        ratios[i] = np.array([none, *found[len(rivals) :]]) / max(none, 1e-300)
-    errors = root_mean_square(ratios)
-    near = np.flatnonzero(errors <= LENGTH_MARGIN * errors.min())
-    return PreslidingChoice(lengths[near[0]], dict(zip(lengths, errors.tolist(), strict=True)))
+        none = min(errors[: len(rivals)])
+        ratios[i] = np.array([none, *errors[len(rivals) :]]) / max(none, 1e-300)
+    whole = root_mean_square(ratios)
+    near = np.flatnonzero(whole <= LENGTH_MARGIN * whole.min())
+    return PreslidingScore(lengths[near[0]], dict(zip(lengths, whole.tolist(), strict=True)))
 
 
-def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, list[ShapeChoice]]:
-    """Choose a joint's friction model by cross-validation, simplest of the nearly best.
+def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shape, float]]:
+    """The simplest of a joint's nearly best friction models, and every candidate's error. [N·m]
 
     First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
     then the terms. A parabola is in the race only where it rises up to the joint's own speed.
 
     Args:
-        j: Joint, from 0.
-        data: Its equations.
+        data: The joint's equations.
         length: Presliding length of the arm, 0 for none. [rad]
     """
     length = length if data.reverses else 0.0
     rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
-    bounded, is_turned = bounded_shape(j, plain, data)
+    bounded, is_turned = bounded_shape(plain, data)
     if is_turned:
-        return plain, []  # the positions may still rub the right way
+        return plain, {}  # the positions may still rub the right way
     if not bounded.terms or bounded.terms == ("offset",):
-        return bounded, []
-    start = fit_column(data.columns(j, Shape(rich)), data.y, data.weights)
-    parts = data.parts(j)
-
+        return bounded, {}
     # Weights of outliers are held: candidates must answer for the same samples.
+    weights, parts = data.fit(Shape(rich)).weights, data.parts
+
     def error(shape: Shape) -> float:
-        return cross_validated(data.columns(j, shape), data.y, start.weights, parts)
+        return cross_validated(data.columns(shape), data.y, weights, parts)
 
     widths = (SLIDING,) if length else SMOOTHINGS
     smoothing = min((Shape(rich, s) for s in widths), key=error).smoothing
@@ -189,46 +287,45 @@ def choose_shape(j: int, data: JointData, length: float = 0.0) -> tuple[Shape, l
     curved = Shape(terms, smoothing, presliding_length=length)
     bends = (curved._replace(logarithmic_velocity=v) for v in LOGARITHMIC_VELOCITIES)
     best = min(bends, key=error)
-    choices: dict[Shape, ShapeChoice] = {}
-    for candidate in candidate_shapes(best, data, max(data.speeds(j))):
-        shape, values = non_negative_fit(j, candidate, data)
-        if shape not in choices and is_dissipative(shape, values, data.speed_limit):
-            choices[shape] = ShapeChoice(j + 1, shape, error(shape))
-    if not choices:
-        return bounded_shape(j, plain._replace(smoothing=smoothing), data)[0], []
-    limit = MARGIN * min(c.error for c in choices.values())
-    near = [c for c in choices.values() if c.error <= limit]
-    chosen = min(near, key=lambda c: (len(c.shape.terms), c.error))
-    return chosen.shape, [c._replace(chosen=c is chosen) for c in choices.values()]
+    scores: dict[Shape, float] = {}
+    for candidate in candidate_shapes(best, data, max(data.speeds)):
+        shape, values = non_negative_fit(candidate, data)
+        if shape not in scores and is_dissipative(shape, values, data.speed_limit):
+            scores[shape] = error(shape)
+    if not scores:
+        return bounded_shape(plain._replace(smoothing=smoothing), data)[0], {}
+    limit = MARGIN * min(scores.values())
+    near = [shape for shape in scores if scores[shape] <= limit]
+    return min(near, key=lambda shape: (len(shape.terms), scores[shape])), scores
 
 
-def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> Iterator[Shape]:
+def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
     """The friction shapes that compete for a joint, with the smoothing and bend of `best`.
 
     Args:
         best: Its smoothing, its bend and its presliding length stay.
         data: The joint's equations.
-        speed: The joint's highest speed, by which the points of a bent line are told. [rad/s]
+        speed: The joint's highest speed, which decides the points of a bent line. [rad/s]
     """
-    shapes: dict[Shape, None] = {}
+    shapes: list[Shape] = []
     line = bent(speed)
     for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
         shape = best._replace(terms=tellable_terms(terms, data))
         if line and terms[0] in line.terms:
             shape = shape._replace(speeds=line.speeds)
-        if "stribeck" not in terms:
-            shapes[shape] = None
+        if "stribeck" in terms:
+            # Of slower ones the sign's own rounding hides the fading.
+            seen = [v for v in STRIBECK_VELOCITIES if v > 2 * best.smoothing]
+            shapes += [shape._replace(stribeck_velocity=velocity) for velocity in seen]
+        else:
+            shapes.append(shape)
             if best.presliding_length:
-                shapes[shape._replace(terms=(*shape.terms, "presliding"))] = None
-            continue
-        for velocity in STRIBECK_VELOCITIES:
-            if velocity > 2 * best.smoothing:  # else the sign's own rounding hides it
-                shapes[shape._replace(stribeck_velocity=velocity)] = None
-    yield from shapes
+                shapes.append(shape._replace(terms=(*shape.terms, "presliding")))
+    return list(dict.fromkeys(shapes))
 
 
 def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
-    """Drop what the motion cannot tell: growth with a load there is none of, offset one-way."""
+    """The terms that the motion can tell: no growth with no load, no offset one-way."""
     out = tuple(t for t in terms if t != "load_coulomb" or data.load_spread >= LIGHT)
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
@@ -239,7 +336,7 @@ def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
     return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
 
 
-def bounded_shape(j: int, shape: Shape, data: JointData) -> tuple[Shape, bool]:
+def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
     """A shape less the terms at zero, Coulomb and viscous friction bounded there in the fit.
 
     Also whether velocities seem turned, see `TURNED`.
@@ -247,12 +344,11 @@ def bounded_shape(j: int, shape: Shape, data: JointData) -> tuple[Shape, bool]:
     powers: dict[Shape, float] = {}
     for without in ((), *((term,) for term in BOUNDED), BOUNDED):
         one = shape._replace(terms=tuple(t for t in shape.terms if t not in without))
-        A = data.columns(j, one)
-        fit = fit_column(A, data.y, data.weights)
+        fit = data.fit(one)
         power = float(np.sum(data.weights * fit.residual**2))
         own = [k for k, term in enumerate(one.terms) if term in BOUNDED]
         if not without:
-            push = float(np.sqrt(np.mean((A[:, own] @ fit.values[own]) ** 2)))
+            push = float(np.sqrt(np.mean((data.columns(one)[:, own] @ fit.values[own]) ** 2)))
             both, free = bool(np.all(fit.values[own] < 0.0)), power
         if np.all(fit.values[own] >= 0.0):
             powers[one] = power
@@ -262,17 +358,17 @@ def bounded_shape(j: int, shape: Shape, data: JointData) -> tuple[Shape, bool]:
     return best, both and powers[best] > TURNED * free and push > PUSH * data.torque_limit
 
 
-def non_negative_fit(j: int, shape: Shape, data: JointData) -> tuple[Shape, Array]:
+def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
     """A shape's fit; with presliding, without the dry terms that come out negative.
 
     Presliding and the smoothed sign share one dry torque: where one of them takes more than all of
     it, the other is left out.
     """
-    fit = fit_column(data.columns(j, shape), data.y, data.weights)
+    fit = data.fit(shape)
     pushing = pushing_terms(shape, fit.values)
     if "presliding" in shape.terms and pushing:
         shape = shape._replace(terms=tuple(t for t in shape.terms if t not in pushing))
-        fit = fit_column(data.columns(j, shape), data.y, data.weights)
+        fit = data.fit(shape)
     return shape, fit.values
 
 

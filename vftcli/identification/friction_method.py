@@ -1,31 +1,31 @@
-"""Method "friction": everything but the links, which stay at the maker's table."""
+"""Method "friction": everything but the links, which stay at the maker's table.
 
+What the other methods say of a joint's friction is made here too.
+"""
+
+from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+import polars as pl
+
 from vftcli.identification.clean_fit import CleanFit, fit_without_contacts
-from vftcli.identification.friction_shapes import round_digits
-from vftcli.identification.method_result import (
-    DETERMINED,
-    MethodResult,
-    bound_remarks,
-    check_friction,
-    friction_numbers,
-    friction_source,
-    held_joints,
-    identified_friction,
-    presliding_remark,
-    profile_constant,
-    profile_friction,
-    rotor_number,
-    temperature_remarks,
-)
-from vftcli.identification.result import Number, number
+from vftcli.identification.friction_fit import JointFit
+from vftcli.identification.friction_shapes import Shape, round_digits
+from vftcli.identification.result import MethodResult, Number, number
 from vftcli.identification.training import Training
+from vftcli.robots.friction import falling_speed, steady_torque
+from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
-#: Slope of measured over expected torque below which a current does not follow its torque.
+#: Standard deviation over value up to which a number counts as determined by the logs.
+DETERMINED = 0.3
+#: Standard deviations off from which a profile's rotor inertia is replaced.
+REFUTED = 3.0
+#: Measured over expected torque below which a current does not follow it.
 LEAST_SLOPE = 0.05
 
 
@@ -36,24 +36,24 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
             "friction method has nothing to find; use --method base"
         )
-    fits, _, remarks = fitted or fit_without_contacts(data, strict=True)
+    data, fits, remarks = fitted or fit_without_contacts(data, strict=True)
     remarks, robot = [*remarks], data.robot
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
     constants = None if robot.torque_constant is None else robot.torque_constant.copy()
     numbers: list[Number] = []
-    for j, found in enumerate(fits):
-        if found is None:
+    for j, fit in enumerate(fits):
+        if fit is None:
             continue
-        count, where = len(found.shape.terms), Where(joints=(j + 1,))
-        if found.is_kept:
-            found_rms, profile_rms = found.errors
+        count, where = len(fit.shape.terms), Where(joints=(j + 1,))
+        if fit.is_kept:
+            found_rms, profile_rms = fit.errors
             missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
             remarks.append(caution("profile-kept", where, **missed))
             continue
-        values, sd = found.fit.values, found.fit.sd
-        if data.fit_constants and not found.constant:
+        values, sd = fit.fit.values, fit.fit.sd
+        if data.fit_constants and not fit.constant:
             remarks.append(caution("unloaded-drive-constant", where))
-        if found.constant and constants is not None:
+        if fit.constant and constants is not None:
             values, sd, K = by_constant(data, j, values, sd)
             numbers.append(K)
             constants[j] = round_digits(K.value)
@@ -63,17 +63,16 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
             remarks += rotor_remarks(J, where)
             rotor[j] = round_digits(J.value) if J.determined else rotor[j]
         if data.rubs:
-            source = friction_source(data, "friction", sd)
-            frictions[j] = identified_friction(data, j, found.shape, values[:count], source)
-            numbers += friction_numbers(j, found.shape, values, sd, profile_friction(robot)[j])
+            frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "friction")
+            numbers += more
             remarks += check_friction(j, frictions[j], data)
-    chain = replace(robot.chain, rotor_inertia=rotor)
-    friction = tuple(frictions) if data.rubs else ()
-    new = replace(robot, chain=chain, friction=friction, torque_constant=constants)
-    choices = [c for f in fits if f is not None for c in f.choices]
-    remarks += [*bound_remarks(fits), *presliding_remark(fits), *temperature_remarks(data)]
-    remarks += held_joints(data)
-    return MethodResult(new, numbers, choices, None, remarks)
+    new = replace(
+        robot,
+        chain=replace(robot.chain, rotor_inertia=rotor),
+        friction=tuple(frictions) if data.rubs else (),
+        torque_constant=constants,
+    )
+    return fitted_result("friction", data, fits, new, numbers, remarks)
 
 
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
@@ -94,10 +93,129 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
     return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
 
 
+def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
+    """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]
+
+    It counts as determined too where it is `REFUTED` standard deviations from the profile's: then
+    that one is wrong, and the fitted one, zero at least, is nearer to the truth.
+    """
+    if refuted := abs(value - before) >= REFUTED * sd:
+        value = max(value, 0.0)
+    known = refuted or (value > 0 and sd < DETERMINED * value)
+    return number(j, "rotor_inertia", value, sd, before, known)
+
+
 def rotor_remarks(J: Number, where: Where) -> list[Remark]:
-    """That a rotor inertia is not known to `DETERMINED`, and which one is taken."""
+    """A remark on a rotor inertia that is not known to `DETERMINED`."""
     if J.determined and J.sd < DETERMINED * J.value:
         return []
-    found = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
+    values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
     code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
-    return [caution(code, where, **found)]
+    return [caution(code, where, **values)]
+
+
+def identified_friction(
+    data: Training, j: int, shape: Shape, values: Array, sd: Array, method: str
+) -> tuple[JointFriction, list[Number]]:
+    """Friction of joint j (from 0) by its fit, and its coefficients beside the profile's.
+
+    It holds at the temperature of the profile's; others may follow the coefficients. (k,)
+    """
+    before = profile_friction(data.robot)[j]
+    logs = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in data.recordings)
+    errors = ", ".join(f"{value:.2g}" for value in sd)
+    friction = replace(
+        shape.friction(
+            values[: len(shape.terms)],
+            f"identified ({method}) from {logs}; standard deviations {errors}",
+        ),
+        temperature=before.temperature,
+        temperature_at=before.temperature_at,
+    )
+    known = dict(before.parameters)
+    if before.speeds[: len(shape.speeds)] == shape.speeds:
+        known |= dict(zip(shape.points, before.torques, strict=False))
+    return friction, [
+        number(j, term, value, error, known.get(term, np.nan), error < DETERMINED * abs(value))
+        for term, value, error in zip(shape.terms, values, sd, strict=False)
+    ]
+
+
+def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
+    """A remark if the fitted friction of joint j (from 0) pushes at some speed, or falls."""
+    motions = [log.motion for log in data.logs]
+    speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in motions)
+    torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
+    noise = max(robust_sd(m.tau)[j] for m in motions)
+    # A hundredth of the torque's spread: no friction comes out on either side of zero.
+    if np.all(torque < -0.01 * noise):
+        raise IdentificationError(
+            f"{data.recordings[0].name}: friction of joint {j + 1} comes out as {torque[0]:.2g} to "
+            f"{torque[-1]:.2g} N·m: it would push. Velocity and effort differ in sign, or this "
+            "is another robot; check --columns and --robot"
+        )
+    where = Where(joints=(j + 1,))
+    if np.any(torque < 0):
+        return [caution("negative-friction", where, least_Nm=float(torque.min()))]
+    limit = data.top_speed(j)
+    if np.isfinite(falls := falling_speed(friction, limit)):
+        return [warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])]
+    return []
+
+
+def fitted_result(
+    method: str,
+    data: Training,
+    fits: Sequence[JointFit | None],
+    robot: Robot,
+    numbers: list[Number],
+    remarks: list[Remark],
+    base: pl.DataFrame | None = None,
+) -> MethodResult:
+    """The result of a method that fits friction, with the remarks on these fits."""
+    known = [(j, fit) for j, fit in enumerate(fits, start=1) if fit is not None]
+    for j, fit in known:
+        if fit.at_bound:
+            terms = " and ".join(fit.at_bound)
+            remarks.append(caution("friction-at-bound", Where(joints=(j,)), terms=terms))
+    presliding = known[0][1].presliding
+    if len(presliding.errors) > 1:
+        values = {
+            "length_mrad": 1e3 * presliding.length,
+            "lengths_mrad": [1e3 * length for length in presliding.errors],
+            "errors": [*presliding.errors.values()],
+        }
+        remarks.append(Remark("presliding-length", values=values))
+    remarks += temperature_remarks(data)
+    for j, (moves, reverses) in enumerate(zip(data.moves, data.reverses, strict=True), start=1):
+        if not moves:
+            remarks.append(fact("static-joint", Where(joints=(j,))))
+        elif not reverses:
+            remarks.append(caution("one-way-joint", Where(joints=(j,))))
+    choices = [
+        (j, shape.words, error, shape == fit.shape)
+        for j, fit in known
+        for shape, error in fit.scores.items()
+    ]
+    return MethodResult(method, robot, numbers, remarks, choices, base)
+
+
+def temperature_remarks(data: Training) -> list[Remark]:
+    """Remarks on the factors of friction by the joints' temperatures."""
+    remarks = []
+    for log in data.logs:
+        if (warmth := log.columns.warmth) is not None:
+            factors = [float(warmth.min()), float(warmth.max())]
+            where = Where(log.motion.recording.name)
+            remarks.append(fact("friction-by-temperature", where, factors=factors))
+    return remarks
+
+
+def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
+    """The profile's friction, one a joint even where it has none."""
+    return robot.friction or tuple(JointFriction() for _ in range(robot.joints))
+
+
+def profile_constant(robot: Robot, j: int) -> float:
+    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
+    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")

@@ -1,4 +1,4 @@
-"""Friction as a sum of known shapes times coefficients: what is linear in it, and what is not.
+"""Friction as a sum of known shapes times coefficients.
 
 The shapes are evaluated on the log as it was recorded and then filtered like the torque, so that a
 reversal is rounded alike on both sides of the equation.
@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.processing import PreparedLog
+from vftcli.identification.processing import PreparedLog, gravity_torque
 from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic
 from vftcli.robots.presliding import play
 from vftcli.robots.profile import FRICTION_KEYS
-from vftcli.robots.robot import JointFriction
+from vftcli.robots.robot import JointFriction, Robot
+from vftcli.robots.temperature import friction_factor, measured_temperature
 from vftcli.signals.arrays import Array
 
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
@@ -25,13 +26,22 @@ LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
 BENDS = (0.01, 0.5, 1.5, 3.2)
 #: Share of the way between two points that a motion must cover to tell the faster one.
 SPANNED = 0.3
-POINT = "point"  #: How the terms of a bent line begin: point1 is the torque at its first speed.
+#: Term → friction model in a robot file; the first that a joint has counts.
+MODELS = {
+    "logarithmic": "coulomb-logarithmic",
+    "stribeck": "coulomb-viscous-stribeck",
+    "load_coulomb": "coulomb-viscous-load",
+    "quadratic": "coulomb-viscous-quadratic",
+    "offset": "coulomb-viscous-offset",
+}
+SIMPLEST = "coulomb-viscous"  #: Model of a joint that has none of them.
+POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
 
 
 class Shape(NamedTuple):
     """The structure of one joint's friction: which terms, and its nonlinear numbers."""
 
-    #: Keys of the robot file whose values are coefficients, in order; those that begin with `POINT`
+    #: Keys of the robot file that hold coefficients, in order; those that begin with `POINT`
     #: are the torques of a bent line.
     terms: tuple[str, ...]
     smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
@@ -43,18 +53,10 @@ class Shape(NamedTuple):
 
     @property
     def model(self) -> str:
-        """Name of the friction model that the robot file gets: the simplest that has all terms."""
+        """Name of the simplest friction model that has all terms."""
         if self.points:
             return "points"
-        if "logarithmic" in self.terms:
-            return "coulomb-logarithmic"
-        if "stribeck" in self.terms:
-            return "coulomb-viscous-stribeck"
-        if "load_coulomb" in self.terms:
-            return "coulomb-viscous-load"
-        if "quadratic" in self.terms:
-            return "coulomb-viscous-quadratic"
-        return "coulomb-viscous-offset" if "offset" in self.terms else "coulomb-viscous"
+        return next((name for term, name in MODELS.items() if term in self.terms), SIMPLEST)
 
     @property
     def points(self) -> tuple[str, ...]:
@@ -85,7 +87,7 @@ class Shape(NamedTuple):
                 parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
         if "presliding" in self.terms:
             parameters["presliding_length"] = self.presliding_length
-        # What was not fitted, as what slides where all of it is presliding's, is none of it.
+        # A dry torque that is all presliding's leaves none to what slides.
         required, _ = FRICTION_KEYS[self.model]
         parameters = {**dict.fromkeys(required, 0.0), **parameters}
         return JointFriction(
@@ -97,22 +99,18 @@ class Shape(NamedTuple):
         )
 
 
-def bent(speed: float, others: tuple[str, ...] = ()) -> Shape | None:
-    """The bent line whose points a motion up to a speed [rad/s] tells, None if fewer than two.
+def bent(speed: float) -> Shape | None:
+    """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
 
     Between its points the line is straight, so that a motion well beyond one of them tells the
     next one too; behind its last point it goes on as it came.
-
-    Args:
-        speed: The motion's highest speed. [rad/s]
-        others: Terms beside the line.
     """
     reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
     count = 1 + int(np.argmin([*reached, False]))
     if count < 2:
         return None
     points = tuple(f"{POINT}{k}" for k in range(1, count + 1))
-    return Shape((*points, *others), speeds=BENDS[:count])
+    return Shape(points, speeds=BENDS[:count])
 
 
 def round_digits(value: float, digits: int = 7) -> float:
@@ -156,7 +154,7 @@ class FrictionColumns:
         self.cache: dict[tuple[str, int, tuple[float, ...]], Array] = {}
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One term of joint j (from 0), filtered like the torque and kept for later calls. (M,)"""
+        """One term of joint j (from 0), filtered like the torque, made once. (M,)"""
         # The key holds only what the term depends on, so that shapes share their columns.
         numbers = {
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
@@ -181,3 +179,10 @@ class FrictionColumns:
         """All terms of a shape for joint j (from 0), one column a term. (M, k)"""
         columns = [self.column(term, j, shape) for term in shape.terms]
         return np.stack(columns, axis=1) if columns else np.zeros((self.motion.samples, 0))
+
+
+def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
+    """A log's friction columns, by a robot's gravity and temperature law."""
+    temperature = measured_temperature(motion.recording)
+    warmth = None if temperature is None else friction_factor(robot.friction, temperature)
+    return FrictionColumns(motion, np.abs(gravity_torque(robot, motion.recording.q)), warmth)

@@ -2,66 +2,66 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import polars as pl
 
 from vftcli.identification.friction_method import friction_method
-from vftcli.identification.links_choice import chosen_method
-from vftcli.identification.method_result import MethodResult
 from vftcli.identification.payload import (
     LoadFit,
     NotSameMotionError,
     TooFewPosesError,
+    names_of,
+    payload_from_motion,
     payload_from_pair,
     payload_from_poses,
 )
-from vftcli.identification.payload_in_motion import payload_from_motion
 from vftcli.identification.processing import Processing
-from vftcli.identification.provenance import with_provenance
 from vftcli.identification.result import (
-    BASE,
     PARAMETERS,
     RESIDUALS,
     SHAPE_CHOICES,
     Identification,
+    MethodResult,
     Number,
     number,
+    score,
+    score_remarks,
 )
-from vftcli.identification.scoring import score, score_remarks
-from vftcli.identification.target_method import targets_method
+from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
-from vftcli.identification.whole_arm import whole_arm
+from vftcli.identification.whole_arm import chosen_method, whole_arm
 from vftcli.robots.robot import Robot
+from vftcli.robots.writing import robot_document
 from vftcli.signals.errors import IdentificationError, ParameterError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
-#: Name at the command line → method.
+#: Name at the command line → method; "auto" chooses between the first two.
 METHODS: dict[str, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
     "base": whole_arm,
     "targets": targets_method,
+    "auto": chosen_method,
 }
-#: Name of the choice between "friction" and "base" by what the profile's links leave.
-AUTO = "auto"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Task:
-    """What shall be identified."""
+    """Method and options of an identification."""
 
-    method: str | None = "friction"  #: A name in `METHODS`, `AUTO`, or None for a payload alone.
+    method: str | None = "friction"  #: A name in `METHODS`, or None for a payload alone.
     name: str = ""  #: Name of the new robot.
     find_payload: bool = False  #: Whether a load on the flange is sought.
     fit_constants: bool = False  #: Whether the friction method also fits drive constants.
     #: Whether the joints have friction to be fitted; a simulator's may have none.
     friction: bool = True
-    processing: Processing = field(default_factory=Processing)  #: Filters and decimation.
+    processing: Processing = field(default_factory=Processing)  #: Cutoff and decimation.
 
     def __post_init__(self) -> None:
-        if self.method is not None and self.method not in (*METHODS, AUTO):
-            there = ", ".join((*METHODS, AUTO))
+        if self.method is not None and self.method not in METHODS:
+            there = ", ".join(METHODS)
             raise ParameterError(f"--method {self.method!r}; there is {there}")
         if self.method is None and not self.find_payload:
             raise ParameterError(f"nothing to identify: give --method {'|'.join(METHODS)}")
@@ -98,12 +98,11 @@ def identify(
     refuse_repeated_logs(held_out, "--validate")
     load = find_load(logs, robot, free) if task.find_payload else None
     train = free_logs(logs, free, load)
-    if load is not None and (task.method is None or not train):
-        method, result = "payload", MethodResult(robot, [], [], None, [])
+    if task.method is None or not train:
+        result = MethodResult("payload", robot)
     else:
-        method = task.method or "payload"
         data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
-        method, result = chosen_method(data) if method == AUTO else (method, METHODS[method](data))
+        result = METHODS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
         score(log, role, robot, new, task.processing)
@@ -113,21 +112,18 @@ def identify(
     traces = tuple(trace for trace in scored if trace.motion.samples > 1)
     remarks += score_remarks(new, traces)
     if load is not None:
-        new, numbers = with_load(new, load, numbers)
+        new = new.with_payload(load.payload)
+        numbers += load_numbers(load, robot.joints - 1)
         remarks.append(load.origin)
     rows = [row for k, trace in enumerate(traces, start=1) for row in trace.rows(k)]
-    choices = [(c.joint, c.shape.words, c.error, c.chosen) for c in result.shape_choices]
-    base = None
-    if result.base is not None:
-        base = pl.DataFrame(result.base.rows(), schema=BASE, orient="row")
     found = Identification(
         robot=new,
         profile=robot,
-        method=method,
+        method=result.method,
         residuals=pl.DataFrame(rows, schema=RESIDUALS, orient="row"),
         parameters=pl.DataFrame(numbers, schema=PARAMETERS, orient="row"),
-        shape_choices=pl.DataFrame(choices, schema=SHAPE_CHOICES, orient="row"),
-        base=base,
+        shape_choices=pl.DataFrame(result.shape_choices, schema=SHAPE_CHOICES, orient="row"),
+        base=result.base,
         traces=traces,
         processing=task.processing.settings_record(logs[0].median_step),
         remarks=tuple(remarks),
@@ -137,7 +133,7 @@ def identify(
 
 
 def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
-    """Find the load: from a pair if there is one, else from poses at rest, else from motion."""
+    """The load, from a pair if there is one, else from poses, else from motion."""
     bare = robot.with_payload(None)
     if free is not None:
         fit = payload_from_pair(logs[0], free, bare)
@@ -171,11 +167,81 @@ def free_logs(
     return tuple(log for log in logs if not load.carried_by(log))
 
 
-def with_load(robot: Robot, load: LoadFit, numbers: list[Number]) -> tuple[Robot, list[Number]]:
-    """The robot with the found load mounted, and its numbers beside the others."""
-    last, nothing, found = robot.joints - 1, float("nan"), load.payload
-    known = load.mass_sd < 0.2 * found.mass
-    more = [number(last, "mass", found.mass, load.mass_sd, nothing, known)]
-    for key, value, sd in zip(("com_x", "com_y", "com_z"), found.com, load.com_sd, strict=True):
-        more.append(number(last, key, value, sd, nothing, bool(sd < 0.05)))
-    return robot.with_payload(found), [*numbers, *more]
+def load_numbers(load: LoadFit, j: int) -> list[Number]:
+    """A load's mass and centre beside the other numbers, as of joint j (from 0)."""
+    mass, nothing = load.payload.mass, float("nan")
+    centre = zip(("com_x", "com_y", "com_z"), load.payload.com, load.com_sd, strict=True)
+    return [
+        number(j, "mass", mass, load.mass_sd, nothing, load.mass_sd < 0.2 * mass),
+        *(number(j, key, value, sd, nothing, sd < 0.05) for key, value, sd in centre),
+    ]
+
+
+def with_provenance(
+    found: Identification,
+    name: str,
+    logs: Sequence[Recording],
+    trained: Sequence[Recording],
+    load: LoadFit | None,
+) -> Robot:
+    """The identified robot under its own name, with the source of every number."""
+    profile = found.profile
+    named = replace(
+        found.robot,
+        name=name or f"{profile.name}-identified",
+        title=f"{profile.title or profile.name}, identified",
+        path=None,
+        published={},
+    )
+    document = robot_document(named)
+    # The profile's published numbers are those of the arm of the paper, not of this one.
+    document.pop("published", None)
+    new = f"identified ({found.method}) from {names_of(trained)}"
+    old = f"profile {profile.name}"
+    sure = found.parameters.filter("determined")
+    determined = set(zip(sure["joint"], sure["parameter"], strict=True))
+    links = found.method == "base"
+    for j, table in enumerate(document["joints"], start=1):
+        table["inertial_source"] = new if links else old
+        for key in ("rotor_inertia", "torque_constant"):
+            if key in table:
+                changed = (j, key) in determined or (links and key == "rotor_inertia")
+                table[f"{key}_source"] = new if changed else old
+    identified = found.residuals.filter(pl.col("model") == "identified")
+    account: dict[str, Any] = {
+        "method": found.method,
+        "profile": profile.name,
+        "logs": [log.name for log in logs],
+        "sha256": [log.source.sha256 or "unknown" for log in logs],
+        "processing": dict(found.processing),
+        # By index, not by name: two files called log.csv are two logs.
+        "residuals": [
+            {
+                "log": rows["log"][0],
+                "role": rows["role"][0],
+                "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]],
+            }
+            for _, rows in identified.group_by("log_index", maintain_order=True)
+        ],
+    }
+    if load is not None:
+        document["payload"]["source"] = str(load.origin)
+        account["payload"] = {
+            "loaded": names_of(load.loaded),
+            "mass_sd": load.mass_sd,
+            "com_sd": load.com_sd.tolist(),
+            "residual_Nm": load.residual.tolist(),
+        }
+    if found.base is not None:
+        account["base_parameters"] = found.base.to_dicts()
+    sources = [
+        {
+            "id": f"log-{k}",
+            "what": "what `identification` and the joints' confidence name",
+            "ref": f"{log.name}, {log.samples} samples, {log.duration:.3f} s",
+            "sha256": log.source.sha256 or "unknown",
+        }
+        for k, log in enumerate(logs, start=1)
+    ]
+    tables = {"sources": [*document.get("sources", ()), *sources], "identification": account}
+    return replace(named, document={**document, **tables})

@@ -1,33 +1,39 @@
-"""A load on the flange, from a pair of logs with and without it or from poses at rest."""
+"""A load on the flange: from a pair of logs with and without it, poses at rest, or motion."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.processing import (
     PreparedLog,
     Processing,
     gravity_torque,
     prepare,
+    root_mean_square,
 )
-from vftcli.identification.result import root_mean_square
 from vftcli.readers.table import listed
+from vftcli.repetition.free_load import LEAST, PARTLY, SURE, columns, weighed
 from vftcli.robots.chain import Payload
 from vftcli.robots.drive import drive_torque, gain_sd
 from vftcli.robots.friction import SMOOTHING
+from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Indices
+from vftcli.robots.run import Run, RunSamples
+from vftcli.signals.arrays import Array, Indices, handed_over
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.intervals import intervals
 from vftcli.signals.least_squares import folds, inverse_of, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.rest import held
+from vftcli.signals.rest import faster, held
 from vftcli.signals.series import resample_columns
 
+PASSES = 3  #: Fits, each with the joints' residuals of the last one.
 STATIC = 4  #: Parameters that gravity tells: mass and three first moments.
 SAME_MOTION = 5e-3  #: Position difference up to which two logs are the same motion. [rad rms]
 COARSE, FINE = 0.05, 5e-4  #: Steps in which the shift between two logs is sought. [s]
@@ -35,8 +41,14 @@ DWELL = 0.5  #: Shortest rest that counts as a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
 APART = 0.1  #: Poses are different if a joint is this far elsewhere. [rad]
 MOST_NAMED = 4  #: Logs that are called by their names; there may be thousands of episodes.
-STRETCHES = 12  #: Stretches of a motion whose errors are taken as each other's strangers.
+STRETCHES = 12  #: Stretches of a motion with errors that count as independent.
 REACH = 1.0  #: A load's centre of mass further than this from the flange cannot be. [m]
+LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
+#: Shortest motion to be weighed: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by
+#: .7 of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
+LONG = 10.0
+#: Weighings with the load on the arm: the third moves mass and centre by less than .1 %.
+ROUNDS = 3
 
 
 def names_of(recordings: Sequence[Recording]) -> str:
@@ -45,7 +57,7 @@ def names_of(recordings: Sequence[Recording]) -> str:
 
 
 class NotSameMotionError(IdentificationError):
-    """Two logs that were taken for a pair do not repeat one motion."""
+    """Two logs of a supposed pair do not repeat one motion."""
 
 
 class TooFewPosesError(IdentificationError):
@@ -60,59 +72,136 @@ class LoadFit(NamedTuple):
     com_sd: Array  #: Standard deviations of the centre of mass in flange axes. (3,) [m]
     residual: Array  #: RMS torque left in each joint. (n,) [N·m]
     loaded: tuple[Recording, ...]  #: The logs that carry it.
-    origin: Remark  #: How it was found.
+    origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it. Logs are told apart as objects: their names may be equal."""
+        """Whether a log carries it. Logs differ as objects: their names may be equal."""
         return any(log is recording for log in self.loaded)
 
 
-class LoadSolution(NamedTuple):
-    """Mass and first moments in the last link's frame, before they are known to be a load's."""
-
-    x: Array  #: The solution. (4,) [kg, kg·m]
-    sd: Array  #: Its standard deviations. (4,)
-    residual: Array  #: RMS left in each joint. (n,) [N·m]
-
-
 def load_at_flange(
-    found: LoadSolution, robot: Robot, loaded: Sequence[Recording], origin: Remark
+    x: Array, sd: Array, left: Array, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
-    """A solution as a load in flange axes."""
-    names, mass, sd = names_of(loaded), float(found.x[0]), float(found.sd[0])
-    if mass <= 0 or sd > 0.5 * mass:
+    """A solution as a load in flange axes.
+
+    Args:
+        x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
+        sd: Their standard deviations. (4,)
+        left: RMS torque left in each joint. (n,) [N·m]
+        robot: The arm.
+        loaded: The logs that carry it.
+        origin: How it was found.
+    """
+    names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
+    if mass <= 0 or mass_sd > 0.5 * mass:
         raise IdentificationError(
-            f"{names}: no load can be told: mass {mass:.3g} ± {sd:.2g} kg; "
+            f"{names}: no load can be told: mass {mass:.3g} ± {mass_sd:.2g} kg; "
             "use poses or motions in which gravity loads several joints differently"
         )
     R = robot.chain.flange_rotation
-    com = R.T @ (found.x[1:STATIC] / mass - robot.chain.flange_translation)
-    spread = np.sqrt(np.diag(R.T @ np.diag((found.sd[1:STATIC] / mass) ** 2) @ R))
+    com = R.T @ (x[1:STATIC] / mass - robot.chain.flange_translation)
+    spread = np.sqrt(np.diag(R.T @ np.diag((sd[1:STATIC] / mass) ** 2) @ R))
     if (away := float(np.linalg.norm(com))) > REACH:
         raise IdentificationError(
             f"{names}: the load's centre of mass comes out {away:.2g}"
             " m from the flange; the logs do not fit this robot"
         )
     load = Payload(mass=mass, com=com, inertia=np.zeros((3, 3)))
-    return LoadFit(load, sd, spread, found.residual, tuple(loaded), origin)
+    return LoadFit(load, mass_sd, spread, left, tuple(loaded), origin)
+
+
+class JointsFit(NamedTuple):
+    """Least squares over all joints, each divided by its own residual."""
+
+    x: Array  #: The solution. (k,)
+    left: Array  #: Its residual. (N, n)
+    weights: Array  #: Of every sample and joint, 0 where it tells nothing. (N, n)
+    A: Array  #: The columns times their weights. (N, n, k)
+
+    @property
+    def inverse(self) -> Array:
+        """(AᵀA)⁻¹, columns scaled; zero where the data says nothing. (k, k)"""
+        flat = self.A.reshape(-1, self.A.shape[2])
+        return inverse_of(flat.T @ flat)
+
+    def cluster_covariance(self, clusters: Sequence[slice | Indices]) -> Array:
+        """Covariance of x for a residual that is a cluster's own. (k, k)
+
+        What each cluster pulls the solution by is what it is: G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
+        B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
+        linear models", Biometrika 73(1), 1986).
+
+        Args:
+            clusters: The rows of each, B of them.
+        """
+        inverse, rest = self.inverse, self.left * self.weights
+        pulls = np.array([np.einsum("knp,kn->p", self.A[c], rest[c]) for c in clusters])
+        covariance: Array = inverse @ (pulls.T @ pulls) @ inverse
+        return covariance * len(clusters) / (len(clusters) - 1)
+
+    def motion_covariance(self, y: Array, gain: float) -> Array:
+        """Covariance of x fitted to a motion, by its `STRETCHES` and its drives. (k, k)
+
+        Friction that another temperature changed, or a model that misses, lasts as long as a motion
+        goes one way; the residual's own correlation time, some tenths of a second, would not count.
+        """
+        stretches = folds(len(self.A), STRETCHES)
+        return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
+
+    def gain_covariance(self, y: Array, gain: float) -> Array:
+        """Covariance of x by drive constants that are not known exactly. (k, k)
+
+        Half of their variance counts as all joints' together (one gear, one warmth of the
+        magnets), half as each joint's own: the first scales a load's mass, the second also moves
+        its centre.
+
+        Args:
+            y: The torque that is explained. (N, n)
+            gain: Relative standard deviation of a joint's torque.
+        """
+        # What each joint's torque contributes to the solution: their sum is the solution.
+        shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
+        together = shares.sum(axis=0)
+        covariance: Array = 0.5 * gain**2 * (np.outer(together, together) + shares.T @ shares)
+        return covariance
+
+
+def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
+    """Least squares of columns A (N, n, k) to y (N, n), the samples weighed by `usable` (N, n)."""
+    scale = np.std(y, axis=0)
+    for _ in range(PASSES):
+        w = np.sqrt(usable) / np.maximum(scale, 1e-9)
+        x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
+        left = y - np.einsum("knp,p->kn", A, x)
+        scale = root_mean_square(left)
+    w = np.sqrt(usable) / np.maximum(scale, 1e-9)
+    return JointsFit(x, left, w, A * w[:, :, None])
+
+
+def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
+    """Drive torque of a load's mass and first moments in the last link's frame. (N, n, 4)"""
+    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
-    """Find a load from the same motion with and without it; which is which shows by itself.
+    """A load from the same motion with and without it; which is which shows by itself.
 
     The torque difference at the same phase is the load's, since friction and model errors are
     alike in both, but for friction that grows with the load: that is fitted along.
     """
-    loaded = second
-    solution, origin = solve_pair(second, first, robot)
-    if solution.x[0] < 0:
-        loaded = first
-        solution, origin = solve_pair(first, second, robot)
-    return load_at_flange(solution, robot, (loaded,), origin)
+    for loaded, free in ((second, first), (first, second)):
+        fit, sd, origin = solve_pair(loaded, free, robot)
+        if fit.x[0] >= 0:
+            break
+    x, left = fit.x[:STATIC], root_mean_square(fit.left)
+    return load_at_flange(x, sd, left, robot, (loaded,), origin)
 
 
-def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[LoadSolution, Remark]:
-    """Fit what the loaded log's torque has beyond the free one's at the same phase."""
+def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[JointsFit, Array, Remark]:
+    """Fit of what the loaded log's torque has beyond the free one's at the same phase.
+
+    Also the standard deviations of mass and moments (4,), and how they were found.
+    """
     processing = Processing()
     motion = prepare(loaded, robot, processing)
     shift, distance = find_time_shift(motion, free)
@@ -121,28 +210,17 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[LoadSo
     inside = (at >= free.t[0]) & (at <= free.t[-1])
     extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
     sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
-    q, dq, ddq = motion.q[inside], motion.dq[inside], motion.ddq[inside]
-    Y = torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
+    q = motion.q[inside]
+    Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
     usable = motion.usable[inside].astype(float)
-    x = fit_all_joints(Y, extra, usable)
+    fit = fit_all_joints(Y, extra, usable)
     # How friction grows depends on the load that is sought: a few rounds settle it.
     for _ in range(4):
-        A = np.concatenate([Y, load_friction(robot, q, sign, x)], axis=2)
-        solution = fit_all_joints(A, extra, usable)
-        x = solution[:STATIC]
-    left = extra - np.einsum("knp,p->kn", A, solution)
-    gain = gain_sd(loaded, robot)
-    sd = np.sqrt(
-        np.diag(stretch_covariance(A, left, usable) + gain_covariance(A, left, extra, usable, gain))
-    )[:STATIC]
-    origin = fact(
-        "load-from-pair",
-        loaded=loaded.name,
-        free=free.name,
-        shift_s=round(-shift, 3) + 0.0,
-        distance_mrad=1e3 * distance,
-    )
-    return LoadSolution(x, sd, root_mean_square(left)), origin
+        A = np.concatenate([Y, load_friction(robot, q, sign, fit.x[:STATIC])], axis=2)
+        fit = fit_all_joints(A, extra, usable)
+    sd = np.sqrt(np.diag(fit.motion_covariance(extra, gain_sd(loaded, robot))))[:STATIC]
+    values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * distance}
+    return fit, sd, Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -158,96 +236,8 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     return out
 
 
-def fit_all_joints(A: Array, y: Array, usable: Array, passes: int = 3) -> Array:
-    """Least squares over all joints, each divided by its own residual. (k,)"""
-    scale = np.maximum(np.std(y, axis=0), 1e-9)
-    for _ in range(passes):
-        w = np.sqrt(usable) / scale
-        x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
-        left = y - np.einsum("knp,p->kn", A, x)
-        scale = np.maximum(root_mean_square(left), 1e-9)
-    return x
-
-
-def weighted_rows(A: Array, values: Array, usable: Array, left: Array) -> tuple[Array, Array]:
-    """Rows and values divided by their joint's residual; rows that tell nothing are zero.
-
-    Args:
-        A: Columns. (N, n, k)
-        values: What goes with them. (N, n)
-        usable: Weights. (N, n)
-        left: The residual. (N, n)
-    """
-    w = np.sqrt(usable) / np.maximum(root_mean_square(left), 1e-9)
-    return A * w[:, :, None], values * w
-
-
-def inverse_gram(rows: Array) -> Array:
-    """(AᵀA)⁻¹ of rows (N, n, k), columns scaled; zero where the data says nothing. (k, k)"""
-    flat = rows.reshape(-1, rows.shape[2])
-    return inverse_of(flat.T @ flat)
-
-
-def stretch_covariance(A: Array, left: Array, usable: Array) -> Array:
-    """Covariance of least squares for a residual that is coloured and shared by joints. (k, k)
-
-    The motion is cut into `STRETCHES`. Friction that another temperature changed, or a model that
-    misses, lasts as long as a motion goes one way; the residual's own correlation time, some tenths
-    of a second, would not count it.
-
-    Args:
-        A: Columns. (N, n, k)
-        left: Residual. (N, n)
-        usable: Weights. (N, n)
-    """
-    return cluster_covariance(A, left, usable, folds(len(A), STRETCHES))
-
-
-def cluster_covariance(
-    A: Array, left: Array, usable: Array, clusters: Sequence[slice | Indices]
-) -> Array:
-    """Covariance of least squares for a residual that is a cluster's own. (k, k)
-
-    What each cluster pulls the solution by is taken as it is: G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
-    B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
-    linear models", Biometrika 73(1), 1986).
-
-    Args:
-        A: Columns. (N, n, k)
-        left: Residual. (N, n)
-        usable: Weights. (N, n)
-        clusters: The rows of each, B of them.
-    """
-    rows, rest = weighted_rows(A, left, usable, left)
-    inverse = inverse_gram(rows)
-    pulls = np.array([np.einsum("knp,kn->p", rows[c], rest[c]) for c in clusters])
-    covariance: Array = inverse @ (pulls.T @ pulls) @ inverse
-    return covariance * len(clusters) / (len(clusters) - 1)
-
-
-def gain_covariance(A: Array, left: Array, y: Array, usable: Array, gain: float) -> Array:
-    """Covariance by drive constants that are not known exactly. (k, k)
-
-    Half of their variance is taken as all joints' together (one gear, one warmth of the magnets),
-    half as each joint's own: the first scales a load's mass, the second also moves its centre.
-
-    Args:
-        A: Columns. (N, n, k)
-        left: Residual. (N, n)
-        y: The torque that is explained. (N, n)
-        usable: Weights. (N, n)
-        gain: Relative standard deviation of a joint's torque.
-    """
-    rows, values = weighted_rows(A, y, usable, left)
-    # What each joint's torque contributes to the solution: their sum is the solution.
-    shares = np.einsum("knp,kn->np", rows, values) @ inverse_gram(rows)
-    together = shares.sum(axis=0)
-    covariance: Array = 0.5 * gain**2 * (np.outer(together, together) + shares.T @ shares)
-    return covariance
-
-
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] that turns the motion's clock into the other log's, and what is left. [rad rms]"""
+    """Shift [s] from the motion's clock to the other log's, and what is left. [rad rms]"""
 
     def distance(shift: float) -> float:
         at = motion.t + shift
@@ -273,13 +263,13 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 
 
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
-    """Find a load from poses at rest: what the torque has beyond the robot's own gravity.
+    """A load from poses at rest: the torque beyond the robot's own gravity.
 
     Stiction hides in every pose; its size is what the residual shows, and many poses average it.
     What the model misses of an arm, and what a day does to its drives, is alike in all poses of a
     log: of several logs, how they differ is part of the standard deviations.
     """
-    each = [resting_poses([recording], robot) for recording in recordings]
+    each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
     if (different := different_poses(q)) < POSES:
         raise TooFewPosesError(
@@ -288,28 +278,24 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
             "motion with and without it"
         )
     zero = np.zeros_like(q)
-    Y = torque_regressor(robot.chain, q, zero, zero)[:, :, -LINK:][:, :, :STATIC]
     extra = torque - gravity_torque(robot, q)
-    usable = np.ones_like(extra)
-    x = fit_all_joints(Y, extra, usable)
-    left = extra - np.einsum("knp,p->kn", Y, x)
+    fit = fit_all_joints(load_columns(robot, q, zero, zero), extra, np.ones_like(extra))
     # Poses are no series in time: each tells for itself.
-    freedom = 1.0 - STATIC / left.size
-    noise = inverse_gram(weighted_rows(Y, left, usable, left)[0]) / freedom
+    noise = fit.inverse / (1.0 - STATIC / extra.size)
     gain = max(gain_sd(recording, robot) for recording in recordings)
-    covariance = noise + gain_covariance(Y, left, extra, usable, gain)
+    covariance = noise + fit.gain_covariance(extra, gain)
     ends = np.cumsum([len(poses) for poses, _ in each])
     logs = [slice(end - len(poses), end) for end, (poses, _) in zip(ends, each, strict=True)]
     logs = [log for log in logs if log.stop > log.start]
     if len(logs) > 1:
-        covariance = covariance + cluster_covariance(Y, left, usable, logs)
-    sd = np.sqrt(np.diag(covariance))
+        covariance = covariance + fit.cluster_covariance(logs)
+    sd, left = np.sqrt(np.diag(covariance)), np.std(fit.left, axis=0)
     origin = fact("load-from-poses", poses=len(q), different=different, logs=len(logs))
-    return load_at_flange(LoadSolution(x, sd, np.std(left, axis=0)), robot, recordings, origin)
+    return load_at_flange(fit.x, sd, left, robot, recordings, origin)
 
 
 def different_poses(q: Array) -> int:
-    """How many poses (P, n) there are that lie `APART` from each other."""
+    """Number of poses (P, n) that lie `APART` from each other."""
     found: list[Array] = []
     for pose in q:
         if not found or np.min(np.max(np.abs(np.array(found) - pose), axis=1)) > APART:
@@ -317,15 +303,97 @@ def different_poses(q: Array) -> int:
     return len(found)
 
 
-def resting_poses(recordings: Sequence[Recording], robot: Robot) -> tuple[Array, Array]:
+def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     """Mean position and torque of every rest. (P, n) [rad], (P, n) [N·m]"""
-    q, torque = [], []
-    for recording in recordings:
-        effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
-        for start, stop in intervals(recording.t, still, least=DWELL):
-            edge = (stop - start) // 5  # where the arm still settles or already leaves
-            span = slice(start + edge, stop - edge)
-            q.append(recording.q[span].mean(axis=0))
-            torque.append(effort[span].mean(axis=0))
-    n = robot.joints
-    return np.reshape(q, (-1, n)), np.reshape(torque, (-1, n))
+    effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
+    spans = []
+    for start, stop in intervals(recording.t, still, least=DWELL):
+        edge = (stop - start) // 5  # where the arm still settles or already leaves
+        spans.append(slice(start + edge, stop - edge))
+    means = [[x[span].mean(axis=0) for span in spans] for x in (recording.q, effort)]
+    q, torque = np.reshape(means, (2, -1, robot.joints))
+    return q, torque
+
+
+def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
+    """A load from motion: the torque beyond the robot's own weight.
+
+    The columns of `vftcli.repetition.free_load` know of a load's weight alone: with what was found
+    on the arm the motion is weighed again, so that the load's inertia does not count as weight.
+    """
+    names = names_of(recordings)
+    q = np.concatenate([recording.q for recording in recordings])
+    if (different := different_poses(q[:: 1 + len(q) // LOOKED_AT])) < POSES:
+        raise IdentificationError(
+            f"{names}: the arm passes {different} different poses, and a load needs {POSES} at "
+            f"least, {APART:g} rad apart; move more joints, or give a pair of logs of one motion "
+            "with and without it"
+        )
+    if (seconds := sum(recording.duration for recording in recordings)) < LONG:
+        raise IdentificationError(
+            f"{names}: {seconds:.3g} s of motion are too short to weigh a load; record {LONG:g} s "
+            "at least"
+        )
+    runs = [Run(recording=recording, robot=robot) for recording in recordings]
+    x, covariance, left, share = weigh_motion(runs, np.zeros(STATIC))
+    least = max(LEAST, SURE * float(np.sqrt(covariance[0, 0])))
+    if not x[0] >= least or share > PARTLY:
+        raise IdentificationError(
+            f"{names}: no load shows; in this motion one from "
+            f"{round_digits(least, 2):g} kg would, a lighter one in {POSES} different poses at "
+            f"rest of at least {DWELL:g} s, or in a pair of logs of one motion with and without it"
+        )
+    origin = fact("load-from-motion", logs=len(runs), left_percent=100.0 * share)
+    for _ in range(ROUNDS):
+        x, covariance, left, _ = weigh_motion(runs, x)
+    in_link = np.eye(STATIC)
+    in_link[1:, 0], in_link[1:, 1:] = robot.chain.flange_translation, robot.chain.flange_rotation
+    sd = np.sqrt(np.diag(in_link @ covariance @ in_link.T))
+    return load_at_flange(in_link @ x, sd, left, robot, recordings, origin)
+
+
+def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Array, float]:
+    """A load weighed in motion, from what it is known to be.
+
+    A joint counts where it moves, and its friction is free: a tanh(q̇/v₀) + b q̇ + o. Nothing is
+    subtracted that went through the same drives, so that an error of theirs acts on the arm's own
+    weight.
+
+    Args:
+        runs: Logs that carry it.
+        carried: Mass and first moment of what their models carry of it. (4,) [kg, kg·m]
+
+    Returns:
+        Mass and first moment in flange axes (4,) [kg, kg·m], their covariance (4, 4), RMS left in
+        each joint (n,) [N·m], and what is left of the torque beside weight and friction of the
+        arm, by its power.
+    """
+    robot, signals = runs[0].robot, []
+    for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
+        piece = RunSamples(run, np.ones(run.recording.samples, dtype=bool))
+        at, own = weighed(piece), columns(piece)
+        if own is not None:
+            signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))
+    if not signals:
+        names = names_of([run.recording for run in runs])
+        raise IdentificationError(f"{names}: no log is long enough to be filtered")
+    d, A, q, dq = (np.concatenate(each) for each in zip(*signals, strict=True))
+    A = np.concatenate([A, dq[:, :, None] * np.eye(robot.joints)], axis=2)
+    usable = faster(dq).astype(float)
+    fit, bare = fit_all_joints(A, d, usable), fit_all_joints(A[:, :, STATIC:], d, usable)
+    x = carried + fit.x[:STATIC]
+    weight = gravity_torque(robot, q) - np.einsum("knp,p->kn", A[:, :, :STATIC], x)
+    gain = max(gain_sd(run.recording, robot) for run in runs)
+    covariance = fit.motion_covariance(weight, gain)[:STATIC, :STATIC]
+    power = np.sum(usable * fit.left**2) / max(np.sum(usable * bare.left**2), 1e-12)
+    return x, covariance, root_mean_square(fit.left), float(np.sqrt(power))
+
+
+def carrying(run: Run, x: Array) -> Run:
+    """A run with a load in its model too, a point mass of x (4,) [kg, kg·m] in flange axes."""
+    load = Payload(mass=float(x[0]), com=x[1:] / x[0], inertia=np.zeros((3, 3)))
+    q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
+    own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)
+    more = loaded.coriolis_transpose_dq - own.coriolis_transpose_dq
+    mu = handed_over(terms.mu + more - loaded.gravity + own.gravity)
+    return run.holding(terms=replace(terms, p=handed_over(terms.p + loaded.p - own.p), mu=mu))

@@ -16,15 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.stacking import ParameterColumns, Triangles
+from vftcli.identification.links import ParameterColumns, Triangles
 from vftcli.robots.regressor import LINK, TENSOR
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 
 #: Weights of the distance to the profile, from hardly any pull to the profile itself.
 WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
-MARGIN = 1.01  #: Factor of the least misfit within which a pull predicts as well as the best one.
-#: Pull of a maker's table whose masses have a standard deviation of 5 %: the distance of
+MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
+#: Pull of a maker's table with masses of 5 % standard deviation: the distance of
 #: P = (1 + δ) P₀ is 2 δ² for small δ.
 TABLE = 100.0
 STEPS = 100  #: Newton steps at most; a dozen or two are usual.
@@ -36,7 +36,7 @@ SMALLEST_RADIUS = 1e-3
 
 
 def basis() -> Array:
-    """How the pseudo-inertia P grows with each of a link's ten parameters, ∂P/∂φ_k. (10, 4, 4)"""
+    """∂P/∂φ_k of the pseudo-inertia P by each of a link's ten parameters. (10, 4, 4)"""
     out = np.zeros((LINK, 4, 4))
     out[0, 3, 3] = 1.0
     for k in range(3):
@@ -69,7 +69,7 @@ def is_physical(phi: Array) -> bool:
 
 
 def thicken_links(phi: Array) -> Array:
-    """The nearest parameters whose every link has some mass and some thickness. (10n,)
+    """The nearest parameters with some mass and some thickness in every link. (10n,)
 
     Profiles from rounded tables, or with point masses, touch the edge of what is physical.
     """
@@ -98,8 +98,8 @@ class Problem(NamedTuple):
 
     def value(self, x: Array) -> float:
         """The cost; infinite outside the physical models."""
-        n, rotors = self.layout.inertial, self.layout.rotors
-        J, J0 = x[n : n + rotors], self.start[n : n + rotors]
+        n, places = self.layout.inertial, self.layout.rotor_places
+        J, J0 = x[places], self.start[places]
         if not is_physical(x[:n]) or np.any(J <= 0):
             return float("inf")
         P, P0 = pseudo_inertias(x[:n]), pseudo_inertias(self.start[:n])
@@ -112,7 +112,7 @@ class Problem(NamedTuple):
 
     def step(self, x: Array) -> tuple[Array, float]:
         """Newton's step and the square of its decrement."""
-        n, rotors = self.layout.inertial, self.layout.rotors
+        n, places = self.layout.inertial, self.layout.rotor_places
         gradient = self.R.T @ (self.R @ x - self.z)
         hessian = self.R.T @ self.R
         inverse = np.linalg.inv(pseudo_inertias(x[:n]))
@@ -122,10 +122,9 @@ class Problem(NamedTuple):
             gradient[place] += self.weight * np.einsum("rc,kcr->k", then - now, BASIS)
             turned = now @ BASIS
             hessian[place, place] += self.weight * np.einsum("krc,lcr->kl", turned, turned)
-        J, J0 = x[n : n + rotors], self.start[n : n + rotors]
-        spots = np.arange(n, n + rotors)
-        gradient[spots] += self.weight * (1.0 / J0 - 1.0 / J)
-        hessian[spots, spots] += self.weight / J**2
+        J, J0 = x[places], self.start[places]
+        gradient[places] += self.weight * (1.0 / J0 - 1.0 / J)
+        hessian[places, places] += np.diag(self.weight / J**2)
         scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
         scaled = hessian / np.outer(scale, scale) + 1e-12 * np.eye(len(x))
         step = -np.linalg.solve(scaled, gradient / scale) / scale
@@ -158,8 +157,7 @@ def starting_point(layout: ParameterColumns, x: Array) -> Array:
     """Physical parameters near x to measure the distance from. (size,)"""
     start = x.copy()
     start[: layout.inertial] = thicken_links(x[: layout.inertial])
-    spots = slice(layout.inertial, layout.inertial + layout.rotors)
-    start[spots] = np.maximum(x[spots], 1e-3)
+    start[layout.rotor_places] = np.maximum(x[layout.rotor_places], 1e-3)
     return start
 
 

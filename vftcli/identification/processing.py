@@ -1,4 +1,4 @@
-"""From a log to the signals an identification is made from: filtered alike, without delay."""
+"""From a log to the torques an identification compares: filtered alike, without delay."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,8 +8,10 @@ from numpy.typing import NDArray
 
 from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
+from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.robots.temperature import friction_factor, measured_temperature
+from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.temperature import measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -18,18 +20,18 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.rest import NONZERO, faster
 from vftcli.signals.series import gaps_of
 
+#: Samples kept per period of the cutoff when the filtered log is decimated.
+OVERSAMPLING = 6.0
+STOP = 0.3  #: Length of a stop from which on it identifies nothing, because of stiction. [s]
+GAP = 10.0  #: Steps longer than this many median steps are left out.
+
 
 @dataclass(frozen=True, kw_only=True)
 class Processing:
-    """How signals are prepared. Everything a joint's torque is made of goes through one filter."""
+    """Filter and decimation: everything a joint's torque is made of goes through one filter."""
 
     #: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
     cutoff: float = 8.0
-    #: Samples kept per period of the cutoff when the filtered log is decimated.
-    oversampling: float = 6.0
-    #: Length of a stop from which on it identifies nothing, because of stiction. [s]
-    rest: float = 0.3
-    gap: float = 10.0  #: Steps longer than this many median steps are left out.
 
     def __post_init__(self) -> None:
         if not 0.0 < self.cutoff < 1e4:
@@ -54,7 +56,7 @@ class Processing:
 
     def stride(self, step: float) -> int:
         """Every how many samples of the filtered log are kept."""
-        return max(1, int(1.0 / (step * self.oversampling * self.cutoff) + 1e-9))
+        return max(1, int(1.0 / (step * OVERSAMPLING * self.cutoff) + 1e-9))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,8 +64,8 @@ class PreparedLog:
     """A log prepared for identification: M samples from the first to the last that moves."""
 
     recording: Recording  #: The log.
-    processing: Processing  #: How it was prepared.
-    kept: NDArray[np.int64]  #: Which samples of the log these are. (M,)
+    processing: Processing  #: Its filter.
+    kept: NDArray[np.int64]  #: Numbers of these samples in the log. (M,)
     t: Array  #: Time. (M,) [s]
     q: Array  #: Positions. (M, n) [rad]
     dq: Array  #: Velocities. (M, n) [rad/s]
@@ -88,7 +90,7 @@ class PreparedLog:
         return np.concatenate(columns, axis=1)
 
     def chunks(self, size: int = 1024) -> Iterator[slice]:
-        """Spans of at most `size` samples: a regressor of a whole log would not fit into memory."""
+        """Spans of `size` samples: a whole log's regressor would not fit into memory."""
         for start in range(0, self.samples, size):
             yield slice(start, min(start + size, self.samples))
 
@@ -101,48 +103,45 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         RobotError: If the number of joints differs.
         ClockError: If the log is too short for the filter.
     """
-    dq, torque = recording.require("dq"), drive_torque(recording, robot)
+    torque, dq = drive_torque(recording, robot), recording.require("dq")
     t, stride = recording.t, processing.stride(recording.median_step)
     # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
     kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
-    columns: dict[str, list[Array]] = {"q": [], "dq": [], "ddq": [], "tau": []}
-    for j in range(recording.joints):
-        velocity = zero_phase(t, dq[:, j : j + 1], processing.cutoff)
-        columns["dq"].append(velocity[kept])
-        columns["ddq"].append(derivative(t, velocity)[kept])
-        for name, signal in (("q", recording.q), ("tau", torque)):
-            columns[name].append(zero_phase(t, signal[:, j : j + 1], processing.cutoff)[kept])
-    usable = usable_samples(t, dq, processing)[kept]
+
+    def smooth(signal: Array) -> Array:
+        return zero_phase(t, signal[:, None], processing.cutoff)
+
+    joints = []
+    for position, speed, effort in zip(recording.q.T, dq.T, torque.T, strict=True):
+        velocity = smooth(speed)
+        signals = smooth(position), velocity, derivative(t, velocity), smooth(effort)
+        joints.append([signal[kept] for signal in signals])
+    q, velocities, ddq, tau = (np.concatenate(x, axis=1) for x in zip(*joints, strict=True))
+    usable = usable_samples(t, dq, processing.cutoff)[kept]
     return PreparedLog(
         recording=recording,
         processing=processing,
         kept=kept,
         t=t[kept],
+        q=q,
+        dq=velocities,
+        ddq=ddq,
+        tau=tau,
         usable=usable,
-        **{name: np.concatenate(parts, axis=1) for name, parts in columns.items()},
     )
 
 
-def usable_samples(t: Array, dq: Array, processing: Processing) -> Mask:
+def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
-        usable[:, j] = ~covered(intervals(t, ~moves, least=processing.rest), len(t))
+        usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
     # What the filter makes of a gap reaches half a period of its cutoff to either side.
-    margin = 0.5 / processing.cutoff
-    for k in gaps_of(t, processing.gap):
+    margin = 0.5 / cutoff
+    for k in gaps_of(t, GAP):
         usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
     return usable
-
-
-def friction_warmth(recording: Recording, robot: Robot) -> Array | None:
-    """What a log's joint temperatures make of the robot's friction. (T, n) [1]
-
-    None where the log has no temperatures, or the robot no law for them.
-    """
-    temperature = measured_temperature(recording)
-    return None if temperature is None else friction_factor(robot.friction, temperature)
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:
@@ -152,3 +151,33 @@ def gravity_torque(robot: Robot, q: Array) -> Array:
         span = slice(start, start + CHUNK)
         out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
     return out
+
+
+def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:
+    """Rigid-body torque of the loaded arm, without rotors. (M, n) [N·m]"""
+    phi = chain_parameters(robot.loaded_chain)
+    out = np.empty(motion.q.shape)
+    for span in motion.chunks():
+        state = motion.q[span], motion.dq[span], motion.ddq[span]
+        out[span] = torque_regressor(robot.chain, *state) @ phi
+    return out
+
+
+def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
+    """Drive torque by the robot's model, friction filtered like the log. (M, n) [N·m]"""
+    torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
+    if not robot.friction:
+        return torque
+    recording = motion.recording
+    load = gravity_torque(robot, recording.q)
+    friction = RunningFriction(robot.friction).torque(
+        recording.q, recording.require("dq"), load, measured_temperature(recording)
+    )
+    total: Array = torque + motion.filtered(friction)
+    return total
+
+
+def root_mean_square(x: Array) -> Array:
+    """Root mean square of each column of x (M, n), in its unit. (n,)"""
+    value: Array = np.sqrt(np.mean(x**2, axis=0))
+    return value

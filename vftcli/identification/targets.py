@@ -1,31 +1,40 @@
-"""What a UR controller believes: K, rotor inertia and friction, read off its own targets.
+"""Method "targets": what a UR controller believes of its arm, read off its own targets.
 
 The controller logs the torque its inverse dynamics asks for (target_moment) and the current it
 expects (target_current). At rest their ratio is K; in motion target_moment less the maker's rigid
 body is J q̈, and K·target_current − target_moment is the controller's friction. Nothing of this
-needs free motion: a hand on the arm changes what is measured, not what was asked for.
+needs free motion: a hand on the arm changes the measured effort, not the one that was asked for.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, is_dissipative
+from vftcli.identification.friction_method import (
+    identified_friction,
+    profile_constant,
+    profile_friction,
+    temperature_remarks,
+)
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     FrictionColumns,
     Shape,
     bent,
+    friction_columns,
+    round_digits,
 )
 from vftcli.identification.processing import (
-    PreparedLog,
     Processing,
-    friction_warmth,
     gravity_torque,
     prepare,
+    rigid_torque,
 )
-from vftcli.identification.scoring import rigid_torque
+from vftcli.identification.result import MethodResult, Number, number
+from vftcli.identification.training import Training
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
@@ -34,13 +43,14 @@ from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 
 #: Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]
 CUTOFF = 4.0
 #: Relative standard deviation up to which a drive constant counts as determined.
 CONSTANT_KNOWN = 1e-2
-ROTOR_KNOWN = 2e-2  #: Relative standard deviation up to which a rotor inertia counts as determined.
+ROTOR_KNOWN = 2e-2  #: The relative deviation up to which a rotor inertia does.
 #: Friction shapes beside which the drive constants must agree.
 SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
@@ -57,6 +67,8 @@ GUIDED = 0.4
 SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of the samples used, which must agree too. [rad/s]
 SETTLE = 0.1  #: Left out at both ends of a rest. [s]
 STEADY = 5e-3  #: Relative change of the target current during a rest up to which it is one.
+#: Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s².
+SAME_GRAVITY = 3e-4
 
 
 class Estimate(NamedTuple):
@@ -68,42 +80,103 @@ class Estimate(NamedTuple):
 
 
 UNKNOWN = Estimate(float("nan"), float("inf"), False)
+#: A friction shape, its coefficients and their standard deviations. (k,), (k,)
+FrictionLaw = tuple[Shape, Array, Array]
 
 
 class ControllerModel(NamedTuple):
-    """What the controller believes of one joint."""
+    """The controller's model of one joint."""
 
     constant: Estimate  #: Drive constant K. [N·m/A]
     rotor: Estimate  #: Reflected rotor inertia. [kg·m²]
-    #: The best of `WRITTEN`, its coefficients and their standard deviations, None where the joint
-    #: does not move.
-    friction: tuple[Shape, Array, Array] | None
+    friction: FrictionLaw | None  #: The law it feeds forward, None where the joint does not move.
     gravity: Estimate  #: Its gravity torque over the profile's.
 
 
-class Targets(NamedTuple):
-    """One log's targets beside its motion, filtered alike."""
+def targets_method(data: Training) -> MethodResult:
+    """K, rotor inertia and friction as the controller itself uses them."""
+    robot = data.robot
+    models = controller_models(data.recordings, robot)
+    rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
+    constants = np.array(robot.torque_constant, dtype=float)
+    numbers: list[Number] = []
+    remarks: list[Remark] = []
+    for j, model in enumerate(models):
+        for name, (value, sd, known), before in (
+            ("torque_constant", model.constant, constants[j]),
+            ("rotor_inertia", model.rotor, rotor[j]),
+        ):
+            numbers.append(number(j, name, value, sd, before, known))
+        remarks += target_remarks(j, model, robot)
+        if model.constant.known:
+            constants[j] = round_digits(model.constant.value)
+        if model.rotor.known:
+            rotor[j] = round_digits(model.rotor.value)
+        if model.friction is not None:
+            frictions[j], more = identified_friction(data, j, *model.friction, "targets")
+            numbers += more
+    remarks += [*gravity_remarks(models), *temperature_remarks(data)]
+    chain = replace(robot.chain, rotor_inertia=rotor)
+    new = replace(robot, chain=chain, friction=tuple(frictions), torque_constant=constants)
+    return MethodResult("targets", new, numbers, remarks)
 
-    recording: Recording  #: The log.
-    motion: PreparedLog  #: Measured motion.
-    columns: FrictionColumns  #: Friction columns.
+
+def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
+    """Remarks on numbers of joint j (from 0) that the targets leave open: the profile's stay."""
+    remarks, where = [], Where(joints=(j + 1,))
+    if not model.constant.known:
+        values = {"profile_NmA": profile_constant(robot, j)}
+        if np.isfinite(model.constant.sd):
+            values |= {"found_NmA": model.constant.value, "sd_NmA": model.constant.sd}
+            remarks.append(caution("undetermined-drive-constant", where, **values))
+        else:
+            remarks.append(caution("unexcited-drive-constant", where, **values))
+    if not model.rotor.known:
+        J = float(robot.chain.rotor_inertia[j])
+        remarks.append(caution("unaccelerated-joint", where, profile_kgm2=J))
+    if model.friction is None:
+        remarks.append(caution("unexcited-friction", where))
+    return remarks
+
+
+def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
+    """A remark if the controller computes with another gravity than the profile."""
+    scales = [m.gravity for m in models if m.gravity.known]
+    if not scales:
+        return []
+    # All joints feel one gravity: their ratios count by their inverse variances.
+    weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
+    ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
+    least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
+    return [fact("controller-gravity", ratio=ratio)] if abs(ratio - 1.0) >= least else []
+
+
+class ControllerTargets(NamedTuple):
+    """Targets beside the motion, filtered alike, of one log or of several."""
+
+    sources: tuple[FrictionColumns, ...]  #: Friction columns of each log.
+    dq: Array  #: Measured velocities. (M, n) [rad/s]
+    ddq: Array  #: Measured accelerations. (M, n) [rad/s²]
     current: Array  #: Target current. (M, n) [A]
     moment: Array  #: Target moment. (M, n) [N·m]
     lead: Array  #: Its time derivative: what a shift in time would add. (M, n) [N·m/s]
     rigid: Array  #: The profile's rigid-body torque. (M, n) [N·m]
     gravity: Array  #: The profile's gravity torque. (M, n) [N·m]
 
+    def columns(self, j: int, shape: Shape) -> Array:
+        """Friction columns of joint j (from 0). (M, k)"""
+        return np.concatenate([source.joint(j, shape) for source in self.sources])
 
-def read_targets(recording: Recording, robot: Robot) -> Targets:
-    """Filter a log's targets like its motion."""
+
+def read_targets(recording: Recording, robot: Robot) -> ControllerTargets:
+    """A log's targets, filtered like its motion."""
     wanted, asked = recording.require("target_current"), recording.require("target_torque")
     motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
-    load = gravity_torque(robot, recording.q)
     smooth = zero_phase(recording.t, asked, CUTOFF)
-    return Targets(
-        recording=recording,
-        motion=motion,
-        columns=FrictionColumns(motion, np.abs(load), friction_warmth(recording, robot)),
+    return ControllerTargets(
+        sources=(friction_columns(motion, robot),),
+        dq=motion.dq,
+        ddq=motion.ddq,
         current=motion.filtered(wanted),
         moment=smooth[motion.kept],
         lead=derivative(recording.t, smooth)[motion.kept],
@@ -113,43 +186,45 @@ def read_targets(recording: Recording, robot: Robot) -> Targets:
 
 
 def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[ControllerModel, ...]:
-    """Read the controller's model of every joint off its targets."""
+    """The controller's model of every joint, by its targets."""
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
             "read a model off; use --method friction or base"
         )
     logs = [read_targets(recording, robot) for recording in recordings]
-    for log in logs:
-        refuse_guided(log, robot)
-    return tuple(joint_model(j, logs, float(robot.torque_constant[j])) for j in range(robot.joints))
+    for recording, log in zip(recordings, logs, strict=True):
+        refuse_guided(recording, log, robot)
+    sources, signals = tuple(log.sources[0] for log in logs), (log[1:] for log in logs)
+    every = ControllerTargets(sources, *map(np.concatenate, zip(*signals, strict=True)))
+    return tuple(joint_model(j, every, float(K)) for j, K in enumerate(robot.torque_constant))
 
 
-def joint_model(j: int, logs: Sequence[Targets], before: float) -> ControllerModel:
-    """Read one joint's model; K first, since friction needs it."""
-    # K is needed for friction; of two ways to it, the surer one in this log is taken.
-    still, moving = constant_at_rest(j, logs), constant_in_motion(j, logs)
+def joint_model(j: int, log: ControllerTargets, before: float) -> ControllerModel:
+    """The model of joint j (from 0); K first, since friction needs it."""
+    # Of two ways to K, the surer one in this log is used.
+    still, moving = constant_at_rest(j, log), constant_in_motion(j, log)
     constant = min((still, moving), key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
     K = constant.value if constant.known else before
-    rotor, gravity = rotor_inertia(j, logs)
-    return ControllerModel(constant, rotor, controller_friction(j, logs, K), gravity)
+    rotor, gravity = rotor_inertia(j, log)
+    return ControllerModel(constant, rotor, controller_friction(j, log, K), gravity)
 
 
-def constant_at_rest(j: int, logs: Sequence[Targets]) -> Estimate:
+def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     """K from the ratio at rest, where friction asks for nothing; sd from the current's digits."""
     points = []
-    for log in logs:
-        recording, t = log.recording, log.recording.t
+    for source in log.sources:
+        recording = source.motion.recording
+        t = recording.t
         current, moment = recording.require("target_current"), recording.require("target_torque")
         step = resolution(current[:, j])
         for start, stop in runs_of(~np.any(faster(recording.require("dq"), NONZERO), axis=1)):
             inside = (t[start:stop] > t[start] + SETTLE) & (t[start:stop] < t[stop - 1] - SETTLE)
             if np.count_nonzero(inside) > 3:
-                i, m = current[start:stop, j][inside], moment[start:stop, j][inside]
-                if np.ptp(i) <= max(4 * step, STEADY * abs(np.median(i))) and (
-                    abs(np.median(i)) > 20 * step
-                ):
-                    points.append((float(np.median(i)), float(np.median(m)), step))
+                held = current[start:stop, j][inside]
+                i, m = np.median(held), np.median(moment[start:stop, j][inside])
+                if np.ptp(held) <= max(4 * step, STEADY * abs(i)) and abs(i) > 20 * step:
+                    points.append((i, m, step))
     if not points:
         return UNKNOWN
     i, m, steps = np.array(points).T
@@ -166,84 +241,69 @@ def resolution(values: Array) -> float:
     return float(steps.min()) if steps.size else 0.0
 
 
-def constant_in_motion(j: int, logs: Sequence[Targets]) -> Estimate:
+def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
     """K from currents that follow moments; sd from how little the friction's shape matters."""
-    current = np.concatenate([log.current[:, j] for log in logs])
-    moment = np.concatenate([log.moment[:, j] for log in logs])
-    speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
-    found, spread = [], []
+    moment, speed = log.moment[:, j], np.abs(log.dq[:, j])
+    constants, spread = [], []
     for shape in SHAPES:
-        friction = np.concatenate([log.columns.joint(j, shape) for log in logs])
-        A = np.column_stack([moment, friction])
+        A = np.column_stack([moment, log.columns(j, shape)])
         for low in SPEEDS:
             used = (speed >= low).astype(float)
             if np.count_nonzero(used) < 50 or np.ptp(moment[used > 0]) == 0.0:
                 continue
-            fit = fit_column(A, current, used)
+            fit = fit_column(A, log.current[:, j], used)
             if fit.values[0] > 0:
-                found.append(1.0 / float(fit.values[0]))
+                constants.append(1.0 / float(fit.values[0]))
                 spread.append(float(fit.sd[0] / fit.values[0] ** 2))
-    if len(found) < len(SPEEDS):
+    if len(constants) < len(SPEEDS):
         return UNKNOWN
-    value = float(np.median(found))
-    sd = float(np.hypot(np.median(spread), 0.5 * np.ptp(found)))
+    value = float(np.median(constants))
+    sd = float(np.hypot(np.median(spread), 0.5 * np.ptp(constants)))
     return Estimate(value, sd, sd <= CONSTANT_KNOWN * value)
 
 
-def rotor_inertia(j: int, logs: Sequence[Targets]) -> tuple[Estimate, Estimate]:
+def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
     """J from what the moment has beyond the rigid body, and the gravity the controller uses.
 
     y = J q̈ + s g + c + δ·dy/dt: the scale s tells 9.82 from 9.81 m/s², δ a shift in time.
     """
-    stacked = [
-        np.column_stack(
-            [
-                log.motion.ddq[:, j],
-                log.gravity[:, j],
-                np.ones(log.motion.samples),
-                log.lead[:, j],
-                log.moment[:, j] - log.rigid[:, j],
-            ]
-        )
-        for log in logs
-    ]
-    rows = np.concatenate(stacked)
-    if np.std(rows[:, 0]) < 1e-2:
+    ddq, gravity, lead, y = (
+        signal[:, j] for signal in (log.ddq, log.gravity, log.lead, log.moment - log.rigid)
+    )
+    A = np.column_stack([ddq, gravity, np.ones(len(y)), lead])
+    if np.std(ddq) < 1e-2:
         return UNKNOWN, UNKNOWN
-    used = np.ones(len(rows))
-    fit = fit_column(rows[:, :-1], rows[:, -1], used)
     # Half of what robustness changes is added to the spread: an account of the model's error.
-    plain = solve(rows[:, :-1], rows[:, -1])
+    fit, plain = fit_column(A, y, np.ones(len(y))), solve(A, y)
     value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
     rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
-    # A joint whose gravity hardly changes tells the constant and the scale only together.
+    # A joint with gravity that hardly changes tells the constant and the scale only together.
     scale = 1.0 + float(plain[1])
     scale_sd = float(np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1])))
     return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
 
 
 def controller_friction(
-    j: int, logs: Sequence[Targets], constant: float
+    j: int, log: ControllerTargets, constant: float
 ) -> tuple[Shape, Array, Array] | None:
     """The shape that K·target_current − target_moment fits best, its coefficients and their sd.
 
-    The controller's own law is a bent line, whose points are read where the motion spans them;
-    elsewhere a logarithm stands for it. None where the joint does not move.
+    The controller's own law is a bent line; its points are read where the motion spans them,
+    elsewhere a logarithm replaces it. None where the joint does not move.
     """
-    speed = np.abs(np.concatenate([log.motion.dq[:, j] for log in logs]))
+    speed = np.abs(log.dq[:, j])
     fast = float(np.quantile(speed, 0.9))
     if fast < SLIDES:
         return None
-    y = np.concatenate([constant * log.current[:, j] - log.moment[:, j] for log in logs])
-    load = np.concatenate([log.columns.load[log.motion.kept, j] for log in logs])
+    y = constant * log.current[:, j] - log.moment[:, j]
+    load = np.concatenate([source.load[source.motion.kept, j] for source in log.sources])
     line = bent(float(speed.max()))
     shapes = WRITTEN if line is None else (line,)
     if np.std(load) >= LIGHT:
         shapes = (*shapes, *(s._replace(terms=(*s.terms, "load_coulomb")) for s in shapes))
     fits = {}
     for shape in shapes:
-        A = np.concatenate([log.columns.joint(j, shape) for log in logs])
-        fit = fit_column(A, y, np.ones(len(y)))
+        fit = fit_column(log.columns(j, shape), y, np.ones(len(y)))
         if is_dissipative(shape, fit.values, fast):
             fits[shape] = fit
 
@@ -254,23 +314,22 @@ def controller_friction(
     return None if best is None else (best, fits[best].values, fits[best].sd)
 
 
-def refuse_guided(log: Targets, robot: Robot) -> None:
-    """Raise an IdentificationError if a hand led the arm: the controller then uses less friction.
+def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
+    """Raise if a hand led the arm: the controller then uses less friction.
 
     Where the log has target velocities, they are zero while the arm moves; elsewhere the friction
     fed forward is a fraction of the law, .1 to 1.1 of it as the joint may be: one joint far below
     the law tells.
     """
-    recording, dq = log.recording, log.recording.require("dq")
-    moves = faster(dq, SLIDES)
+    moves = faster(recording.require("dq"), SLIDES)
     guided = False
     if recording.target_dq is not None:
         asked = np.any(recording.target_dq != 0.0, axis=1)
         guided = bool(np.mean(asked[moves.any(axis=1)]) < UNASKED) if moves.any() else False
     elif robot.torque_constant is not None and robot.friction:
-        law = friction_torque(robot.friction, log.motion.dq)
+        law = friction_torque(robot.friction, log.dq)
         fed = robot.torque_constant * log.current - log.moment
-        used = np.where(faster(log.motion.dq, SLIDES), law, 0.0)
+        used = np.where(faster(log.dq, SLIDES), law, 0.0)
         size = np.sum(used**2, axis=0)
         shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
         guided = bool(np.min(shares, initial=1.0) < GUIDED)

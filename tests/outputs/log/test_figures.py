@@ -5,7 +5,7 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.pooling import POOLED
+from vftcli.evaluation.errors import POOLED
 from vftcli.outputs.figures.paper import WIDTHS, paper_style
 from vftcli.outputs.log.figures import (
     LOG_FIGURES,

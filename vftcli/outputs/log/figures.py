@@ -128,7 +128,7 @@ def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
     None where no joint has an error, or where more than `MOST` logs have no rows that stand for
     all of them.
     """
-    from vftcli.evaluation.pooling import POOLED
+    from vftcli.evaluation.errors import POOLED
 
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:

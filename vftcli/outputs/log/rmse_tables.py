@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.joint_means import JointMeans, joint_means
+from vftcli.evaluation.errors import JointMeans, joint_means
 from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
 from vftcli.signals.arrays import Array, Mask
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from vftcli.evaluation.pooling import POOLED
+from vftcli.evaluation.errors import POOLED
 from vftcli.outputs.grid import (
     Column,
     Grid,

@@ -42,7 +42,7 @@ def render_batch(lines: Sequence[IndexLine], failures: "pl.DataFrame") -> str:
 
 def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[IndexLine]:
     """The line of every log."""
-    from vftcli.evaluation.joint_means import joint_means
+    from vftcli.evaluation.errors import joint_means
 
     if table.is_empty():
         return

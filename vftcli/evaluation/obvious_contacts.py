@@ -1,7 +1,7 @@
 """Touches: where a log shows contact by itself, so that nobody calls its motion free.
 
 The torque that the model leaves open is low-passed and compared with its own quiet level: friction
-that is missed spreads over a log, a contact stands out of it.
+that is missed spreads over a log, a contact sticks out of it.
 """
 
 from typing import NamedTuple
@@ -9,16 +9,15 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array
 from vftcli.signals.filters import low_pass
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.remarks import Remark, Where, warning
 
-#: Where the open torque is low-passed: a hand's push lasts longer, reversals do not. [Hz]
+#: Cutoff of the open torque's low-pass: a hand's push lasts longer, reversals do not. [Hz]
 CUTOFF = 2.0
-#: Multiple of a joint's median open torque from which it stands out.
+#: Multiple of a joint's median open torque from which it sticks out.
 #:
-#: Free UR10e logs reach more on joints whose friction is missed for a moment (13.8), but below
+#: Free UR10e logs reach more on joints with friction missed for a moment (13.8), but below
 #: their dry friction; logs of hands, and simulated pushes, reach 17–100.
 STANDING_OUT = 8.0
 #: Multiple of a joint's dry friction up to which friction may be what is open; free UR10e logs
@@ -55,21 +54,16 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
     level = np.abs(open_torque - np.median(open_torque, axis=0))
     quiet = np.median(level, axis=0)
     limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * run.dry_friction), LEAST)
-    return tuple(
-        touch_in(run.t, level, limit, quiet, start, stop)
-        for start, stop in runs_of(np.asarray((level > limit).any(axis=1)))
-    )
-
-
-def touch_in(
-    t: Array, level: Array, limit: Array, quiet: Array, start: int, stop: int
-) -> ShownContact:
-    """The contact of a run of samples, told by the joint that exceeds its limit most."""
-    excess = (level[start:stop] / limit).max(axis=0)
-    joint = int(np.argmax(excess))
-    torque = float(level[start:stop, joint].max())
-    begin, end = float(t[start]), float(t[stop - 1])
-    return ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
+    found = []
+    for start, stop in runs_of(np.asarray((level > limit).any(axis=1))):
+        excess = (level[start:stop] / limit).max(axis=0)
+        joint = int(np.argmax(excess))
+        torque = float(level[start:stop, joint].max())
+        begin, end = float(run.t[start]), float(run.t[stop - 1])
+        found.append(
+            ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
+        )
+    return tuple(found)
 
 
 def touched_remarks(run: Run) -> tuple[Remark, ...]:
@@ -82,7 +76,7 @@ def touched_remarks(run: Run) -> tuple[Remark, ...]:
     if not found:
         return ()
     worst = max(found, key=lambda touch: touch.torque / max(touch.quiet, LEAST))
-    t = run.t
+    t = run.recording.t
     edges = [float(t[0]), *(x for touch in found for x in (touch.start, touch.stop)), float(t[-1])]
     spans = list(zip(edges[::2], edges[1::2], strict=True))
     begin, end = max(spans, key=lambda span: span[1] - span[0])
