@@ -13,8 +13,8 @@ from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
+from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
-from vftcli.simulation.mismatch import build_arm
 from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 

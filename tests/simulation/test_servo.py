@@ -62,7 +62,7 @@ def test_torque_and_positions_stay_inside_the_limits():
 @pytest.mark.parametrize(
     ("spec", "step", "words"),
     [
-        (ServoSpec(stiffness="hard"), 1e-3, "There is stiff, soft"),
+        (ServoSpec(stiffness="hard"), 1e-3, "there is stiff, soft"),
         (ServoSpec(stiffness=0.0), 1e-3, "must be positive"),
         (ServoSpec(damping=-0.1), 1e-3, "must be positive and damping not negative"),
         (ServoSpec(stiffness=401.0), 1e-3, "chatters at a step of 0.001 s; it can be at most 400"),

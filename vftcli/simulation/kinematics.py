@@ -7,7 +7,6 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.packages import needed
 
 ITERATIONS = 100
 #: A pose counts as reached when position and rotation error are below this. [m, rad]
@@ -28,7 +27,7 @@ class FlangePose(NamedTuple):
 
 def flange_pose(model: Any, q: Array) -> FlangePose:  # noqa: ANN401 - Pinocchio is untyped
     """Pose of the flange at joint positions `q` (n,) [rad]."""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     data = model.createData()
     pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
@@ -42,7 +41,7 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
     Gauss–Newton on the error twist log(T⁻¹ T_d) with damping that vanishes with the error, so that
     redundant arms move by the least joint motion.
     """
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     data, frame = model.createData(), model.getFrameId("flange")
     goal = pin.SE3(np.array(pose.rotation), np.array(pose.translation))

@@ -1,14 +1,23 @@
-"""What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy."""
+"""What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy.
+
+Its estimates of contact are what the vendors' are: the measured torque less the nominal model's,
+low-passed.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from vftcli.robots import Robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.pose import rpy_matrix
 from vftcli.simulation.arm import Arm, History, JointSignals
-from vftcli.simulation.scenario import SensingSpec
+from vftcli.simulation.motion import Reference
+from vftcli.simulation.scenario import ForceSensorSpec, SensingSpec
+from vftcli.simulation.servo import rigid_torque
 
 #: Logging rate by kind of drive measurement, for robots that state none. [Hz]
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
@@ -38,6 +47,16 @@ class Measured:
     temperature: Array  #: Joint temperatures. (M, n) [°C]
     #: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
     rows: tuple[int, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Vendor:
+    """The controller's own quantities at each sample."""
+
+    target_torque: Array  #: Nominal rigid-body torque of the reference. (M, n) [N·m]
+    #: That and the nominal friction as current, None without drive constants. (M, n) [A]
+    target_current: Array | None
+    tau_ext: Array  #: Its estimate of the external torque ON the robot. (M, n) [N·m]
 
 
 def check_sensing(spec: SensingSpec) -> None:
@@ -175,3 +194,89 @@ def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tupl
     source = np.arange(count)
     source[again & inner] -= 1
     return tuple(int(k) for k in source[~(lost & inner)])
+
+
+def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
+    """Evaluate the controller's nominal model along a run.
+
+    Its friction knows load and temperature, as the controllers' of Universal Robots do, and no
+    presliding.
+    """
+    nominal: Robot = arm.true.nominal
+    target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
+    still, warm = np.zeros_like(samples.target_q), measured.temperature
+    load = momentum_terms(nominal.loaded_chain, samples.target_q, still).gravity
+    target_torque = rigid_torque(nominal.model, target)
+    target_current = None
+    if nominal.torque_constant is not None:
+        rubs = friction_torque(nominal.friction, samples.target_dq, load, temperature=warm)
+        target_current = (target_torque + rubs) / nominal.torque_constant
+    motion = Reference(measured.q, measured.dq, samples.target_ddq)
+    model_torque = rigid_torque(nominal.model, motion)
+    model_torque += friction_torque(nominal.friction, measured.dq, load, temperature=warm)
+    spec = arm.scenario.sensing
+    step = 1.0 / log_rate(spec, arm.robot)
+    residual = first_order_low_pass(measured.torque - model_torque, spec.vendor_cutoff, step)
+    return Vendor(target_torque=target_torque, target_current=target_current, tau_ext=-residual)
+
+
+def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
+    """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
+    # Exact discretisation of the first-order filter for an input held over the step.
+    share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
+    out = np.empty_like(signal)
+    state = signal[0].copy()
+    for k, row in enumerate(signal):
+        state = state + share * (row - state)
+        out[k] = state
+    return out
+
+
+def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
+    """Wrench in sensor axes about the sensor's origin, as force ON the robot. (M, 6) [N, N·m]
+
+    It feels every contact on the flange, and weight and inertia of what is mounted beyond it; then
+    zero offset, drift and noise are added. None without a sensor.
+    """
+    spec = arm.scenario.force_sensor
+    if spec is None:
+        return None
+    # Its own generator: mounting a sensor leaves the noise of all other signals as it was.
+    rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
+    clean = np.zeros((len(samples.time), 6))
+    turn = rpy_matrix(spec.rpy)
+    rotations, specific = tool_motion(arm, samples, spec, turn)
+    for k, R in enumerate(rotations):
+        force = R.T @ wrench[k, :3]
+        lever = turn.T @ np.array(spec.position)
+        moment = R.T @ wrench[k, 3:] - np.cross(lever, force)
+        weight = spec.tool_mass * (R.T @ specific[k])
+        clean[k, :3] = force + weight
+        clean[k, 3:] = moment + np.cross(spec.tool_com, weight)
+    noise = np.repeat([spec.noise_force, spec.noise_torque], 3)
+    drift = np.repeat([spec.drift_force, spec.drift_torque], 3)
+    reading: Array = clean + np.array(spec.bias) + np.outer(samples.time, drift)
+    return reading + noise * rng.standard_normal(clean.shape)
+
+
+def tool_motion(
+    arm: Arm, samples: Samples, spec: ForceSensorSpec, turn: Array
+) -> tuple[Array, Array]:
+    """Orientation of the sensor in the base (M, 3, 3), and g − a of the tool's centre. (M, 3)"""
+    import pinocchio as pin
+
+    model, data = arm.plant.model, arm.plant.model.createData()
+    frame = model.getFrameId("flange")
+    rotations = np.empty((len(samples.time), 3, 3))
+    specific = np.empty((len(samples.time), 3))
+    for k, (q, v, a) in enumerate(zip(samples.q, samples.v, samples.a, strict=True)):
+        pin.forwardKinematics(model, data, q, v, a)
+        pose = pin.updateFramePlacement(model, data, frame)
+        axes = pin.LOCAL_WORLD_ALIGNED
+        moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
+        spin = pin.getFrameVelocity(model, data, frame, axes).angular
+        rotations[k] = pose.rotation @ turn
+        lever = pose.rotation @ np.array(spec.position) + rotations[k] @ np.array(spec.tool_com)
+        swing = np.cross(moving.angular, lever) + np.cross(spin, np.cross(spin, lever))
+        specific[k] = model.gravity.linear - (moving.linear + swing)
+    return rotations, specific

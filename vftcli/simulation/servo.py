@@ -8,10 +8,9 @@ from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.packages import needed
+from vftcli.signals.parsing import check_known
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
-from vftcli.simulation.schema import unknown_name
 
 #: Natural frequency of the position loop by name. [rad/s]
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
@@ -31,14 +30,13 @@ class Servo:
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
-        pin = needed("pinocchio", "a simulation")
+        import pinocchio as pin
 
         self.inertia = pin.crba
-        if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
-            raise ParameterError(
-                unknown_name(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
-            )
-        omega = STIFFNESS[spec.stiffness] if isinstance(spec.stiffness, str) else spec.stiffness
+        omega = spec.stiffness
+        if isinstance(omega, str):
+            check_known(omega, STIFFNESS, f"no servo.stiffness {omega!r}")
+            omega = STIFFNESS[omega]
         if omega <= 0 or spec.damping < 0:
             raise ParameterError("servo.stiffness must be positive and damping not negative")
         if omega * step > FASTEST_LOOP:
@@ -75,7 +73,7 @@ class Servo:
 
 def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
     """Inverse dynamics of a Pinocchio model along a motion. (T, n) [N·m]"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     data, out = model.createData(), np.empty_like(reference.q)
     for k, (q, dq, ddq) in enumerate(zip(*reference, strict=True)):

@@ -8,10 +8,17 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.packages import needed
 from vftcli.signals.pose import cross
-from vftcli.simulation.pushes import LoadSpec, Place, ProfileSpec, PushesSpec, Touch
-from vftcli.simulation.springs import HandSpec, StopSpec
+from vftcli.simulation.contacts import (
+    Hand,
+    HandSpec,
+    LoadSpec,
+    Place,
+    ProfileSpec,
+    PushesSpec,
+    Segments,
+    StopSpec,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +42,7 @@ class Mounted(NamedTuple):
     """A contact and the body it acts on."""
 
     name: str  #: The contact's name.
-    contact: Touch  #: What it exerts.
+    contact: Segments | Hand | StopSpec  #: What it exerts.
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
@@ -56,8 +63,7 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
         raise ParameterError(
             f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
         )
-    contact: Touch = spec.start(rng, duration)
-    lever = np.array(spec.point)
+    contact, lever = spec.start(rng, duration), np.array(spec.point)
     if spec.link == 0:
         point = chain.flange_rotation @ lever + chain.flange_translation
         return Mounted(spec.name, contact, chain.joints, chain.flange_rotation, point, True, lever)
@@ -123,30 +129,21 @@ class Touching:
         for walk in self.walks:
             tau += walk.torque[min(int(t / self.step), len(walk.torque) - 1)]
         for k, mounted in enumerate(self.mounted):
-            if mounted.contact.active(t):
-                J = joint_jacobian(model, data, mounted.joint)
-                tau += self.push(k, mounted, t, J, data.oMi[mounted.joint], v)
-            else:
-                self.wrenches[k] = 0.0
-        return tau
-
-    def push(self, k: int, mounted: Mounted, t: float, J: Array, pose: Any, v: Array) -> Array:  # noqa: ANN401
-        """Joint torque of one contact, its wrench kept. (n,) [N·m]"""
-        R, origin = pose.rotation, pose.translation
-        arm = R @ mounted.point
-        twist = J @ v
-        velocity = twist[:3] + cross(twist[3:], arm)
-        place = Place(R @ mounted.turn, origin + arm, velocity, twist[3:])
-        wrench = mounted.contact.wrench(t, place)
-        self.wrenches[k] = wrench
-        moment = wrench[3:] + cross(arm, wrench[:3])
-        tau: Array = J[:3].T @ wrench[:3] + J[3:].T @ moment
+            self.wrenches[k] = 0.0
+            if not mounted.contact.active(t):
+                continue
+            J, pose = joint_jacobian(model, data, mounted.joint), data.oMi[mounted.joint]
+            R, arm, twist = pose.rotation, pose.rotation @ mounted.point, J @ v
+            velocity = twist[:3] + cross(twist[3:], arm)
+            place = Place(R @ mounted.turn, pose.translation + arm, velocity, twist[3:])
+            self.wrenches[k] = wrench = mounted.contact.wrench(t, place)
+            tau += J[:3].T @ wrench[:3] + J[3:].T @ (wrench[3:] + cross(arm, wrench[:3]))
         return tau
 
 
 def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
     """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     J: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
     return J

@@ -5,9 +5,9 @@ from pathlib import Path
 
 from vftcli.robots import Robot
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import unknown_name
 from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
@@ -31,8 +31,7 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
         ParameterError: If there is no such format, or the arm cannot log in it.
     """
     name = wanted or scenario.format or vendor_format(robot)
-    if name not in WRITERS:
-        raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
+    check_known(name, WRITERS, f"no log format {name!r}")
     if name in {"rtde", "ur-rtde"} and not is_ur(robot):
         raise ParameterError(
             f"robot {robot.name!r} has no motor currents or not six joints and cannot log in a UR "

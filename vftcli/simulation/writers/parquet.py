@@ -7,8 +7,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
-from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.truth import AXES, Truth
+from vftcli.simulation.experiment import AXES, Simulation, Truth
 from vftcli.simulation.writers.signals import joint_signals
 
 TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
