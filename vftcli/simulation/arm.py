@@ -60,22 +60,7 @@ class History(JointSignals):
     State and reference are those at the start of a step, all else holds over it.
     """
 
-    step: float  #: Inner step. [s]
     wrenches: Array  #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
-    walk: Array  #: Joint torque of the random walks. (N, n) [N·m]
-
-    @classmethod
-    def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":
-        """Return room for `steps` steps, and one more for the state after the last."""
-        rows = steps + 1
-        arrays = {field.name: np.zeros((rows, joints)) for field in fields(JointSignals)}
-        walk, wrenches = np.zeros((rows, joints)), np.zeros((rows, contacts, 6))
-        return cls(step=step, wrenches=wrenches, walk=walk, **arrays)
-
-    def until(self, rows: int) -> "History":
-        """The first rows alone."""
-        names = [field.name for field in fields(self) if field.name != "step"]
-        return replace(self, **{name: getattr(self, name)[:rows] for name in names})
 
 
 class Arm:
@@ -114,9 +99,9 @@ class Arm:
                 )
         self.scenario, self.seed = scenario, seed
         self.robot: Robot = load_robot(scenario.robot)
-        self.seeds: dict[str, Any] = dict(
-            zip(("arm", "contacts", "sensing"), np.random.SeedSequence(seed).spawn(3), strict=True)
-        )
+        names = "arm", "contacts", "sensing"
+        seeds = np.random.SeedSequence(seed).spawn(3)
+        self.seeds: dict[str, Any] = dict(zip(names, seeds, strict=True))
         rng = np.random.default_rng(self.seeds["arm"])
         self.true: TrueArm = build_arm(scenario, self.robot, rng)
         h = scenario.step
@@ -127,8 +112,10 @@ class Arm:
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
         )
-        contacts = len(self.touching.mounted)
-        self.history = History.room(h, self.steps, self.robot.joints, contacts)
+        # One row more is for the state after the last step.
+        room = {f.name: np.zeros((self.steps + 1, len(q))) for f in fields(JointSignals)}
+        wrenches = np.zeros((self.steps + 1, *self.touching.wrenches.shape))
+        self.history = History(wrenches=wrenches, **room)
 
     @property
     def t(self) -> float:
@@ -155,12 +142,12 @@ class Arm:
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
         """
-        q_d = self.servo.clip_to_limits(np.asarray(q_d, dtype=float))
-        nothing = np.zeros_like(q_d)
-        rows = [q_d, nothing if dq_d is None else dq_d, nothing if ddq_d is None else ddq_d]
-        reference = Reference(*(np.asarray(row, dtype=float)[None] for row in rows))
-        forward = self.servo.feed_forward(reference)[0]
-        self.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
+        rows = np.zeros((3, len(self.q)))
+        rows[0] = np.clip(q_d, self.servo.q_min, self.servo.q_max)
+        rows[1] = 0.0 if dq_d is None else dq_d
+        rows[2] = 0.0 if ddq_d is None else ddq_d
+        forward = self.servo.feed_forward(Reference(*rows[:, None]))[0]
+        self.step(rows[0], rows[1], rows[2], forward)
 
     def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
         """Make one inner step with a feed-forward torque `forward` (n,) [N·m] already known."""
@@ -172,7 +159,9 @@ class Arm:
         history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
         t = (k + 0.5) * plant.step
         if k % WARMING_STEPS == 0:
-            self.warm_up(t)
+            temperature = self.temperature(np.array([t]))
+            if (factor := friction_factor(self.robot.friction, temperature)) is not None:
+                plant.true_friction = self.true.friction.warmed(factor[0])
         # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
@@ -206,14 +195,7 @@ class Arm:
             begin[:] = spec.temperature_begin
         end = begin if spec.temperature_end is None else np.full_like(begin, spec.temperature_end)
         share = (t / (self.steps * self.scenario.step))[:, None]
-        found: Array = begin + (end - begin) * share
-        return found
-
-    def warm_up(self, t: float) -> None:
-        """Let the friction follow the joints' temperature."""
-        factor = friction_factor(self.robot.friction, self.temperature(np.array([t])))
-        if factor is not None:
-            self.plant.true_friction = self.true.friction.warmed(factor[0])
+        return np.asarray(begin + (end - begin) * share)
 
     def close(self) -> History:
         """The history so far, with the state after the last step as its closing row.
@@ -226,9 +208,8 @@ class Arm:
         for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
             array = getattr(history, name)
             array[k] = array[k - 1]
-        for walk in self.touching.walks:
-            history.walk[:k] += walk.torque[:k]
-        return history.until(k + 1)
+        every = [field.name for field in fields(History)]
+        return History(**{name: getattr(history, name)[: k + 1] for name in every})
 
     def mean_torque(self, interval: float) -> Array:
         """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""

@@ -27,7 +27,7 @@ from vftcli.simulation.sensing import (
     sample_run,
     vendor_view,
 )
-from vftcli.simulation.touch import Mounted, joint_jacobian
+from vftcli.simulation.touch import joint_jacobian
 from vftcli.simulation.trajectories import plan
 
 MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
@@ -48,22 +48,15 @@ class Truth:
     #: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
     contacts: dict[str, Array]
     walks: dict[str, Array]  #: Name → joint torque of each random walk. (M, n) [N·m]
-    q: Array  #: True positions, velocities, accelerations. (M, n)
-    dq: Array
-    ddq: Array
-    torque: Array  #: True drive torque in the log's sampling (average or instant). (M, n) [N·m]
-    friction: Array  #: True friction torque. (M, n) [N·m]
 
     def columns(self) -> dict[str, Array]:
         """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
         table = {"t": self.t}
         table |= {f"tau_ext/{j}": c for j, c in enumerate(self.tau_ext.T, start=1)}
         table |= {f"wrench/{a}": c for a, c in zip(AXES, self.wrench.T, strict=True)}
-        for name, values in self.contacts.items():
-            pairs = zip(AXES, values.T, strict=True)
-            table |= {f"contact/{name}/{axis}": column for axis, column in pairs}
-        for name, values in self.walks.items():
-            table |= {f"contact/{name}/{j}": c for j, c in enumerate(values.T, start=1)}
+        for name, values in (self.contacts | self.walks).items():
+            labels = AXES if name in self.contacts else range(1, values.shape[1] + 1)
+            table |= {f"contact/{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
         return table
 
 
@@ -88,14 +81,13 @@ class Simulation:
         written = np.array(self.measured.rows)
         rows = np.unique(written)
         seen = self.measured
-        t = seen.stamp[rows] - seen.stamp[rows[0]]
         duplicates = len(written) - len(rows)
         repeated = "repeats-dropped" if duplicates > 1 else "repeat-dropped"
         remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
         in_current = seen.current is not None
         current = self.vendor.target_current
         return Recording(
-            t=t,
+            t=seen.stamp[rows] - seen.stamp[rows[0]],
             q=seen.q[rows],
             dq=seen.dq[rows],
             current=seen.current[rows] if seen.current is not None else None,
@@ -210,48 +202,36 @@ def simulate_pair(
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
-    history, touching = arm.history.until(arm.made), arm.touching
-    middle = (np.arange(arm.made, dtype=float) + 0.5) * history.step
-    wrenches = interpolate(samples.time, middle, history.wrenches)
-    walk = interpolate(samples.time, middle, history.walk)
-    model = arm.plant.model
-    data = model.createData()
-    tau_ext, wrench = walk.copy(), np.zeros((len(samples.time), 6))
+    touching, made = arm.touching, arm.made
+    middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
+    wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
+    walk = np.zeros((made, arm.robot.joints))
+    for each in touching.walks:
+        walk += each.torque[:made]
+    data = arm.plant.model.createData()
+    tau_ext, wrench = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
     for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
-        tau, flange = torque_and_wrench(model, data, samples.q[k], touching.mounted, wrenches[k])
+        tau, flange = torque_and_wrench(arm, data, samples.q[k], wrenches[k])
         tau_ext[k] += tau
         wrench[k] = flange
     contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
-    walks = {
-        w.name: interpolate(samples.time, middle, w.torque[: arm.made]) for w in touching.walks
-    }
-    return Truth(
-        t=samples.stamp,
-        tau_ext=tau_ext,
-        wrench=wrench,
-        contacts=contacts,
-        walks=walks,
-        q=samples.q,
-        dq=samples.v,
-        ddq=samples.a,
-        torque=samples.tau,
-        friction=samples.friction,
-    )
+    walks = {w.name: interpolate(samples.time, middle, w.torque[:made]) for w in touching.walks}
+    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=wrench, contacts=contacts, walks=walks)
 
 
 def torque_and_wrench(
-    model: Any,  # noqa: ANN401 - Pinocchio is untyped
-    data: Any,  # noqa: ANN401
+    arm: Arm,
+    data: Any,  # noqa: ANN401 - Pinocchio is untyped
     q: Array,
-    mounted: list[Mounted],
     wrenches: Array,
 ) -> tuple[Array, Array]:
     """Joint torque of all contacts (n,) [N·m] and the wrench of those on the flange (6,)."""
     import pinocchio as pin
 
+    model, chain = arm.plant.model, arm.true.chain
     pin.computeJointJacobians(model, data, q)
     tau, flange = np.zeros(len(q)), np.zeros(6)
-    for contact, wrench in zip(mounted, wrenches, strict=True):
+    for contact, wrench in zip(arm.touching.mounted, wrenches, strict=True):
         R = data.oMi[contact.joint].rotation
         if contact.on_flange:
             flange += at_other_point(wrench, R @ contact.turn @ contact.lever)
@@ -259,9 +239,7 @@ def torque_and_wrench(
             J = joint_jacobian(model, data, contact.joint)
             tau += J.T @ at_other_point(wrench, R @ contact.point)
     last = len(q)
-    offset = (
-        data.oMi[last].rotation @ model.frames[model.getFrameId("flange")].placement.translation
-    )
+    offset = data.oMi[last].rotation @ chain.flange_translation
     return tau + joint_jacobian(model, data, last).T @ at_other_point(flange, offset), flange
 
 

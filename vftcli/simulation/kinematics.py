@@ -1,6 +1,6 @@
 """Flange poses and the joint angles that reach them."""
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,25 +18,17 @@ HOMES: dict[int, tuple[float, ...]] = {
 }
 
 
-class FlangePose(NamedTuple):
-    """Orientation (3, 3) and origin (3,) [m] of the flange in the base frame."""
-
-    rotation: Array
-    translation: Array
-
-
-def flange_pose(model: Any, q: Array) -> FlangePose:  # noqa: ANN401 - Pinocchio is untyped
-    """Pose of the flange at joint positions `q` (n,) [rad]."""
+def flange_pose(model: Any, q: Array) -> Any:  # noqa: ANN401 - Pinocchio is untyped
+    """Pose of the flange in the base frame at joint positions `q` (n,) [rad], an SE3 [m]."""
     import pinocchio as pin
 
     data = model.createData()
     pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
-    pose = data.oMf[model.getFrameId("flange")]
-    return FlangePose(np.array(pose.rotation), np.array(pose.translation))
+    return data.oMf[model.getFrameId("flange")].copy()
 
 
-def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: ANN401
-    """Joint positions that bring the flange to `pose`, from a nearby guess, or None. (n,) [rad]
+def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
+    """Joint positions that bring the flange to a pose, from a nearby guess, or None. (n,) [rad]
 
     Gauss–Newton on the error twist log(T⁻¹ T_d) with damping that vanishes with the error, so that
     redundant arms move by the least joint motion.
@@ -44,7 +36,6 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
     import pinocchio as pin
 
     data, frame = model.createData(), model.getFrameId("flange")
-    goal = pin.SE3(np.array(pose.rotation), np.array(pose.translation))
     q = np.array(guess, dtype=float)
     for _ in range(ITERATIONS):
         pin.framesForwardKinematics(model, data, q)
@@ -59,17 +50,19 @@ def reach(model: Any, pose: FlangePose, guess: Array) -> Array | None:  # noqa: 
     return None
 
 
-def follow(robot: Robot, poses: list[FlangePose], start: Array, what: str) -> Array:
-    """Joint positions along a path of flange poses, each from the one before. (K, n) [rad]"""
+def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str) -> Array:
+    """Joint positions along flange points (K, 3) [m], each from the one before. (K, n) [rad]"""
+    import pinocchio as pin
+
     q, path = np.array(start, dtype=float), []
-    for k, pose in enumerate(poses):
-        found = reach(robot.model, pose, q)
+    for k, point in enumerate(points):
+        found = reach(robot.model, pin.SE3(rotation, point), q)
         # A jump of a radian is another branch of the inverse kinematics, not the path's next pose.
         if found is None or np.max(np.abs(found - q)) > 1.0:
-            x, y, z = pose.translation
+            x, y, z = point
             raise ParameterError(
                 f"{what}: the flange of {robot.name!r} cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m "
-                f"(point {k + 1} of {len(poses)}); choose a smaller motion or another start"
+                f"(point {k + 1} of {len(points)}); choose a smaller motion or another start"
             )
         q = found
         path.append(q)

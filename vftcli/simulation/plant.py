@@ -30,9 +30,9 @@ class Plant:
 
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
-    where λ is the impulse of dry friction (`slide_or_stick`) and D the slope of the smooth friction. It
-    is of second order in h while no joint changes between sticking and sliding. Presliding
-    friction, a spring that yields, is taken at q_m like gravity.
+    where λ is the impulse of dry friction and D the slope of the smooth friction. It is of second
+    order in h while no joint changes between sticking and sliding. Presliding friction, a spring
+    that yields, is evaluated at q_m like gravity.
 
     Attributes:
         q, v: Positions and velocities now. (n,) [rad, rad/s]

@@ -27,6 +27,7 @@ class Servo:
     Attributes:
         omega: Natural frequency ω of the loop. [rad/s]
         limit: Torque limits; infinite where unknown. (n,) [N·m]
+        q_min, q_max: Joint limits, likewise. (n,) [rad]
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
@@ -47,14 +48,9 @@ class Servo:
         self.spec, self.robot = spec, robot
         self.model, self.data = robot.model, robot.model.createData()
         self.omega, self.rate = omega, 2.0 * spec.damping * omega
-        known = np.isfinite(robot.limits.tau_max) & spec.torque_limits
-        self.limit = np.where(known, robot.limits.tau_max, np.inf)
-        self.q_min = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min, -np.inf)
-        self.q_max = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max, np.inf)
-
-    def clip_to_limits(self, q_d: Array) -> Array:
-        """A commanded position brought inside the joint limits. (n,) [rad]"""
-        return np.clip(q_d, self.q_min, self.q_max)
+        limits = robot.limits
+        self.limit = np.fmin(limits.tau_max if spec.torque_limits else np.inf, np.inf)
+        self.q_min, self.q_max = np.fmax(limits.q_min, -np.inf), np.fmin(limits.q_max, np.inf)
 
     def feed_forward(self, reference: Reference) -> Array:
         """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""

@@ -1,6 +1,7 @@
 """The kinds of ``[trajectory]`` a scenario can have, each turned into a motion of the joints."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import ClassVar
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.kinematics import FlangePose, check_limits, check_start, flange_pose, follow
+from vftcli.simulation.kinematics import check_limits, check_start, flange_pose, follow
 from vftcli.simulation.motion import Command, Periodic, Reference, Stretches, straight_paths
 
 #: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
@@ -39,19 +40,13 @@ class CircleSpec:
         toward = np.array([np.cos(self.towards), np.sin(self.towards), 0.0])
         centre = home.translation + self.radius * toward
         ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
-        poses = [FlangePose(home.rotation, centre + offset) for offset in ring]
-        q = follow(robot, [*poses, poses[0]], start, "the circle")
+        q = follow(robot, home.rotation, centre + ring[[*range(count), 0]], start, "the circle")
         closure = np.outer(np.arange(count) / count, q[-1] - q[0])
         if np.max(np.abs(closure)) > 1.0:
             raise ParameterError("the circle winds a joint up; choose another start or radius")
-        series = np.fft.rfft(q[:-1], axis=0) / count
-        return Periodic(
-            period=self.period,
-            cycles=self.cycles,
-            mean=series[0].real,
-            cosine=2.0 * series[1 : HARMONICS + 1].real,
-            sine=-2.0 * series[1 : HARMONICS + 1].imag,
-        )
+        mean, *series = np.fft.rfft(q[:-1], axis=0)[: HARMONICS + 1] / count
+        cosine, sine = 2.0 * np.real(series), -2.0 * np.imag(series)
+        return Periodic(self.period, self.cycles, mean.real, cosine, sine)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,12 +59,8 @@ class HoldSpec:
 
     def motion(self, robot: Robot) -> Command:
         """A motion that stays at the pose, the usual one if none is given."""
-        start = check_start(robot, self.start)
-        return Stretches(
-            times=np.array([[0.0, 1.0]]),
-            paths=straight_paths([start, start]),
-            duration=self.length,
-        )
+        points = [check_start(robot, self.start)] * 2
+        return Stretches(np.array([[0.0, 1.0]]), straight_paths(points), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,19 +80,18 @@ class OffsetsSpec:
 
         q = check_start(robot, self.start)
         home = flange_pose(robot.model, q)
-        check_times([m[:2] for m in self.moves], self.length)
+        times = np.array([m[:2] for m in self.moves])
+        check_times(times, self.length)
         before, paths = np.zeros(3), list[Array]()
         nodes = np.linspace(-1.0, 1.0, 33)
         for move in self.moves:
             after = np.array(move[2:])
             share = 0.5 * (nodes[:, None] + 1.0)
             points = home.translation + before + share * (after - before)
-            line = follow(robot, [FlangePose(home.rotation, p) for p in points], q, "a move")
+            line = follow(robot, home.rotation, points, q, "a move")
             paths.append(np.asarray(chebyshev.chebfit(nodes, line, 16), dtype=float))
             q, before = line[-1], after
-        return Stretches(
-            times=np.array([m[:2] for m in self.moves]), paths=tuple(paths), duration=self.length
-        )
+        return Stretches(times, tuple(paths), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +112,10 @@ class JointMovesSpec:
             raise ParameterError(
                 f"trajectory.moves must have rows of two times and {robot.joints} displacements"
             )
-        check_times([(row[0], row[1]) for row in self.moves], self.length)
+        times = np.array([row[:2] for row in self.moves])
+        check_times(times, self.length)
         points = [start, *(start + np.array(row[2:]) for row in self.moves)]
-        return Stretches(
-            times=np.array([row[:2] for row in self.moves]),
-            paths=straight_paths(points),
-            duration=self.length,
-        )
+        return Stretches(times, straight_paths(points), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,17 +136,14 @@ class PosesSpec:
             )
         points = self.draw_poses(robot)
         starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
-        return Stretches(
-            times=np.column_stack([starts, starts + self.move]),
-            paths=straight_paths(points),
-            duration=float(starts[-1] + self.move + self.dwell),
-        )
+        times = np.column_stack([starts, starts + self.move])
+        return Stretches(times, straight_paths(points), float(times[-1, 1] + self.dwell))
 
     def draw_poses(self, robot: Robot) -> list[Array]:
         """Poses about the usual one, inside the limits and with the flange above the table."""
         rng, home = np.random.default_rng(1), check_start(robot, ())
-        low = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min + 0.05, -np.pi)
-        high = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max - 0.05, np.pi)
+        low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
+        high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
         points: list[Array] = []
         for _ in range(100 * self.count):
             pose = np.clip(home + rng.uniform(-self.spread, self.spread, robot.joints), low, high)
@@ -190,14 +174,13 @@ class JointwiseSpec:
         t, times, paths = self.rest, [], []
         for axis in self.amplitude * np.eye(robot.joints):
             for speed in self.speeds:
-                legs = [(0 * axis, axis), (axis, -axis), (-axis, 0 * axis)]
-                for a, b in legs:
+                for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
                     length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
                     times.append((t, t + length))
                     paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
                     t += length
                 t += self.rest
-        return Stretches(times=np.array(times), paths=tuple(paths), duration=t)
+        return Stretches(np.array(times), tuple(paths), t)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -220,13 +203,8 @@ class ExcitationSpec:
                 f"numbers, one a joint of {robot.name!r}, cosine and sine as many rows, and "
                 "trajectory.period must be positive"
             )
-        return Periodic(
-            period=self.period,
-            cycles=self.cycles,
-            mean=np.array(self.mean),
-            cosine=np.array(self.cosine),
-            sine=np.array(self.sine),
-        )
+        series = (np.array(part) for part in (self.mean, self.cosine, self.sine))
+        return Periodic(self.period, self.cycles, *series)
 
 
 TrajectorySpec = (
@@ -240,9 +218,9 @@ TrajectorySpec = (
 )
 
 
-def check_times(times: list[tuple[float, float]], length: float) -> None:
-    """Raise unless moves follow one another inside the motion's length."""
-    flat = np.array(times, dtype=float).ravel()
+def check_times(times: Array, length: float) -> None:
+    """Raise unless moves (K, 2) [s] follow one another inside the motion's length."""
+    flat = times.ravel()
     good = len(flat) > 0 and flat[0] >= 0 and flat[-1] <= length
     if not good or np.any(np.diff(flat) < 0) or np.any(np.diff(flat)[::2] <= 0):
         raise ParameterError(

@@ -8,6 +8,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
@@ -47,8 +48,7 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
 
 def is_ur(robot: Robot) -> bool:
     """Whether an arm measures motor currents and has six joints."""
-    in_current = robot.torque_source == "current" and robot.torque_constant is not None
-    return in_current and robot.joints == UR_JOINTS
+    return drive_constants(robot) is not None and robot.joints == UR_JOINTS
 
 
 def vendor_format(robot: Robot) -> str:
