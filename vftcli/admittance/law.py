@@ -6,13 +6,13 @@ on speed and B = B_d.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vftcli.admittance.parameters import Admittance
 from vftcli.signals.arrays import Array, check_shape, seal
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 
 KINDS = ("traditional", "variable")
 
@@ -43,10 +43,8 @@ class Controller:
     @property
     def xi(self) -> Array:
         """Damping ratio ξ of the recovery phase. (6,)"""
-        own: Array = self.damping / (
-            2.0 * np.sqrt(self.parameters.mass * self.parameters.stiffness)
-        )
-        return own
+        p = self.parameters
+        return np.asarray(self.damping / (2.0 * np.sqrt(p.mass * p.stiffness)))
 
 
 def traditional(parameters: Admittance) -> Controller:
@@ -66,7 +64,8 @@ def variable(parameters: Admittance) -> Controller:
         kind="variable",
         alpha=parameters.alpha,
         rate=1.0 / np.asarray(parameters.speed_scale),
-        damping=parameters.recovery_damping,
+        # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
+        damping=2.0 * parameters.damping_ratio * np.sqrt(parameters.mass * parameters.stiffness),
         parameters=parameters,
     )
 
@@ -79,15 +78,15 @@ def controllers(
     wanted = kinds or KINDS
     found = [traditional(parameters)] if "traditional" in wanted else []
     if "variable" in wanted:
-        variants = [parameters.with_alpha(a) for a in dict.fromkeys(alphas)] or [parameters]
-        found += [variable(variant) for variant in variants]
+        each = [replace(parameters, alpha=np.full(6, a)) for a in dict.fromkeys(alphas)]
+        found += map(variable, each or [parameters])
     return tuple(found)
 
 
 def check_kinds(kinds: Sequence[str]) -> None:
     """Raise a ParameterError that lists the kinds if one is not in `KINDS`."""
-    if unknown := [kind for kind in kinds if kind not in KINDS]:
-        raise ParameterError(f"no controller {unknown[0]!r}; there is {', '.join(KINDS)}")
+    for kind in kinds:
+        check_known(kind, KINDS, f"no controller {kind!r}")
 
 
 def kinetic_shape(u: Array) -> Array:
@@ -115,16 +114,12 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     moving = np.where(controller.rate > 0.0, controller.rate, 1.0)
     varied = kinetic_shape(np.abs(v) * moving) / moving**2
     kinetic = p.mass * np.where(controller.rate > 0.0, varied, 0.5 * v**2) / controller.alpha**2
-    total: Array = potential + kinetic
-    return total
+    return np.asarray(potential + kinetic)
 
 
 def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
     """V = ½M_dva v² + ½K_dva x² of (52), axis by axis: its proof drops Ṁ and K̇. (…, 6) [J]"""
     p = controller.parameters
     swell = np.exp(np.abs(v) * controller.rate)
-    V: Array = (
-        0.5 * p.mass / (controller.alpha * swell) * v**2
-        + 0.5 * controller.alpha * p.stiffness * swell * x**2
-    )
-    return V
+    kinetic = 0.5 * p.mass / (controller.alpha * swell) * v**2
+    return np.asarray(kinetic + 0.5 * controller.alpha * p.stiffness * swell * x**2)

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.motion import AxisMotion
+from vftcli.admittance.motion import AxisMotion, Phases
 from vftcli.admittance.parameters import AXES
-from vftcli.admittance.thresholds import Phases
 from vftcli.signals.arrays import Array
 from vftcli.signals.intervals import runs_of
 

@@ -8,7 +8,6 @@ from vftcli.observers.kalman import KalmanObserver
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array
-from vftcli.signals.packages import needed
 from vftcli.virtual_sensor.solvers import wrench_of
 
 
@@ -29,7 +28,7 @@ class OnlineKalman:
         self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
     ) -> None:
         """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
-        pin = needed("pinocchio", "a closed loop")
+        import pinocchio as pin
 
         n = robot.joints
         self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step

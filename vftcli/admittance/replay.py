@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, energy, printed_energy
 from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
-from vftcli.admittance.motion import AxisMotion, release, run
+from vftcli.admittance.motion import AxisMotion, Phases, phases, release, run
 from vftcli.admittance.parameters import Admittance
 from vftcli.admittance.replay_checks import (
     arm_moved,
@@ -20,7 +20,6 @@ from vftcli.admittance.replay_checks import (
     unknown_force,
 )
 from vftcli.admittance.stability import Verdict, check_stable
-from vftcli.admittance.thresholds import Phases, phases
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
@@ -166,18 +165,9 @@ def judge_motion(
     drags: Sequence[Drag],
     force: Array,
 ) -> Replay:
-    """Follow a motion with the joints, and tell its energies, its figures and what limits it met.
+    """Joints along a motion from a pose (n,) [rad], its energies, figures and limits.
 
-    Args:
-        solver: The arm's.
-        start: Joint positions of the target pose. (n,) [rad]
-        parameters: Shared parameters.
-        controllers: The controllers.
-        verdicts: Their stability.
-        motion: Their motion.
-        split: The phases of the force.
-        drags: Its drags.
-        force: Force on the robot, NaN where unknown. (T, 6) [N, N·m]
+    The force (T, 6) [N, N·m] is NaN where it is unknown.
     """
     path = follow(solver, start, motion.x, parameters.period)
     lyapunov = lyapunov_along(controllers, motion, split)

@@ -13,7 +13,7 @@ import numpy as np
 
 from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark, Where, warning
 
@@ -30,35 +30,36 @@ class UnstableError(ParameterError):
 class Verdict(NamedTuple):
     """Stability of one controller. Arrays are (6,)."""
 
-    controller: Controller  #: Whose.
+    controller: Controller  #: The controller.
     drag: Array  #: 2TsB/M + Ts²K/M of the drag phase.
     recovery: Array  #: The same in the recovery phase at the speed limit; infinite without one.
     #: Largest deviation from which a release at rest does not escape if there is no speed limit;
     #: infinite for the traditional controller. [m, rad]
     escape: Array
-    limited: Mask  #: Whether the axis has a speed limit.
 
-    def complaints(self, safe: Mask | None = None) -> tuple[Remark, ...]:
+    def complaints(self, size: Array | float = np.inf) -> tuple[Remark, ...]:
         """What makes it unstable, with the number that breaks.
 
         Args:
-            safe: Axes whose lack of a speed limit does not matter, None for none. (6,)
+            size: Deviations of a release from rest; an axis without a speed limit that starts
+                inside the escape bound is left out. (6,) [m, rad]
         """
-        where, risky = Where(self.controller.name), ~self.limited & np.isfinite(self.escape)
+        where = Where(self.controller.name)
+        limited = np.isfinite(self.controller.parameters.speed_limit)
         # Without a speed limit the number is infinite, and the escape says what that means.
-        at_limit = (self.recovery >= DISCRETE_BOUND) & self.limited
-        numbers = (
-            ("law-unstable-in-drag", self.drag >= DISCRETE_BOUND, self.drag),
-            ("law-unstable-at-limit", at_limit, self.recovery),
-        )
+        at_limit = (self.recovery >= DISCRETE_BOUND) & limited
         found = [
             warning(code, where, axis=AXES[k], number=float(number[k]))
-            for code, wrong, number in numbers
+            for code, wrong, number in (
+                ("law-unstable-in-drag", self.drag >= DISCRETE_BOUND, self.drag),
+                ("law-unstable-at-limit", at_limit, self.recovery),
+            )
             for k in np.flatnonzero(wrong)
         ]
+        risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
         found += [
             warning("law-escapes", where, axis=AXES[k], bound=float(self.escape[k]), unit=UNITS[k])
-            for k in np.flatnonzero(risky if safe is None else risky & ~safe)
+            for k in np.flatnonzero(risky)
         ]
         return tuple(found)
 
@@ -72,8 +73,7 @@ def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float
         stiffness: K. [N/m, N·m/rad]
         period: Ts. [s]
     """
-    number: Array = (2.0 * period * damping + period**2 * stiffness) / mass
-    return number
+    return np.asarray((2.0 * period * damping + period**2 * stiffness) / mass)
 
 
 def escape_factor(xi: float) -> float:
@@ -103,26 +103,19 @@ def escape_factor(xi: float) -> float:
     return float(z)
 
 
-def escape_bound(controller: Controller) -> Array:
-    """Deviation up to which a release at rest is safe with no speed limit at all. (6,) [m, rad]"""
+def judge(controller: Controller) -> Verdict:
+    """Everything that can be said of a controller before it runs."""
     p = controller.parameters
     factors = {xi: escape_factor(xi) for xi in set(controller.xi.tolist())}
     factor = np.array([factors[xi] for xi in controller.xi.tolist()])
     scale = np.sqrt(p.mass / p.stiffness) / controller.alpha
-    with np.errstate(divide="ignore"):
-        bound: Array = factor * scale / controller.rate
-    return bound
-
-
-def judge(controller: Controller) -> Verdict:
-    """Everything that can be said of a controller before it runs."""
-    p = controller.parameters
-    limit = np.asarray(p.speed_limit)
-    with np.errstate(over="ignore", invalid="ignore"):
-        swell = controller.alpha * np.exp(np.where(controller.rate > 0, limit * controller.rate, 0))
+    limit, rate = np.asarray(p.speed_limit), controller.rate
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        escape = factor * scale / rate
+        swell = controller.alpha * np.exp(np.where(rate > 0, limit * rate, 0))
     drag = discrete_number(p.mass, p.damping, p.stiffness, p.period)
     recovery = discrete_number(p.mass / swell, controller.damping, p.stiffness * swell, p.period)
-    return Verdict(controller, drag, recovery, escape_bound(controller), np.isfinite(limit))
+    return Verdict(controller, drag, recovery, escape)
 
 
 def check_stable(
@@ -140,10 +133,10 @@ def check_stable(
     Returns:
         A verdict for each, and what is wrong with them, also where that is let pass.
     """
-    verdicts = tuple(judge(controller) for controller in controllers)
+    verdicts = tuple(map(judge, controllers))
     # Under a hand any deviation can come about; only a release has a size.
-    size = np.full(6, np.inf) if release is None else np.abs(release)
-    grave = [r for verdict in verdicts for r in verdict.complaints(size <= verdict.escape)]
+    size = np.inf if release is None else np.abs(release)
+    grave = [remark for verdict in verdicts for remark in verdict.complaints(size)]
     if grave and not force_unstable:
         more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise UnstableError(
