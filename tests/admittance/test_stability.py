@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vftcli.admittance.law import controllers, traditional, variable
-from vftcli.admittance.motion import release
-from vftcli.admittance.parameters import Admittance, from_table
-from vftcli.admittance.stability import (
+from vftcli.admittance.law import (
     UnstableError,
     check_stable,
+    controllers,
     discrete_number,
     escape_factor,
     judge,
+    traditional,
+    variable,
 )
+from vftcli.admittance.motion import release
+from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.robots import PROFILES, load_robot
 
 

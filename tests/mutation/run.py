@@ -53,7 +53,7 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["tests/signals/test_least_squares.py", "tests/identification", "tests/robots"],
     ),
     "admittance": (
-        ["admittance/law.py", "admittance/stability.py", "admittance/metrics.py"],
+        ["admittance/law.py", "admittance/metrics.py"],
         ["tests/admittance"],
     ),
     "refinement": (

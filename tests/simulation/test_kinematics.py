@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.kinematics import (
+from vftcli.simulation.trajectories import (
     HOMES,
     check_limits,
     check_start,

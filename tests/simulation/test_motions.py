@@ -7,7 +7,6 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.kinematics import check_limits, flange_pose
 from vftcli.simulation.motion import Command
 from vftcli.simulation.trajectories import (
     CircleSpec,
@@ -16,6 +15,8 @@ from vftcli.simulation.trajectories import (
     JointwiseSpec,
     OffsetsSpec,
     PosesSpec,
+    check_limits,
+    flange_pose,
     plan,
 )
 

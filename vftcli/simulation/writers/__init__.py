@@ -9,9 +9,8 @@ from vftcli.signals.parsing import check_known
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
-from vftcli.simulation.writers.parquet import write_parquet
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
+from vftcli.simulation.writers.tables import LIBFRANKA, RTDE, UR_RTDE, write_parquet
 
 #: Name at ``--as`` → the function that writes it.
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
