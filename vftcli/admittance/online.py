@@ -42,20 +42,6 @@ class OnlineKalman:
         self.mu = np.zeros(n)
         self.tau = np.zeros(n)
 
-    def terms(self, q: Array, dq: Array) -> tuple[Array, Array]:
-        """P = M q̇ and Cᵀq̇ − g − F_f of the next sample. (n,) each [kg·m²/s, N·m]
-
-        The second is μ without the drives; presliding friction goes on from the sample before.
-        """
-        pin, model, data = self.pin, self.model, self.data
-        C = pin.computeCoriolisMatrix(model, data, q, dq)
-        p = pin.crba(model, data, q) @ dq
-        gravity = pin.computeGeneralizedGravity(model, data, q)
-        rest = C.T @ dq - gravity
-        if self.robot.friction:
-            rest = rest - self.friction.torque(q[None], dq[None], gravity[None])[0]
-        return p, rest
-
     def sample(self, q: Array, dq: Array, torque: Array) -> Array:
         """Take one sample and return the external torque. (n,) [N·m]
 
@@ -64,8 +50,15 @@ class OnlineKalman:
             dq: Measured velocities. (n,) [rad/s]
             torque: Measured drive torque. (n,) [N·m]
         """
-        p, rest = self.terms(q, dq)
-        mu = rest if self.averaged else rest + torque
+        pin, model, data = self.pin, self.model, self.data
+        C = pin.computeCoriolisMatrix(model, data, q, dq)
+        p = pin.crba(model, data, q) @ dq
+        gravity = pin.computeGeneralizedGravity(model, data, q)
+        mu = C.T @ dq - gravity
+        if self.robot.friction:  # presliding friction goes on from the sample before
+            mu = mu - self.friction.torque(q[None], dq[None], gravity[None])[0]
+        if not self.averaged:
+            mu = mu + torque
         if self.p is None:
             self.p, self.mu = p, mu
             return self.tau

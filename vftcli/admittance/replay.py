@@ -11,10 +11,12 @@ from vftcli.admittance.law import Controller, Verdict, check_stable, energy, pri
 from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
 from vftcli.admittance.motion import AxisMotion, Phases, phases, release, run
 from vftcli.admittance.parameters import AXES, Admittance
+from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import refuse_mostly_gap
+from vftcli.signals.pose import log_matrix
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
@@ -38,7 +40,7 @@ class Lyapunov:
     printed: Array  #: V of (52). [J]
     #: Steps in which W rises by more than `RISE` of its value at the phase's start, for each
     #: controller; the three axes of a rotation that recover together count together. (N,)
-    rises: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+    rises: Counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -219,9 +221,6 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
 
 def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
-    from vftcli.robots.kinematics import link_poses
-    from vftcli.signals.pose import log_matrix
-
     poses = link_poses(solver.robot.chain, q)
     rotation, translation = solver.pose(start)
     turned = log_matrix(poses.rotation[:, -1] @ rotation.T)

@@ -19,7 +19,6 @@ from vftcli.outputs.admittance.page import charts as replay_charts
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
 from vftcli.robots import load_robot
-from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.sensing import log_rate
@@ -84,30 +83,23 @@ def ungated(found: Replay) -> Replay:
     """A replay with a traditional controller that has no threshold: (45) under the whole force."""
     force, motion = np.nan_to_num(found.wrench), found.motion
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
-    x, v = (
-        np.concatenate([one, all_[:, 1:]], axis=1)
-        for one, all_ in ((alone.x, motion.x), (alone.v, motion.v))
-    )
+    x, v = motion.x.copy(), motion.v.copy()
+    x[:, :1], v[:, :1] = alone.x, alone.v
     motion = replace(motion, x=x, v=v)
     drags = drags_of(found.phases, found.parameters.period)
-    return replace(
-        found, motion=motion, rows=tuple(rows_of(found.controllers, motion, drags, force))
-    )
+    rows = rows_of(found.controllers, motion, drags, force)
+    return replace(found, motion=motion, rows=tuple(rows))
 
 
 def latency_values(held: Sequence[Latency]) -> dict[str, float | None]:
     """Times of each contact, None of one that found the arm moving."""
-    return {
-        f"{key}/{k}": value
-        for k, one in enumerate(held, start=1)
-        for key, value in (
-            ("detection", one.detection),
-            ("motion", one.motion if one.rested else None),
-            ("withdrawal", one.withdrawal),
-            ("reaction", one.reaction if one.rested else None),
-            ("stop", one.turn),
-        )
-    }
+    values: dict[str, float | None] = {}
+    for k, one in enumerate(held, start=1):
+        for key in ("detection", "motion", "withdrawal", "reaction"):
+            shown = one.rested or key in {"detection", "withdrawal"}
+            values[f"{key}/{k}"] = getattr(one, key) if shown else None
+        values[f"stop/{k}"] = one.turn
+    return values
 
 
 def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:
@@ -196,27 +188,21 @@ def released(
                 result.put(variant, {f"{key}/{name}": row[key]})
             result.put(variant, {f"overshoot/{name}": 100.0 * (row["overshoot"] or 0.0)})
         if xi is None:
-            for key in ("mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"):
-                put_axes(result, key, getattr(parameters, key))
-            put_axes(result, "xi", parameters.damping_ratio)
+            keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
+            table = {key: getattr(parameters, key) for key in keys}
+            for key, values in {**table, "xi": parameters.damping_ratio}.items():
+                each = zip(AXES, values.tolist(), strict=True)
+                result.put(variant, {f"{key}/{axis}": value for axis, value in each})
     return result
-
-
-def put_axes(result: RunResult, key: str, parameter: Sequence[float] | Array) -> None:
-    """Add a parameter of a robot's table, axis by axis."""
-    found = zip(AXES, parameter, strict=True)
-    result.put(CORRECTED, {f"{key}/{axis}": float(value) for axis, value in found})
 
 
 def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:
     """Force and motion of the loop: what the sensor says and the law commands, and the truth."""
-
-    def both(force: Array, motion: Array) -> Array:
-        return np.column_stack([force[:, part], motion[:, part]])
-
+    true = np.column_stack([run.truth[:, part], run.moved[:, part]])
+    ours = np.column_stack([run.estimate[:, part], run.commanded[:, part]])
     lines = (
-        ChartLine("true force, flange", both(run.truth, run.moved), "#8a929a", "5 3"),
-        ChartLine("virtual sensor, command", both(run.estimate, run.commanded), "#0b6fb8"),
+        ChartLine("true force, flange", true, "#8a929a", "5 3"),
+        ChartLine("virtual sensor, command", ours, "#0b6fb8"),
     )
     letter, *units = ("F", "N", "m") if part == FORCE else ("M", "N·m", "rad")
     band = np.concatenate([found.parameters.threshold[part], np.full(3, np.nan)])

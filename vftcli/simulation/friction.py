@@ -91,7 +91,7 @@ class TrueFriction:
         speed = np.abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
-        if self.has_logarithm:
+        if "logarithmic" in self.present:
             bend = self.logarithmic_velocity
             torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
             slope = slope + self.logarithmic / (bend + speed)
@@ -99,7 +99,7 @@ class TrueFriction:
             beyond = np.maximum(speed - self.bends, 0.0)
             torque = torque + np.add.reduce(self.bend_slopes * beyond) * np.sign(dq)
             slope = slope + np.add.reduce(np.where(beyond > 0.0, self.bend_slopes, 0.0))
-        if self.has_sigmoid:
+        if "amplitude" in self.present:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
             torque = torque + self.amplitude * (bell - rest)
@@ -108,19 +108,9 @@ class TrueFriction:
         return torque, np.maximum(slope, 0.0)
 
     @cached_property
-    def is_loaded(self) -> bool:
-        """Whether any joint rubs more under load; gravity is left out where none does."""
-        return bool(self.load_coulomb.any())
-
-    @cached_property
-    def has_logarithm(self) -> bool:
-        """Whether the friction of any joint rises as a logarithm."""
-        return bool(self.logarithmic.any())
-
-    @cached_property
-    def has_sigmoid(self) -> bool:
-        """Whether any joint has sigmoid friction; exponentials are left out where none has."""
-        return bool(self.amplitude.any())
+    def present(self) -> frozenset[str]:
+        """Names of what any joint has; what none has is left out of a step."""
+        return frozenset(name for name in SHAPES if getattr(self, name).any())
 
     def warmed(self, factor: Array) -> "TrueFriction":
         """The friction, its offset apart, multiplied by a factor of each joint. (n,) [1]"""
@@ -169,11 +159,8 @@ def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
             raise ParameterError(
                 f"friction.{name} is for an arm whose file has no friction; {robot.name!r} has some"
             )
-        if (
-            len(values) != robot.joints
-            or np.any(values < 0)
-            or out_of_bounds(name, values.tolist())
-        ):
+        low = len(values) != robot.joints or np.any(values < 0)
+        if low or out_of_bounds(name, values.tolist()):
             raise ParameterError(
                 f"friction.{name} must have one number a joint, {robot.joints} of them, none "
                 "negative or beyond what robots have"

@@ -68,7 +68,6 @@ class Plant:
         self.centre = self.q.copy()
         self.friction = np.zeros_like(self.q)
         self.external = np.zeros_like(self.q)
-        self.gives = bool(friction.presliding.any())
         sticks = (friction.coulomb > 0.0) & (friction.presliding == 0.0)
         self.signs = np.where(sticks, np.sign(self.v), 1.0)
 
@@ -94,9 +93,13 @@ class Plant:
         M = pin.crba(model, data, q_mid)
         true = self.true_friction
         smooth, slope = true.smooth(self.v)
-        load = pin.computeGeneralizedGravity(model, data, q_mid) if true.is_loaded else None
+        load = (
+            pin.computeGeneralizedGravity(model, data, q_mid)
+            if "load_coulomb" in true.present
+            else None
+        )
         dry = true.dry(self.v, load)
-        if self.gives:
+        if "presliding" in true.present:
             creeping, steep, dry = true.creep(self.v, dry)
             smooth, slope = smooth + creeping + self.presliding(q_mid), slope + steep
         torque = tau - bias - smooth
@@ -115,8 +118,7 @@ class Plant:
         true = self.true_friction
         reach = true.presliding_length
         self.centre = np.minimum(np.maximum(self.centre, q - reach), q + reach)
-        torque: Array = true.presliding * (q - self.centre) / reach
-        return torque
+        return np.asarray(true.presliding * (q - self.centre) / reach)
 
 
 def slide_or_stick(
