@@ -76,8 +76,7 @@ class AxisMotion:
     @property
     def escaped(self) -> Mask:
         """Controllers whose motion left the finite numbers: finite-time escape. (N,)"""
-        found: Mask = ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
-        return found
+        return np.asarray(~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2)))
 
 
 class Recursion:

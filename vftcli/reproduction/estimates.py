@@ -183,14 +183,12 @@ def assembled_bearing(
 
 def within(wrench: Wrench, span: Sequence[float]) -> Mask:
     """The samples of a span."""
-    inside: Mask = (wrench.t > span[0]) & (wrench.t < span[1])
-    return inside
+    return np.asarray((wrench.t > span[0]) & (wrench.t < span[1]))
 
 
 def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:
     """Mean wrench over a span. (6,) [N, N·m]"""
-    mean: Array = np.nanmean(wrench.known[within(wrench, span)], axis=0)
-    return mean
+    return np.asarray(np.nanmean(wrench.known[within(wrench, span)], axis=0))
 
 
 def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> None:

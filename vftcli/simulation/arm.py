@@ -220,8 +220,7 @@ class Arm:
 
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
     """Normal deviates of standard deviation `size`, cut at two standard deviations."""
-    draw: Array = size * np.clip(rng.standard_normal(shape), -2.0, 2.0)
-    return draw
+    return np.asarray(size * np.clip(rng.standard_normal(shape), -2.0, 2.0))
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:

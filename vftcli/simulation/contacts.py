@@ -187,8 +187,7 @@ class PushesSpec:
 def direction(rng: np.random.Generator, vertical: float) -> Array:
     """A random direction whose vertical part is scaled by `vertical`. (3,)"""
     vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
-    unit: Array = vector / np.linalg.norm(vector)
-    return unit
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 @dataclass(frozen=True, kw_only=True)

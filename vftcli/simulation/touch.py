@@ -145,5 +145,4 @@ def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
     """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
     import pinocchio as pin
 
-    J: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
-    return J
+    return np.asarray(pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED))

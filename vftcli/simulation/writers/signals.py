@@ -79,8 +79,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
     def accelerometer() -> Array:
         weightless = np.gradient(samples.target_dq, samples.time, axis=0)
         felt = np.einsum("kij,kj->ki", target().jacobian[:, :3], weightless) - model.gravity.linear
-        seen: Array = np.einsum("kji,kj->ki", target().rotation, felt)
-        return seen
+        return np.asarray(np.einsum("kji,kj->ki", target().rotation, felt))
 
     def matrix() -> Array:
         pose = np.zeros((len(samples.time), 4, 4))
