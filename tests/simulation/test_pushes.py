@@ -92,7 +92,7 @@ def test_stop_pushes_and_never_pulls() -> None:
 def test_random_walk_gains_its_intensity() -> None:
     walk = draw_walk(RandomWalkSpec(name="w", intensity=(4.0,)), 500, 1000, 1e-3, rng())
     # variance of 500 walks after 1 s: 4 (N·m)², good to 2·4/√1000 = 0.25 (one sigma)
-    assert np.var(walk.torque[-1]) == pytest.approx(4.0, abs=1.0)
+    assert np.var(walk[-1]) == pytest.approx(4.0, abs=1.0)
 
 
 @pytest.mark.parametrize(

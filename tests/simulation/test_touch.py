@@ -82,7 +82,7 @@ def test_links_that_are_not_there_are_refused(link):
 def test_walks_begin_at_zero_when_they_begin():
     spec = RandomWalkSpec(name="w", intensity=(4.0,), begin=0.05)
     touching = Touching((spec,), ROBOT.chain, 20, 0.01, np.random.SeedSequence(1))
-    walk = touching.walks[0].torque
+    walk = touching.walks["w"]
     assert not walk[:6].any()
     assert walk[6:].all()
     assert touching.anything(0.0)  # a walk acts all the time, if only with zero

@@ -10,7 +10,7 @@ the threshold to the turn.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -69,17 +69,6 @@ class ClosedLoop:
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
-class Row(NamedTuple):
-    """What the loop writes down of one control period; see `ClosedLoop`."""
-
-    t: float
-    estimate: Array
-    dragged: Mask
-    commanded: Array
-    q: Array
-    reached: bool
-
-
 class Loop:
     """The controller's side of the loop: sensors, observer, phases, law, inverse kinematics.
 
@@ -118,7 +107,7 @@ class Loop:
         self.q_measured = rounded(arm.q + q, arm.scenario.sensing.position_step)
         self.sensor.sample(self.q_measured, arm.v + dq, arm.mean_torque(self.span) + torque)
 
-    def act(self, zero: tuple[float, float] | None) -> Row:
+    def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
         """What happens in a control period: Algorithm 1, or rest until the zero's span is over."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
         # A controller that followed its own drift would never find the zero of a still arm.
@@ -129,8 +118,14 @@ class Loop:
         wrench = wrench - self.zero
         if not waits:
             self.control(wrench)
-        commanded, q = self.law.x[0].copy(), self.arm.q.copy()
-        return Row(t, wrench, self.dragged.copy(), commanded, q, self.reached)
+        return {
+            "t": t,
+            "estimate": wrench,
+            "dragged": self.dragged.copy(),
+            "commanded": self.law.x[0].copy(),
+            "q": self.arm.q.copy(),
+            "reached": self.reached,
+        }
 
     def control(self, wrench: Array) -> None:
         """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
@@ -199,7 +194,7 @@ def run_closed_loop(
     check_stable([controller], force_unstable=force_unstable)
     period = controller.parameters.period
     arm = still_arm(scenario, period, seed)
-    loop, log = Loop(arm, controller, observer, torque), list[Row]()
+    loop, log = Loop(arm, controller, observer, torque), list[dict[str, Any]]()
     every_sample = steps_in(loop.interval, arm.scenario.step, "sampling interval")
     every_control = steps_in(period, arm.scenario.step, "control period")
     for k in range(arm.steps):
@@ -242,10 +237,12 @@ def steps_in(interval: float, step: float, what: str) -> int:
     return count
 
 
-def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | None) -> ClosedLoop:
+def closed_loop_of(
+    loop: Loop, log: Sequence[dict[str, Any]], zero: tuple[float, float] | None
+) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
     arm = loop.arm
-    columns = dict(zip(Row._fields, map(np.array, zip(*log, strict=True)), strict=True))
+    columns = {name: np.array([row[name] for row in log]) for name in log[0]}
     t = columns["t"]
     simulation, truth = None, np.full((len(t), 6), np.nan)
     if arm.made == arm.steps:

@@ -206,8 +206,8 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
     wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
     walk = np.zeros((made, arm.robot.joints))
-    for each in touching.walks:
-        walk += each.torque[:made]
+    for each in touching.walks.values():
+        walk += each[:made]
     data = arm.plant.model.createData()
     tau_ext, wrench = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
     for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
@@ -215,7 +215,7 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
         tau_ext[k] += tau
         wrench[k] = flange
     contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
-    walks = {w.name: interpolate(samples.time, middle, w.torque[:made]) for w in touching.walks}
+    walks = {k: interpolate(samples.time, middle, w[:made]) for k, w in touching.walks.items()}
     return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=wrench, contacts=contacts, walks=walks)
 
 

@@ -50,13 +50,6 @@ class Mounted(NamedTuple):
     lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
 
 
-class Walk(NamedTuple):
-    """A random walk of the joint torques: its value at each inner step. (N, n) [N·m]"""
-
-    name: str
-    torque: Array
-
-
 def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: float) -> Mounted:
     """Put a contact on its link."""
     if not 0 <= spec.link <= chain.joints:
@@ -72,8 +65,8 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
 
 def draw_walk(
     spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
-) -> Walk:
-    """Draw a random walk of joint torques over `steps` inner steps of `step` [s]."""
+) -> Array:
+    """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
     if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
         raise ParameterError(
             f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "
@@ -84,7 +77,7 @@ def draw_walk(
     walk += spec.initial * rng.standard_normal(joints)
     late = np.arange(steps) * step >= spec.begin
     begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
-    return Walk(spec.name, begun * late[:, None])
+    return np.asarray(begun * late[:, None])
 
 
 class Touching:
@@ -92,7 +85,7 @@ class Touching:
 
     Attributes:
         mounted: Contacts that exert wrenches.
-        walks: Contacts that exert joint torques.
+        walks: Name → joint torque of each random walk at each inner step. (N, n) [N·m]
         wrenches: The last wrench of each mounted contact about its point, base axes. (C, 6)
     """
 
@@ -110,10 +103,10 @@ class Touching:
         # A generator a contact: adding one leaves what the others draw as it was.
         rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
         self.mounted: list[Mounted] = []
-        self.walks: list[Walk] = []
+        self.walks: dict[str, Array] = {}
         for spec, rng in zip(specs, rngs, strict=True):
             if isinstance(spec, RandomWalkSpec):
-                self.walks.append(draw_walk(spec, chain.joints, steps, step, rng))
+                self.walks[spec.name] = draw_walk(spec, chain.joints, steps, step, rng)
             else:
                 self.mounted.append(mount(spec, chain, rng, steps * step))
         self.wrenches = np.zeros((len(self.mounted), 6))
@@ -126,8 +119,8 @@ class Touching:
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
         tau = np.zeros_like(v)
-        for walk in self.walks:
-            tau += walk.torque[min(int(t / self.step), len(walk.torque) - 1)]
+        for walk in self.walks.values():
+            tau += walk[min(int(t / self.step), len(walk) - 1)]
         for k, mounted in enumerate(self.mounted):
             self.wrenches[k] = 0.0
             if not mounted.contact.active(t):
