@@ -107,13 +107,9 @@ class JointPath:
 
 
 def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> JointPath:
-    """Joint positions for flange deviations from a start pose.
+    """Joint positions for flange deviations (T, N, 6) [m, rad] from a start pose (n,) [rad].
 
-    Args:
-        solver: The arm's.
-        start: Joint positions of the target pose X_d. (n,) [rad]
-        x: Deviations in base axes, rotation vectors last. (T, N, 6) [m, rad]
-        period: Time between rows. [s]
+    Deviations are in base axes, rotation vectors last, a `period` [s] apart.
     """
     rotation, translation = solver.pose(start)
     q, reached = np.empty((*x.shape[:2], len(start))), np.zeros(x.shape[:2], dtype=bool)

@@ -111,14 +111,10 @@ def kinetic_shape(u: Array) -> Array:
 def energy(controller: Controller, x: Array, v: Array) -> Array:
     """The Lyapunov function of each axis in a recovery phase. (…, 6) [J]
 
+    Of deviations x (…, 6) [m, rad] and velocities v (…, 6) [m/s, rad/s] it is
     W = ½K_d x² + (M_d v₀²/α²) φ(|v|/v₀), with Ẇ = −B e^{−|v|/v₀} v²/α ≤ 0; for the traditional
     controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x
     is the rotation vector log(R R_dᵀ) and v the angular velocity.
-
-    Args:
-        controller: Whose recovery phase it is.
-        x: Deviations. (…, 6) [m, rad]
-        v: Velocities. (…, 6) [m/s, rad/s]
     """
     p = controller.parameters
     potential = 0.5 * p.stiffness * x**2
@@ -179,14 +175,7 @@ class Verdict(NamedTuple):
 
 
 def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float) -> Array:
-    """2TsB/M + Ts²K/M, below 4 where semi-implicit Euler is stable.
-
-    Args:
-        mass: M. [kg, kg·m²]
-        damping: B. [N·s/m, N·m·s/rad]
-        stiffness: K. [N/m, N·m/rad]
-        period: Ts. [s]
-    """
+    """2TsB/M + Ts²K/M, below 4 where semi-implicit Euler is stable. [1]"""
     return np.asarray((2.0 * period * damping + period**2 * stiffness) / mass)
 
 
@@ -240,12 +229,11 @@ def check_stable(
     Args:
         controllers: The controllers.
         force_unstable: Run them all the same, for study.
-        release: The deviation of a release from rest, if that is all they are run for: an axis
-            without a speed limit is let pass where it starts inside the escape bound.
-            (6,) [m, rad]
+        release: The deviation of a release from rest, if they run for that alone: an axis that
+            starts inside the escape bound needs no speed limit. (6,) [m, rad]
 
     Returns:
-        A verdict for each, and what is wrong with them, also where that is let pass.
+        Their verdicts, and all that is wrong with them.
     """
     verdicts = tuple(map(judge, controllers))
     # Under a hand any deviation can come about; only a release has a size.

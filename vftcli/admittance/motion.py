@@ -21,14 +21,10 @@ class Phases(NamedTuple):
 
 
 def phases(wrench: Array, parameters: Admittance) -> Phases:
-    """Split a record into drag and recovery phases, axis by axis.
+    """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
 
     An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An unknown (NaN)
     force counts as none.
-
-    Args:
-        wrench: Force and moment on the flange. (T, 6) [N, N·m]
-        parameters: Thresholds, hysteresis and mode.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = np.abs(wrench)
@@ -114,12 +110,7 @@ class Recursion:
         self.turns = bool(np.any(self.x[:, 3:]) or np.any(self.v[:, 3:]))
 
     def step(self, force: Array, dragged: Mask) -> None:
-        """Move one control period on under the force that enters the law.
-
-        Args:
-            force: Force and moment that enter the law. (6,) [N, N·m]
-            dragged: Which axes are in the drag phase. (6,)
-        """
+        """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
         x, v, period = self.x, self.v, self.period
         swell = np.exp(np.abs(v) * self.rate)
         swell *= self.alpha

@@ -43,13 +43,7 @@ class OnlineKalman:
         self.tau = np.zeros(n)
 
     def sample(self, q: Array, dq: Array, torque: Array) -> Array:
-        """Take one sample and return the external torque. (n,) [N·m]
-
-        Args:
-            q: Measured positions. (n,) [rad]
-            dq: Measured velocities. (n,) [rad/s]
-            torque: Measured drive torque. (n,) [N·m]
-        """
+        """The external torque after one more sample [rad, rad/s, N·m]. (n,) [N·m]"""
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq

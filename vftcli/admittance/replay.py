@@ -129,14 +129,7 @@ def replay_release(
 ) -> Replay:
     """Let go of the arm at rest at deviation `x` (6,) [m, rad] from the pose `start` (n,) [rad].
 
-    Args:
-        x: Deviation.
-        robot: The arm.
-        parameters: Shared parameters.
-        controllers: The controllers.
-        start: Joint positions of the target pose.
-        duration: How long to watch; None for as long as it takes. [s]
-        force_unstable: Run unstable settings too.
+    It is watched for `duration` [s], None for as long as it takes; else as `replay`.
     """
     if not np.any(x):
         raise ParameterError(
@@ -202,16 +195,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
 
 
 def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
-    """Sample columns as a controller does: the newest sample at each control period.
-
-    Args:
-        t: Times of the log. (T,) [s]
-        values: Columns. (T, …)
-        period: Control period. [s]
-
-    Returns:
-        Times from the log's first sample on (S,) [s], and the columns then. (S, …)
-    """
+    """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay in step.
@@ -266,13 +250,7 @@ def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:
 
 
 def nothing_dragged(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[Remark, ...]:
-    """Say so if nothing ever passed a threshold, and which axis came nearest to its own.
-
-    Args:
-        wrench: Force at each control period, NaN where unknown. (T, 6) [N, N·m]
-        parameters: The thresholds.
-        dragged: Whether anything did.
-    """
+    """Say so if a force (T, 6) [N, N·m] never passed a threshold, and which axis came nearest."""
     if dragged or not len(wrench):
         return ()
     largest = np.max(np.abs(np.nan_to_num(wrench)), axis=0)
@@ -283,13 +261,7 @@ def nothing_dragged(wrench: Array, parameters: Admittance, dragged: bool) -> tup
 
 
 def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[Remark, ...]:
-    """Say so if an axis is dragged for long while the log's arm stands still; its longest drag.
-
-    Args:
-        drags: The drags.
-        logged: Deviation of the log's own flange from its first pose. (T, 6) [m, rad]
-        period: Control period. [s]
-    """
+    """The longest drag of each axis in which the log's flange rests. (T, 6) [m, rad], [s]"""
     longest: dict[str, int] = {}
     long, near = round(RESTING[0] / period), RESTING[1]
     for drag in drags:
@@ -311,7 +283,7 @@ def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[
 def limits_met(
     controllers: Sequence[Controller], motion: AxisMotion, path: JointPath, rises: Counts
 ) -> tuple[Remark, ...]:
-    """What went wrong or was limited on the way, controller by controller."""
+    """What went wrong or was limited, controller by controller."""
     found = []
     for n, controller in enumerate(controllers):
         where = Where(controller.name)

@@ -169,10 +169,7 @@ def released(
 ) -> RunResult:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
-    Args:
-        robot: The arm.
-        deviation: How far off it is let go along x. [m]
-        alphas: Values of α; none for the table's own.
+    It is let go off by `deviation` [m] along x; without `alphas` α is the table's own.
     """
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])

@@ -53,10 +53,7 @@ UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> RunResult:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes.
 
-    Args:
-        seed: Of the simulation.
-        sensor_pose: Where the scenario has the sensor on the flange. [m, rad]
-        unloaded: Span in which nothing touches the arm. [s]
+    The file of the paper explains the arguments.
     """
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
     # A soft position loop: joints slide where a stiff one holds them.
@@ -142,12 +139,7 @@ def assembled_bearing(
 ) -> RunResult:
     """Zero drift, the bearing's weight, errors by phase, and what the controllers make of it.
 
-    Args:
-        seed: Of the simulation.
-        unloaded: Span in which nothing touches the arm. [s]
-        hung: Span in which the bearing alone hangs on it. [s]
-        phases: What is done with the arm → when. [s]
-        sampled: Its sampling interval. [s]
+    The file of the paper explains the arguments.
     """
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot, models = run.recording, load_robot("panda"), Models()
@@ -245,10 +237,7 @@ def beside_vendor(wrench: Wrench, vendor: Wrench) -> Chart:
 def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
     """Errors joint by joint, lags, rms of the free cycle, and the guidelines' facts.
 
-    Args:
-        seed: Of the simulation.
-        scenario: Its name.
-        period: Length of a cycle, the first of which nobody touches. [s]
+    The first cycle of `period` [s] is free.
     """
     recording = simulate(load_scenario(scenario, ()), seed).recording
     robot, models, result = load_robot("ur5"), Models(), RunResult()

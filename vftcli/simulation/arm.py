@@ -81,14 +81,7 @@ class Arm:
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
-        """Prepare a run.
-
-        Args:
-            scenario: The experiment.
-            seed: Seed of everything drawn.
-            start: The reference at the start, one row; the arm starts on it.
-            duration: Length of the run. [s]
-        """
+        """Prepare a run of so long [s]; the arm starts on the reference's one row."""
         if seed < 0:
             raise ParameterError(f"the seed is {seed}; it must be zero or positive")
         for name in ("temperature_begin", "temperature_end"):
@@ -135,10 +128,8 @@ class Arm:
     def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
         """Make one inner step towards a commanded position, with the servo's own feed-forward.
 
-        A position outside the joint limits is brought to them.
-
         Args:
-            q_d: Commanded positions. (n,) [rad]
+            q_d: Commanded positions, brought to the joint limits. (n,) [rad]
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
         """
@@ -183,11 +174,7 @@ class Arm:
             )
 
     def temperature(self, t: Array) -> Array:
-        """The joints' temperature at some times of the run. (N, n) [°C]
-
-        Args:
-            t: True times. (N,) [s]
-        """
+        """The joints' temperature at true times (N,) [s] of the run. (N, n) [°C]"""
         spec, friction = self.scenario.friction, self.robot.friction
         references = [joint.reference_temperature for joint in friction]
         begin = np.array(references or [REFERENCE] * len(self.q))

@@ -55,14 +55,10 @@ class TrueFriction:
     stribeck_velocity: float = 0.05  #: Velocity over which it fades. [rad/s]
 
     def dry(self, dq: Array, load: Array | None = None) -> Array:
-        """Largest dry friction torque at velocities `dq` (n,) [rad/s]. (n,) [N·m]
+        """Largest dry friction at velocities (n,) [rad/s] and loads (n,) [N·m]. (n,) [N·m]
 
         F_c (1 + s exp(−(q̇/v_s)²)), the Stribeck curve of Armstrong-Hélouvry, Dupont and Canudas
         de Wit, Automatica 30 (1994), and f_l |load| with the gravity torque that the gears carry.
-
-        Args:
-            dq: Velocities. (n,) [rad/s]
-            load: Gravity torques, None for none. (n,) [N·m]
         """
         dry = self.coulomb
         if self.stribeck != 0.0:
@@ -75,12 +71,7 @@ class TrueFriction:
     def creep(self, dq: Array, dry: Array) -> tuple[Array, Array, Array]:
         """What fades of the dry friction, of joints that give, its slope, and what sticks.
 
-        Args:
-            dq: Velocities. (n,) [rad/s]
-            dry: Largest dry friction torques. (n,) [N·m]
-
-        Returns:
-            (n,) [N·m], (n,) [N·m·s/rad] and (n,) [N·m].
+        (n,) each [N·m, N·m·s/rad, N·m], at velocities [rad/s].
         """
         gives = self.presliding > 0.0
         fading, sign = np.where(gives, dry, 0.0), np.tanh(dq / CREEP)
