@@ -96,6 +96,7 @@ def test_twists_exceed_the_threshold() -> None:
         (["duration"], "is not key=value"),
         (["servo=3"], "must be a section"),
         (["title.x=3"], "is a value, not a section"),
+        (["contacts.hand=3"], "contacts is a value, not a section"),
     ],
 )
 def test_wrong_keys_are_named(overrides: list[str], words: str) -> None:

@@ -1,11 +1,8 @@
 """The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
 
-The arm is the simulator's, with its contacts, friction and mismatch; the controller sees what a log
-would hold: positions and velocities with noise, and the drive torque averaged over the sampling
-interval (or its last instant). Between two control periods the servo holds the last command.
-Latencies are of the sensor, from the true force, and as the paper times them: its sensor knows no
-true force, so its Figs 6 and 9 time from detection to motion, and from the estimate's fall below
-the threshold to the turn.
+The arm is the simulator's; the controller sees what a log would hold, noise and all. Between two
+control periods the servo holds the last command. Latencies are from the true force, and as Figs 6
+and 9 time them: from detection to motion, and from the estimate's fall to the turn.
 """
 
 from collections.abc import Sequence
@@ -77,7 +74,11 @@ class Loop:
     """
 
     def __init__(
-        self, arm: Arm, controller: Controller, observer: KalmanObserver, torque: str
+        self,
+        arm: Arm,
+        controller: Controller,
+        observer: KalmanObserver,
+        torque: str,
     ) -> None:
         self.arm, self.controller = arm, controller
         nominal, self.interval = arm.true.nominal, 1.0 / log_rate(arm.scenario.sensing, arm.robot)
@@ -175,8 +176,7 @@ def run_closed_loop(
 ) -> ClosedLoop:
     """Run a scenario's contacts against an arm under admittance control.
 
-    The scenario's own trajectory is not followed: the arm starts where it starts, and where it goes
-    is the controller's doing.
+    The arm starts where the trajectory does; where it goes is the controller's doing.
 
     Args:
         scenario: The experiment: arm, contacts, friction, mismatch, sensing.
@@ -184,8 +184,7 @@ def run_closed_loop(
         observer: The Kalman filter of the virtual sensor.
         seed: Seed of everything drawn; the scenario's own if not given.
         torque: "average" over the sampling interval, or the last "instant".
-        zero: Unloaded span whose mean wrench is removed; the controller holds still until it ends.
-            None removes nothing. [s]
+        zero: Unloaded span, None for none: the arm holds still, its mean wrench is removed. [s]
         force_unstable: Run unstable settings too.
         progress: Told how far the run is.
     """
@@ -275,8 +274,7 @@ class Latency:
     reaction: float | None
     #: Time from the estimate's fall below the threshold until the flange goes no farther.
     turn: float | None
-    #: Whether the flange was at rest when the force came; a time to a displacement says nothing of
-    #: one that was moving already.
+    #: Whether the flange was at rest when the force came, without which `motion` says nothing.
     rested: bool
 
 

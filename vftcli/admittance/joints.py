@@ -132,7 +132,11 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
 
 
 def try_pose(
-    solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
+    solver: FlangeSolver,
+    rotation: Array,
+    point: Array,
+    guess: Array,
+    last: Array,
 ) -> tuple[Array, bool]:
     """Reach a pose from a guess, and if that fails or leaps, from the joints before it."""
     if not np.all(np.isfinite(point)):

@@ -1,13 +1,10 @@
-"""The variable-parameter law (47), its energies, the printed one of which rises, and its stability.
+"""The variable-parameter law (47), its energy, the printed one, which rises, and its stability.
 
 In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK), so that
-B = 2ξ√(M_d K_d) is constant. The traditional controller is the same law with α = 1, no dependence
-on speed and B = B_d.
+B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and M, and B = B_d.
 
-Two things can go wrong. Semi-implicit Euler (49)–(51) is stable for mass M, damping B and
-stiffness K only if 2TsB/M + Ts²K/M < 4, and the variable law's M shrinks and its K grows with
-speed. And without a speed limit the law itself escapes: K grows with e^{|v|}, M shrinks, and from a
-deviation large enough the speed becomes infinite in finite time, at any control period.
+Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4, and M falls and K rises with speed.
+Without a speed limit the law escapes: from far enough it becomes infinitely fast in finite time.
 """
 
 from collections.abc import Sequence
@@ -83,7 +80,9 @@ def variable(parameters: Admittance) -> Controller:
 
 
 def controllers(
-    parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
+    parameters: Admittance,
+    kinds: Sequence[str] = (),
+    alphas: Sequence[float] = (),
 ) -> tuple[Controller, ...]:
     """The controllers of a comparison, the traditional one first."""
     check_kinds(kinds)
@@ -222,7 +221,10 @@ def judge(controller: Controller) -> Verdict:
 
 
 def check_stable(
-    controllers: Sequence[Controller], *, force_unstable: bool = False, release: Array | None = None
+    controllers: Sequence[Controller],
+    *,
+    force_unstable: bool = False,
+    release: Array | None = None,
 ) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
     """Judge controllers before they run, and refuse what would be unstable.
 

@@ -36,9 +36,8 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
 def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Array:
     """The force that enters (49), by the threshold's mode. (…, 6) [N, N·m]
 
-    "hard" passes the whole force of a dragged axis, "soft" what exceeds its threshold,
-    F − F_tsd·sign(F), so that it starts from zero; an axis that recovers has none. "literal" is
-    Algorithm 1 as printed: the threshold chooses the parameters, and the whole force always enters.
+    "hard" passes the whole force of a dragged axis, "soft" F − F_tsd·sign(F), which starts from
+    zero; an axis that recovers has none. "literal" is Algorithm 1 as printed: all always enters.
     """
     if parameters.threshold_mode == "literal":
         return wrench
@@ -85,7 +84,10 @@ class Recursion:
     """
 
     def __init__(
-        self, controllers: Sequence[Controller], x: Array | None = None, v: Array | None = None
+        self,
+        controllers: Sequence[Controller],
+        x: Array | None = None,
+        v: Array | None = None,
     ) -> None:
         """Start at deviations `x` with velocities `v`, (N, 6) or (6,), zero if not given."""
         if not controllers:
@@ -163,7 +165,10 @@ def run(
 
 
 def release(
-    controllers: Sequence[Controller], x: Array, duration: float, v: Array | None = None
+    controllers: Sequence[Controller],
+    x: Array,
+    duration: float,
+    v: Array | None = None,
 ) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))

@@ -14,18 +14,21 @@ from vftcli.virtual_sensor.solvers import wrench_of
 class OnlineKalman:
     """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
 
-    A drive torque that is the mean over the sampling interval is what the momentum has gained by
-    it, exactly; the trapezoid over two such means is half a sample late, and in a loop that half
-    sample turns every jerk of the arm into a false force. So a mean enters as it is, and only the
-    rest of μ by the trapezoid. An instantaneous torque enters by the trapezoid: then the numbers
-    are those of `KalmanObserver.estimate` over the log.
+    A mean torque over the sampling interval enters as it is: the trapezoid over two is half a
+    sample late, which turns every jerk of the arm into a false force. An instantaneous one enters
+    by the trapezoid, as the rest of μ: the numbers are those of `KalmanObserver.estimate`.
 
     Attributes:
         tau: The estimate now. (n,) [N·m]
     """
 
     def __init__(
-        self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
+        self,
+        observer: KalmanObserver,
+        robot: Robot,
+        step: float,
+        *,
+        averaged: bool,
     ) -> None:
         """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
         import pinocchio as pin

@@ -109,7 +109,9 @@ class Admittance:
 
 
 def from_table(
-    table: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
+    table: Mapping[str, Any],
+    robot: str,
+    settings: Mapping[str, Mapping[str, Any]],
 ) -> Admittance:
     """Build the parameters from a robot file's ``[admittance]`` and the user's assignments.
 

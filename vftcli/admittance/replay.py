@@ -194,7 +194,11 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
-def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
+def on_control_clock(
+    t: Array,
+    values: Sequence[Array],
+    period: float,
+) -> tuple[Array, list[Array]]:
     """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
@@ -249,7 +253,11 @@ def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:
     return (caution("force-unknown", samples=count),) if count else ()
 
 
-def nothing_dragged(wrench: Array, parameters: Admittance, dragged: bool) -> tuple[Remark, ...]:
+def nothing_dragged(
+    wrench: Array,
+    parameters: Admittance,
+    dragged: bool,
+) -> tuple[Remark, ...]:
     """Say so if a force (T, 6) [N, N·m] never passed a threshold, and which axis came nearest."""
     if dragged or not len(wrench):
         return ()
@@ -260,7 +268,11 @@ def nothing_dragged(wrench: Array, parameters: Admittance, dragged: bool) -> tup
     return (caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=threshold),)
 
 
-def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[Remark, ...]:
+def drags_at_rest(
+    drags: Sequence[Drag],
+    logged: Array,
+    period: float,
+) -> tuple[Remark, ...]:
     """The longest drag of each axis in which the log's flange rests. (T, 6) [m, rad], [s]"""
     longest: dict[str, int] = {}
     long, near = round(RESTING[0] / period), RESTING[1]
@@ -281,7 +293,10 @@ def drags_at_rest(drags: Sequence[Drag], logged: Array, period: float) -> tuple[
 
 
 def limits_met(
-    controllers: Sequence[Controller], motion: AxisMotion, path: JointPath, rises: Counts
+    controllers: Sequence[Controller],
+    motion: AxisMotion,
+    path: JointPath,
+    rises: Counts,
 ) -> tuple[Remark, ...]:
     """What went wrong or was limited, controller by controller."""
     found = []
@@ -304,7 +319,10 @@ def limits_met(
 
 
 def implausible_travel(
-    parameters: Admittance, controllers: Sequence[Controller], motion: AxisMotion, path: JointPath
+    parameters: Admittance,
+    controllers: Sequence[Controller],
+    motion: AxisMotion,
+    path: JointPath,
 ) -> tuple[Remark, ...]:
     """Say so if the travel is none that the arm could make, and what to do under a hard threshold.
 

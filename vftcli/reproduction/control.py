@@ -35,7 +35,11 @@ FARTHEST_RELEASE = 0.5
 
 
 def closed_loop(
-    seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
+    seed: int,
+    *,
+    scenario: str,
+    figures: Sequence[str],
+    alphas: Sequence[float],
 ) -> RunResult:
     """Latencies of a controller in the loop, and its force through controllers of every α."""
     result = RunResult()
@@ -72,8 +76,7 @@ def looped(
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # The same enters, whoever is driven by it: no controller has a tail of the force that another
-    # does not see.
+    # The same enters, whoever is driven by it.
     everything = replace(alone, alphas=tuple(alphas)).controllers(parameters)
     source = fact("force-of-loop")
     return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
@@ -139,9 +142,8 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
     """How late the UR5 turns after a release at most, and how much earlier the variable law is.
 
-    Without force x(t) and v(t) of the traditional law turn at the latest where x = 0 at the
-    release: after arccos(ζ)/ω_d. The advance is the largest over deviations from 0 on, released at
-    the speed limit, in steps of the control period.
+    The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance is the
+    largest over deviations released at the speed limit, in steps of the control period.
     """
     control = ControlChoice(alphas=tuple(alphas))
     parameters = control.parameters(load_robot("ur5"))

@@ -192,7 +192,11 @@ def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> N
 
 
 def replay_bearing(
-    wrench: Wrench, made: Analysis, *, period: float | None = None, as_printed: bool = False
+    wrench: Wrench,
+    made: Analysis,
+    *,
+    period: float | None = None,
+    as_printed: bool = False,
 ) -> Replay:
     """The same force through the traditional and the variable controller of Table IV."""
     words = [] if period is None else [f"admittance.period={period}"]
@@ -203,7 +207,12 @@ def replay_bearing(
     return replay(wrench, made.recording.q, made.robot, parameters, laws, source=source)
 
 
-def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence[float]) -> None:
+def put_motion(
+    result: RunResult,
+    variant: str,
+    found: Replay,
+    knocked: Sequence[float],
+) -> None:
     """How soon the arm is back from where it was guided, what is left, how far knocks move it."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):

@@ -80,7 +80,11 @@ def end_with_terminal() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> dict[Job, Result]:
+def run_jobs(
+    jobs: Sequence[Job],
+    tell: Hearer,
+    workers: int | None = None,
+) -> dict[Job, Result]:
     """Run jobs, those that take the time last and by themselves."""
     alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
     beside = [job for job in jobs if job not in alone]

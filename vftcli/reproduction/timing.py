@@ -110,10 +110,8 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
 
     Returns:
         ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
-        ``dynamics``: the batched terms; and what was run. ``complete_log`` holds the spectra and
-        the observers that need a complete log: the tuned ones with their tuning, ``best`` without,
-        its smoothing pass alone; ``wrench smoother`` is the wrench of the whole log, its noise and
-        prior included.
+        ``dynamics``: the batched terms; ``complete_log``: the spectra and the observers that need
+        a complete log, with their tuning but for ``best``; and what was run.
     """
     robot, timings = load_robot(robot_name), Timings()
     with one_core():

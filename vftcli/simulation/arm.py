@@ -66,8 +66,7 @@ class History(JointSignals):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `step` with its command and reads `q`, `v` and the mean torque of
-    the last interval; `vftcli.simulation.simulate` does so with the scenario's own trajectory.
+    A controller in the loop calls `step` and reads `q`, `v` and `mean_torque`.
 
     Attributes:
         scenario: The experiment.
@@ -126,7 +125,7 @@ class Arm:
         return self.plant.v
 
     def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
-        """Make one inner step towards a commanded position, with the servo's own feed-forward.
+        """Make one inner step with the servo's own feed-forward.
 
         Args:
             q_d: Commanded positions, brought to the joint limits. (n,) [rad]
@@ -141,7 +140,7 @@ class Arm:
         self.step(rows[0], rows[1], rows[2], forward)
 
     def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
-        """Make one inner step with a feed-forward torque `forward` (n,) [N·m] already known."""
+        """Make one inner step with a feed-forward torque (n,) [N·m]."""
         history, plant, k = self.history, self.plant, self.made
         if k >= self.steps:
             raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
@@ -185,10 +184,7 @@ class Arm:
         return np.asarray(begin + (end - begin) * share)
 
     def close(self) -> History:
-        """The history so far, with the state after the last step as its closing row.
-
-        What has no value after the last step keeps its last one.
-        """
+        """The history so far; what has no value after the last step keeps its last."""
         self.check_motion()
         history, k = self.history, self.made
         history.q[k], history.v[k] = self.plant.q, self.plant.v
@@ -211,7 +207,7 @@ def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Ar
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
-    """Return a payload section as a load on the flange, its mass and tensor scaled."""
+    """A payload section as a load on the flange, scaled."""
     values = {"mass": (spec.mass,), "com": spec.com, "inertia": spec.inertia}
     for key, numbers in values.items():
         if why := out_of_bounds(key, numbers):
@@ -223,8 +219,7 @@ def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
 def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> TrueArm:
     """Draw the arm of a scenario.
 
-    The same numbers are drawn whatever the sizes are, so that switching one error off leaves the
-    others as they were.
+    Whatever the sizes are, the same numbers are drawn: errors stay when one is off.
     """
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():
@@ -254,7 +249,7 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
 
 
 def perturbed_chain(chain: Chain, sizes: MismatchSpec, rng: np.random.Generator) -> Chain:
-    """Return a chain with erring masses, centres of mass and rotor inertias, still physical."""
+    """A chain with erring masses, centres of mass and rotor inertias."""
     n = chain.joints
     mass = 1.0 + deviate(rng, sizes.mass, (n,))
     com = deviate(rng, sizes.com, (n, 3))
@@ -271,7 +266,7 @@ def perturbed_chain(chain: Chain, sizes: MismatchSpec, rng: np.random.Generator)
 def perturbed_friction(
     friction: TrueFriction, sizes: MismatchSpec, rng: np.random.Generator
 ) -> TrueFriction:
-    """Return friction whose dry and viscous levels err independently, joint by joint."""
+    """Friction whose dry and viscous levels err independently."""
     n = len(friction.coulomb)
     dry, wet = (1.0 + deviate(rng, sizes.friction, (n,)) for _ in range(2))
     levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}

@@ -1,7 +1,6 @@
-"""The kinds of contact that act with a wrench: given, hung, drawn at random, hand, hard stop.
+"""The kinds of contact that act with a wrench: given, hung, drawn, hand, hard stop.
 
-A contact acts at `point` of a link (`link` 0: the flange, else the link of that joint) with a
-wrench ON the robot in base axes. Hand and stop answer the arm's motion by spring and damper.
+It acts ON the robot at `point` of a `link` (0: the flange), in base axes.
 """
 
 import math

@@ -185,7 +185,9 @@ def observe(arm: Arm) -> Simulation:
 
 
 def simulate_pair(
-    scenario: Scenario, seed: int | None = None, progress: Progress | None = None
+    scenario: Scenario,
+    seed: int | None = None,
+    progress: Progress | None = None,
 ) -> list[Simulation]:
     """Run an experiment, and if it is one of a pair also the free run of the same arm.
 

@@ -2,8 +2,7 @@
 
 τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest (Coulomb, load and
 Stribeck), s the state of the play operator (`vftcli.robots.presliding`) and
-λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: a joint that gives holds at rest what its teeth hold, a·s, and
-the rest of its dry friction fades with the speed, v₀ = 3 mrad/s (`CREEP`);
+λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a joint that gives holds a·s, v₀ is `CREEP`;
 smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
 + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 """
@@ -95,7 +94,7 @@ class TrueFriction:
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
             torque = torque + self.amplitude * (bell - rest)
             slope = slope + self.amplitude * self.slope * bell * (1.0 - bell)
-        # The step treats the slope implicitly; a negative one would pump energy into the joint.
+        # The slope is implicit: a negative one would pump energy into the joint.
         return torque, np.maximum(slope, 0.0)
 
     @cached_property

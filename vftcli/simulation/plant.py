@@ -1,9 +1,8 @@
 """The arm itself: rigid-body dynamics with rotor inertia and true friction, integrated in time.
 
-Dry friction after Moreau: given the impulse balance M̃ (v⁺ − v) = g − λ with |λ_j| ≤ ℓ_j, a sliding
-joint has λ_j = ℓ_j sign(v⁺_j), a sticking one has v⁺_j = 0 exactly. M̃ is positive definite, so the
-solution exists and is unique. (J. J. Moreau, "Unilateral contact and dry friction in finite freedom
-dynamics", 1988.)
+Dry friction: in M̃ (v⁺ − v) = g − λ, |λ_j| ≤ ℓ_j, a sliding joint has λ_j = ℓ_j sign(v⁺_j), a
+sticking one v⁺_j = 0. M̃ is positive definite: there is one solution. (J. J. Moreau, "Unilateral
+contact and dry friction in finite freedom dynamics", 1988.)
 """
 
 from collections.abc import Callable
@@ -30,9 +29,8 @@ class Plant:
 
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
-    where λ is the impulse of dry friction and D the slope of the smooth friction. It is of second
-    order in h while no joint changes between sticking and sliding. Presliding friction, a spring
-    that yields, is evaluated at q_m like gravity.
+    λ is the impulse of dry friction, D the slope of the smooth one; of second order in h while no
+    joint begins to stick or slide. Presliding friction is evaluated at q_m.
 
     Attributes:
         q, v: Positions and velocities now. (n,) [rad, rad/s]
@@ -139,7 +137,7 @@ def slide_or_stick(
     from scipy.linalg.lapack import dposv
 
     for _ in range(GUESSES):
-        # While every joint slides, one Cholesky solve settles the step; it is by far most of them.
+        # While every joint slides, as mostly, one Cholesky solve settles the step.
         if signs.all():
             _, step, _ = dposv(M, impulse - limit * signs)
             after = v + step
@@ -177,8 +175,13 @@ def step_with_stuck_joints(
     return after, friction, better
 
 
-def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
-    """The same step by projected Gauss–Seidel, which converges for every positive definite M̃."""
+def gauss_seidel(
+    M: Array,
+    impulse: Array,
+    v: Array,
+    limit: Array,
+) -> tuple[Array, Array, Array]:
+    """The same step by projected Gauss–Seidel, which always converges."""
     A = np.linalg.inv(M)
     free = v + A @ impulse
     friction = np.zeros_like(v)

@@ -1,7 +1,6 @@
 """What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy.
 
-Its estimates of contact are what the vendors' are: the measured torque less the nominal model's,
-low-passed.
+Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
 
 from dataclasses import dataclass
@@ -83,7 +82,7 @@ def log_rate(spec: SensingSpec, robot: Robot) -> float:
 
 
 def sample_run(arm: Arm) -> Samples:
-    """The true signals of a finished run at the instants of the log's own, drifting clock."""
+    """The true signals of a finished run on the log's drifting clock."""
     spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
     grid = np.arange(len(history.q), dtype=float) * arm.scenario.step
@@ -115,8 +114,7 @@ def interpolate(time: Array, grid: Array, values: Array) -> Array:
 def average_torque(tau: Array, grid: Array, time: Array, interval: float) -> Array:
     """Drive torque averaged over the `interval` before each sample, or over the last step. (M, n)
 
-    The torque is constant over an inner step, so its integral is piecewise linear and the average
-    exact. The first sample has no interval before it and reports the first step's torque.
+    Exact, for it is constant over a step. The first sample reports the first step's.
     """
     step, total = grid[1], np.zeros_like(tau)
     span = max(interval, step)
@@ -128,10 +126,7 @@ def average_torque(tau: Array, grid: Array, time: Array, interval: float) -> Arr
 
 
 def noise_sizes(arm: Arm) -> tuple[Array, Array, Array]:
-    """Noise of positions, velocities and torques, of currents where these are measured. (n,) each
-
-    [rad, rad/s, N·m or A]
-    """
+    """Noise of positions, velocities, and torques or currents. (n,) each [rad, rad/s, N·m, A]"""
     spec, noise = arm.scenario.sensing, arm.robot.noise
     K = drive_constants(arm.robot)
     own = noise.tau if K is None else noise.current
@@ -147,7 +142,7 @@ def drive_constants(robot: Robot) -> Array | None:
 
 
 def measure_run(arm: Arm, samples: Samples) -> Measured:
-    """Report what the sensors make of the true signals; everything random is from the seed."""
+    """What the sensors make of the true signals, noise from the seed."""
     spec, K = arm.scenario.sensing, drive_constants(arm.robot)
     rng = np.random.default_rng(arm.seeds["sensing"])
     sizes, shape = noise_sizes(arm), samples.q.shape
@@ -184,7 +179,7 @@ def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
 
 
 def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tuple[int, ...]:
-    """Which sample each row of the log holds. The first and the last are always there."""
+    """Which sample each row of the log holds, first and last always."""
     lost = rng.random(count) < spec.dropped
     again = rng.random(count) < spec.repeated
     inner = np.arange(count) > 0
@@ -197,8 +192,7 @@ def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tupl
 def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
     """Evaluate the controller's nominal model along a run.
 
-    Its friction knows load and temperature, as the controllers' of Universal Robots do, and no
-    presliding.
+    As Universal Robots', its friction knows load and temperature, no presliding.
     """
     nominal: Robot = arm.true.nominal
     target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
@@ -233,8 +227,7 @@ def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
 def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
     """Wrench in sensor axes about the sensor's origin, as force ON the robot. (M, 6) [N, N·m]
 
-    It feels every contact on the flange, and weight and inertia of what is mounted beyond it; then
-    zero offset, drift and noise are added. None without a sensor.
+    Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without one.
     """
     spec = arm.scenario.force_sensor
     if spec is None:

@@ -50,7 +50,12 @@ class Mounted(NamedTuple):
     lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
 
 
-def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: float) -> Mounted:
+def mount(
+    spec: WrenchSpec,
+    chain: Chain,
+    rng: np.random.Generator,
+    duration: float,
+) -> Mounted:
     """Put a contact on its link."""
     if not 0 <= spec.link <= chain.joints:
         raise ParameterError(
@@ -64,7 +69,11 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
 
 
 def draw_walk(
-    spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
+    spec: RandomWalkSpec,
+    joints: int,
+    steps: int,
+    step: float,
+    rng: np.random.Generator,
 ) -> Array:
     """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
     if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:

@@ -254,8 +254,7 @@ def flange_pose(model: Any, q: Array) -> Any:  # noqa: ANN401 - Pinocchio is unt
 def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
     """Joint positions that bring the flange to a pose, from a nearby guess, or None. (n,) [rad]
 
-    Gauss–Newton on the error twist log(T⁻¹ T_d) with damping that vanishes with the error, so that
-    redundant arms move by the least joint motion.
+    Gauss–Newton on log(T⁻¹ T_d), damped as it errs: redundant arms move least.
     """
     import pinocchio as pin
 
@@ -268,7 +267,7 @@ def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
         if size < REACHED:
             return q
         J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
-        # Far away damping keeps steps short at singularities; near the goal it must not slow down.
+        # Damping keeps far steps short at singularities and must not slow near ones.
         damping = 1e-3 * min(size, 1.0) ** 2
         q = q + J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
     return None
@@ -281,7 +280,7 @@ def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str
     q, path = np.array(start, dtype=float), []
     for k, point in enumerate(points):
         found = reach(robot.model, pin.SE3(rotation, point), q)
-        # A jump of a radian is another branch of the inverse kinematics, not the path's next pose.
+        # A jump of a radian is another branch of the inverse kinematics.
         if found is None or np.max(np.abs(found - q)) > 1.0:
             x, y, z = point
             raise ParameterError(

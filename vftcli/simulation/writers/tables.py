@@ -158,7 +158,9 @@ def write_truth(path: Path, truth: Truth, start: float) -> None:
 
 
 def write_columns(
-    path: Path, columns: dict[str, Array], frames: Mapping[str, StatedFrame] | None = None
+    path: Path,
+    columns: dict[str, Array],
+    frames: Mapping[str, StatedFrame] | None = None,
 ) -> None:
     """Write named columns (M,) of doubles as one Parquet table; wrenches have these frames."""
     import polars as pl
