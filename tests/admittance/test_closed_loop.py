@@ -9,8 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.closed_loop import ClosedLoop, run_closed_loop
-from vftcli.admittance.latency import latencies
+from vftcli.admittance.closed_loop import ClosedLoop, latencies, run_closed_loop
 from vftcli.admittance.law import controllers, variable
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.parameters import from_table, parse_settings

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.admittance.latency import latencies
+from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import controllers
 from vftcli.admittance.parameters import from_table
 from vftcli.robots import load_robot

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.metrics import Drag, drags_of, overshoot, releases_of, return_time
-from vftcli.admittance.thresholds import Phases
+from vftcli.admittance.motion import Phases
 
 PERIOD = 0.1
 T = np.arange(101) * PERIOD

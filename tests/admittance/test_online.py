@@ -40,6 +40,5 @@ def test_the_first_sample_starts_at_no_torque() -> None:
     sensor = OnlineKalman(KFO, robot, 0.001, averaged=True)
     q, dq = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2]), np.full(6, 0.1)
     np.testing.assert_array_equal(sensor.sample(q, dq, np.full(6, 50.0)), np.zeros(6))
-    p, rest = sensor.terms(q, dq)
-    assert np.any(p != 0.0)
-    assert np.any(rest != 0.0)
+    assert np.any(sensor.p != 0.0)
+    assert np.any(sensor.mu != 0.0)

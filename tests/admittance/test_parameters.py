@@ -66,6 +66,7 @@ def test_which_assignments_are_ours() -> None:
         ("y.stiffness=-8", "admittance.stiffness of axis y is -8; it must be positive"),
         ("z.damping=-1", "admittance.damping of axis z is -1; it must be zero or positive"),
         ("rx.threshold=nan", "no admittance threshold for rx; give it in its"),
+        ("rotation.speed_limit=nan", "no admittance speed_limit for rx, ry, rz; give it in its"),
         ("position.hysteresis=1", "share of the threshold and must be below 1"),
         ("period=0", "the control period must be positive"),
         ("position.mass=1,2", "position.mass has 2 values; give one, or one for each of 3"),

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.joints import FlangeSolver, follow
-from vftcli.admittance.law import controllers, variable
+from vftcli.admittance.law import UnstableError, controllers, variable
 from vftcli.admittance.parameters import from_table, parse_settings
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
-from vftcli.admittance.stability import UnstableError
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
 from vftcli.signals.errors import ClockError, ParameterError

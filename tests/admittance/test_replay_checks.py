@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance import replay_checks as checks
+from vftcli.admittance import replay as checks
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import controllers
 from vftcli.admittance.metrics import Drag

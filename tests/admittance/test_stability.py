@@ -1,19 +1,23 @@
 """Stability before motion: the discrete condition and the escape bound, each in two ways."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from vftcli.admittance.law import controllers, traditional, variable
-from vftcli.admittance.motion import release
-from vftcli.admittance.parameters import Admittance, from_table
-from vftcli.admittance.stability import (
+from vftcli.admittance.law import (
     UnstableError,
     check_stable,
+    controllers,
     discrete_number,
     escape_factor,
     judge,
+    traditional,
+    variable,
 )
+from vftcli.admittance.motion import release
+from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.robots import PROFILES, load_robot
 
 
@@ -86,7 +90,7 @@ def test_escape_factors_of_the_science() -> None:
 
 
 def test_escape_bound_of_the_ur5() -> None:
-    verdict = judge(variable(profile("ur5").with_alpha(1.0)))
+    verdict = judge(variable(replace(profile("ur5"), alpha=1.0)))
     assert verdict.escape[0] == pytest.approx(0.616, abs=1e-3)  # printed digits
     assert verdict.escape[3] == pytest.approx(0.495, abs=1e-3)
 

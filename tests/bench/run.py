@@ -29,17 +29,19 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers import read
-from vftcli.reproduction.benchmark import (
+from vftcli.reproduction.timing import (
     FREE_SECONDS,
     SAMPLES,
+    SCRIPT_SAMPLES,
     TUNED,
     Timings,
     circle,
+    dense_kalman_loop,
     estimate_tuned,
+    first_order_loops,
     one_core,
     simd,
 )
-from vftcli.reproduction.timing import SCRIPT_SAMPLES, dense_kalman_loop, first_order_loops
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.reproduction.benchmark import Timings, benchmark, simd
+from vftcli.reproduction.timing import Timings, benchmark, simd
 
 
 def test_a_shortened_run_counts_in_full() -> None:

@@ -5,9 +5,9 @@ import pytest
 
 from vftcli.observers import KalmanObserver, MomentumObserver
 from vftcli.reproduction import timing
-from vftcli.reproduction.benchmark import circle
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED
 from vftcli.reproduction.timing import (
+    circle,
     dense_kalman_loop,
     first_order_loops,
     held_matrices,

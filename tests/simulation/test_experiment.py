@@ -13,8 +13,8 @@ from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
+from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
-from vftcli.simulation.mismatch import build_arm
 from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 
@@ -84,11 +84,11 @@ def test_same_seed_same_bytes_another_seed_another_log(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_true_torque_is_that_of_the_contacts(many: Simulation) -> None:
     """τ_ext = Σ Jᵢᵀ wᵢ from the truth's own columns, through Pinocchio's frame Jacobians."""
-    truth, model = many.truth, load_robot("panda").model
+    truth, samples, model = many.truth, many.samples, load_robot("panda").model
     place = pin.SE3(np.eye(3), np.array([0.05, 0.0, 0.02]))
     elbow = model.addFrame(pin.Frame("elbow", 4, place, pin.FrameType.OP_FRAME))
     data, axes = model.createData(), pin.LOCAL_WORLD_ALIGNED
-    for k, q in enumerate(truth.q):
+    for k, q in enumerate(samples.q):
         tip = pin.computeFrameJacobian(model, data, q, model.getFrameId("flange"), axes)
         link = pin.computeFrameJacobian(model, data, q, elbow, axes)
         there = tip.T @ truth.wrench[k] + link.T @ truth.contacts["elbow"][k]
@@ -110,10 +110,10 @@ def test_truth_closes_the_equation_of_motion() -> None:
     run = simulate(scenario, 2)
     rng = np.random.default_rng(np.random.SeedSequence(2).spawn(3)[0])
     model = build_arm(scenario, run.robot, rng).chain.to_pinocchio()
-    data, truth = model.createData(), run.truth
-    states = zip(truth.q, truth.dq, truth.ddq, strict=True)
+    data, samples = model.createData(), run.samples
+    states = zip(samples.q, samples.v, samples.a, strict=True)
     needed = np.array([pin.rnea(model, data, *state) for state in states])
-    gap = needed + truth.friction - truth.torque - truth.tau_ext
+    gap = needed + samples.friction - samples.tau - run.truth.tau_ext
     # the torque is that of the step before the sample, q̈ and friction the mean of both sides:
     # half a step's change of a torque that moves by up to 2 N·m a step while pushed
     assert np.all(rms(gap[10:-10]) < 0.3)
@@ -215,7 +215,7 @@ def test_pair_is_one_motion_with_and_without_the_payload() -> None:
     heavier = loaded.recording.require("current") - free.recording.require("current")
     assert np.max(np.abs(heavier[:, 1])) > 1.0
     # two sensors' noise, not one
-    assert np.any(loaded.recording.q - loaded.truth.q != free.recording.q - free.truth.q)
+    assert np.any(loaded.recording.q - loaded.samples.q != free.recording.q - free.samples.q)
 
 
 @pytest.mark.slow
@@ -226,7 +226,7 @@ def test_warming_joints_rub_less() -> None:
         simulate(load_scenario("ur5-circle", [*base, *more]), 1) for more in (drift[:1], drift)
     )
     late = cold.truth.t > 6.0
-    ratio = rms(warm.truth.friction[late]) / rms(cold.truth.friction[late])
+    ratio = rms(warm.samples.friction[late]) / rms(cold.samples.friction[late])
     # at 36 to 40 °C the law gives .82–.86 (size 3) and .73–.79 (size 1) of that at 25 °C
     assert np.all(ratio[[0, 1, 2, 3, 5]] < 0.9)
     np.testing.assert_allclose(warm.measured.temperature[[0, -1]], [[25.0] * 6, [40.0] * 6])
@@ -244,7 +244,7 @@ def test_bearing_weighs_what_it_should_and_the_arm_does_not_chatter() -> None:
     kinds = ("mass", "com", "friction", "torque_constant", "torque_offset")
     settings = [*(f"mismatch.{k}=0" for k in kinds), "friction.stribeck=0", "friction.sticking=0"]
     run = simulate(load_scenario("panda-bearing", settings), 1)
-    slip = np.max(np.abs(run.truth.dq - run.samples.target_dq), axis=0)
+    slip = np.max(np.abs(run.samples.v - run.samples.target_dq), axis=0)
     assert np.all(slip < 0.1), slip  # knocks shake the wrist by 0.05 rad/s
     log = run.recording
     tau = MomentumObserver(gain=30.0).estimate(dynamics_terms(log, run.robot)).tau

@@ -61,7 +61,7 @@ def test_a_share_of_the_sigmoid_can_stick():
     whole, part = (true_friction(robot, FrictionSpec(sticking=s)) for s in (0.0, 0.4))
     np.testing.assert_allclose(part.amplitude, 0.6 * whole.amplitude)
     np.testing.assert_allclose(part.coulomb, whole.coulomb + 0.2 * whole.amplitude)
-    assert whole.has_sigmoid
+    assert "amplitude" in whole.present
 
 
 def test_warmth_changes_all_but_the_offset():
@@ -129,7 +129,7 @@ def test_a_frictionless_arm_has_none():
     friction = true_friction(load_robot("panda"), FrictionSpec(enabled=False))
     torque, slope = friction.smooth(np.ones(7))
     assert not np.any([torque, slope, friction.dry(np.ones(7))])
-    assert not friction.has_sigmoid
+    assert "amplitude" not in friction.present
 
 
 def test_an_arm_without_friction_figures_has_those_stated():

@@ -6,9 +6,8 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.kinematics import (
+from vftcli.simulation.trajectories import (
     HOMES,
-    FlangePose,
     check_limits,
     check_start,
     flange_pose,
@@ -36,18 +35,18 @@ def test_a_pose_nearby_is_reached(name):
 def test_a_pose_out_of_reach_is_none():
     robot = load_robot("ur5")
     home = np.array(HOMES[6])
-    far = FlangePose(np.eye(3), np.array([2.0, 0.0, 0.0]))  # a UR5 reaches 0.85 m
-    assert reach(robot.model, far, home) is None
+    here, far = flange_pose(robot.model, home), np.array([2.0, 0.0, 0.0])  # a UR5 reaches 0.85 m
+    assert reach(robot.model, pin.SE3(np.eye(3), far), home) is None
     with pytest.raises(ParameterError, match=r"a line: the flange .* \(point 2 of 2\)"):
-        follow(robot, [flange_pose(robot.model, home), far], home, "a line")
+        follow(robot, here.rotation, np.array([here.translation, far]), home, "a line")
 
 
 def test_a_path_is_followed_without_changing_branch():
     robot = load_robot("ur5")
     home = np.array(HOMES[6])
     start = flange_pose(robot.model, home)
-    points = [start.translation + np.array([0.0, 0.01 * k, 0.0]) for k in range(10)]
-    path = follow(robot, [FlangePose(start.rotation, p) for p in points], home, "a line")
+    points = start.translation + np.outer(np.arange(10), [0.0, 0.01, 0.0])
+    path = follow(robot, start.rotation, points, home, "a line")
     np.testing.assert_allclose(path[0], home, atol=1e-9)
     assert np.max(np.abs(np.diff(path, axis=0))) < 0.05  # 1 cm at half a metre, and a wrist
     np.testing.assert_allclose(flange_pose(robot.model, path[-1]).translation, points[-1])

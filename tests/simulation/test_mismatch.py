@@ -6,7 +6,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.mismatch import build_arm, deviate, perturbed_friction
+from vftcli.simulation.arm import build_arm, deviate, perturbed_friction
 from vftcli.simulation.scenario import MismatchSpec
 
 UR5 = load_robot("ur5")

@@ -7,10 +7,18 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.calibration_motions import JointwiseSpec, PosesSpec
-from vftcli.simulation.kinematics import check_limits, flange_pose
 from vftcli.simulation.motion import Command
-from vftcli.simulation.trajectories import CircleSpec, HoldSpec, JointMovesSpec, OffsetsSpec, plan
+from vftcli.simulation.trajectories import (
+    CircleSpec,
+    HoldSpec,
+    JointMovesSpec,
+    JointwiseSpec,
+    OffsetsSpec,
+    PosesSpec,
+    check_limits,
+    flange_pose,
+    plan,
+)
 
 SPECS = [
     CircleSpec(towards=-1.5),

@@ -11,9 +11,8 @@ from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.friction import TrueFriction, true_friction
-from vftcli.simulation.plant import Plant
+from vftcli.simulation.plant import Plant, gauss_seidel, slide_or_stick
 from vftcli.simulation.scenario import FrictionSpec
-from vftcli.simulation.stiction import gauss_seidel, slide_or_stick
 
 
 def frictionless(robot: Robot) -> TrueFriction:

@@ -6,8 +6,15 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.pushes import STYLES, LoadSpec, Place, ProfileSpec, PushesSpec
-from vftcli.simulation.springs import HandSpec, StopSpec
+from vftcli.simulation.contacts import (
+    STYLES,
+    HandSpec,
+    LoadSpec,
+    Place,
+    ProfileSpec,
+    PushesSpec,
+    StopSpec,
+)
 from vftcli.simulation.touch import RandomWalkSpec, draw_walk
 
 HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))
@@ -85,7 +92,7 @@ def test_stop_pushes_and_never_pulls() -> None:
 def test_random_walk_gains_its_intensity() -> None:
     walk = draw_walk(RandomWalkSpec(name="w", intensity=(4.0,)), 500, 1000, 1e-3, rng())
     # variance of 500 walks after 1 s: 4 (N·m)², good to 2·4/√1000 = 0.25 (one sigma)
-    assert np.var(walk.torque[-1]) == pytest.approx(4.0, abs=1.0)
+    assert np.var(walk[-1]) == pytest.approx(4.0, abs=1.0)
 
 
 @pytest.mark.parametrize(
@@ -96,7 +103,7 @@ def test_random_walk_gains_its_intensity() -> None:
         (LoadSpec(name="l", weight=-1.0, spans=()), "negative"),
         (StopSpec(name="s", through=(0, 0, 0), normal=(0, 0, 0)), "no length"),
         (HandSpec(name="h", spans=((0, 1),), moves=((0, 0, 0), (0, 0, 0))), "one for each"),
-        (ProfileSpec(name="p", spans=(), axes="tool"), "There is base, link"),
+        (ProfileSpec(name="p", spans=(), axes="tool"), "there is base, link"),
     ],
 )
 def test_impossible_contacts_are_refused(spec: object, words: str) -> None:

@@ -9,9 +9,8 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.simulation import load_scenario, scenario_names, simulate
-from vftcli.simulation.load import to_toml
+from vftcli.simulation.load import section_from, to_toml
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import section_from
 from vftcli.simulation.trajectories import plan
 
 NAMES = (
@@ -85,7 +84,7 @@ def test_twists_exceed_the_threshold() -> None:
     ("overrides", "words"),
     [
         (["servo.stifness=soft"], "Did you mean stiffness"),
-        (["servo.stiffness=hard"], "There is stiff, soft"),
+        (["servo.stiffness=hard"], "there is stiff, soft"),
         (["sensor.rate=3"], "no scenario key 'sensor'"),
         (["contacts.hnd.style=taps"], "Did you mean hand"),
         (["contacts.hand.kind=push"], "Did you mean pushes"),
@@ -97,6 +96,7 @@ def test_twists_exceed_the_threshold() -> None:
         (["duration"], "is not key=value"),
         (["servo=3"], "must be a section"),
         (["title.x=3"], "is a value, not a section"),
+        (["contacts.hand=3"], "contacts is a value, not a section"),
     ],
 )
 def test_wrong_keys_are_named(overrides: list[str], words: str) -> None:
@@ -130,7 +130,7 @@ def test_impossible_experiments_are_refused(overrides: list[str], words: str) ->
 
 
 def test_unknown_scenario_lists_them() -> None:
-    with pytest.raises(ParameterError, match=r"Did you mean ur5-circle\?.*panda-bearing"):
+    with pytest.raises(ParameterError, match=r"panda-bearing.*Did you mean ur5-circle\?"):
         load_scenario("ur5-cirle")
 
 

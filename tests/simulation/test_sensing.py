@@ -18,11 +18,11 @@ def circle(*settings: str) -> Simulation:
 @pytest.mark.slow
 def test_everything_off_is_the_true_state() -> None:
     run = circle(*CLEAN, "sensing.torque=instant", "mismatch.torque_constant=0")
-    np.testing.assert_allclose(run.recording.q, run.truth.q, atol=1e-15)
-    np.testing.assert_allclose(run.recording.require("dq"), run.truth.dq, atol=1e-15)
+    np.testing.assert_allclose(run.recording.q, run.samples.q, atol=1e-15)
+    np.testing.assert_allclose(run.recording.require("dq"), run.samples.v, atol=1e-15)
     constant = run.robot.torque_constant
     torque = run.recording.require("current") * constant
-    np.testing.assert_allclose(torque, run.truth.torque, atol=1e-12)
+    np.testing.assert_allclose(torque, run.samples.tau, atol=1e-12)
     np.testing.assert_allclose(np.diff(run.recording.t), 0.008, atol=1e-12)
 
 
@@ -30,8 +30,8 @@ def test_everything_off_is_the_true_state() -> None:
 def test_average_torque_is_the_mean_over_the_interval() -> None:
     fine = circle(*CLEAN, "sensing.rate=1000", "sensing.torque=instant")
     mean = circle(*CLEAN, "sensing.torque=average")
-    steps = fine.truth.torque[1:].reshape(-1, 8, 6).mean(axis=1)
-    np.testing.assert_allclose(mean.truth.torque[1:], steps, atol=1e-9)
+    steps = fine.samples.tau[1:].reshape(-1, 8, 6).mean(axis=1)
+    np.testing.assert_allclose(mean.samples.tau[1:], steps, atol=1e-9)
 
 
 @pytest.mark.slow
@@ -39,7 +39,7 @@ def test_noise_has_the_profile_size() -> None:
     run = circle("duration=20.0", "sensing.position_step=0")
     noise = run.robot.noise
     # 2501 samples: the estimate of a standard deviation is good to 1.4 % (one sigma)
-    spread = np.std(run.recording.q - run.truth.q, axis=0)
+    spread = np.std(run.recording.q - run.samples.q, axis=0)
     np.testing.assert_allclose(spread, noise.q, rtol=0.07)
     quiet = circle("duration=20.0", "sensing.noise=0")
     currents = run.recording.require("current") - quiet.recording.require("current")

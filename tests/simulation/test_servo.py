@@ -54,15 +54,15 @@ def test_torque_and_positions_stay_inside_the_limits():
     assert np.any(np.abs(tau) == ROBOT.limits.tau_max)
     free = Servo(ServoSpec(torque_limits=False), ROBOT, 1e-3)
     assert np.all(np.isinf(free.limit))
-    far = np.full(6, 100.0)
-    np.testing.assert_array_equal(servo.clip_to_limits(far), np.minimum(far, ROBOT.limits.q_max))
-    np.testing.assert_array_equal(servo.clip_to_limits(-far), np.maximum(-far, ROBOT.limits.q_min))
+    np.testing.assert_array_equal(
+        [servo.q_min, servo.q_max], [ROBOT.limits.q_min, ROBOT.limits.q_max]
+    )
 
 
 @pytest.mark.parametrize(
     ("spec", "step", "words"),
     [
-        (ServoSpec(stiffness="hard"), 1e-3, "There is stiff, soft"),
+        (ServoSpec(stiffness="hard"), 1e-3, "there is stiff, soft"),
         (ServoSpec(stiffness=0.0), 1e-3, "must be positive"),
         (ServoSpec(damping=-0.1), 1e-3, "must be positive and damping not negative"),
         (ServoSpec(stiffness=401.0), 1e-3, "chatters at a step of 0.001 s; it can be at most 400"),

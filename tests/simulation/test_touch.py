@@ -9,10 +9,10 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario, simulate
-from vftcli.simulation.pushes import ProfileSpec
+from vftcli.simulation.contacts import ProfileSpec
+from vftcli.simulation.experiment import at_other_point
+from vftcli.simulation.sensing import first_order_low_pass
 from vftcli.simulation.touch import RandomWalkSpec, Touching, cross
-from vftcli.simulation.truth import at_other_point
-from vftcli.simulation.vendor import first_order_low_pass
 
 ROBOT = load_robot("ur5")
 FORCE, MOMENT, POINT = (3.0, -4.0, 12.0), (0.5, 0.2, -0.3), (0.02, 0.05, 0.1)
@@ -82,7 +82,7 @@ def test_links_that_are_not_there_are_refused(link):
 def test_walks_begin_at_zero_when_they_begin():
     spec = RandomWalkSpec(name="w", intensity=(4.0,), begin=0.05)
     touching = Touching((spec,), ROBOT.chain, 20, 0.01, np.random.SeedSequence(1))
-    walk = touching.walks[0].torque
+    walk = touching.walks["w"]
     assert not walk[:6].any()
     assert walk[6:].all()
     assert touching.anything(0.0)  # a walk acts all the time, if only with zero

@@ -100,7 +100,11 @@ class ReleaseChoice:
 
     @classmethod
     def parsed(
-        cls, *, release: Sequence[str], start: str | None = None, duration: float | None = None
+        cls,
+        *,
+        release: Sequence[str],
+        start: str | None = None,
+        duration: float | None = None,
     ) -> "ReleaseChoice":
         """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state."""
         return cls(

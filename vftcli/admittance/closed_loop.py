@@ -1,24 +1,23 @@
 """The whole loop in simulation: hand, arm and servo, sensing, observer, Algorithm 1, joints, servo.
 
-The arm is the simulator's, with its contacts, friction and mismatch; the controller sees what a log
-would hold: positions and velocities with noise, and the drive torque averaged over the sampling
-interval (or its last instant). Between two control periods the servo holds the last command.
+The arm is the simulator's; the controller sees what a log would hold, noise and all. Between two
+control periods the servo holds the last command. Latencies are from the true force, and as Figs 6
+and 9 time them: from detection to motion, and from the estimate's fall to the turn.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver
-from vftcli.admittance.law import Controller
-from vftcli.admittance.motion import Recursion
+from vftcli.admittance.law import Controller, check_stable
+from vftcli.admittance.motion import Recursion, entering_force
 from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
-from vftcli.admittance.stability import check_stable
-from vftcli.admittance.thresholds import entering_force
 from vftcli.observers.paper import KalmanObserver
+from vftcli.robots import load_robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
@@ -28,9 +27,15 @@ from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.sensing import known_noise, log_rate
+from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
+from vftcli.simulation.trajectories import plan
 
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
+STARTED = 5e-3  #: Displacement of the flange at which it is said to have moved. [m]
+TURNED = 0.02  #: Rotation of the flange at which it is said to have turned. [rad]
+#: Speeds below which the flange counts as at rest when a force comes. [m/s, rad/s]
+STILL = (0.005, 0.05)
+REST = 1.0  #: A contact begins where the force had been below the threshold for this long. [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,91 +66,71 @@ class ClosedLoop:
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
-class Row(NamedTuple):
-    """What the loop writes down of one control period; see `ClosedLoop`."""
-
-    t: float
-    estimate: Array
-    dragged: Mask
-    commanded: Array
-    q: Array
-    reached: bool
-
-
-class Sensors:
-    """What the arm's controller measures, noise and all.
+class Loop:
+    """The controller's side of the loop: sensors, observer, phases, law, inverse kinematics.
 
     Attributes:
         interval: Sampling interval. [s]
     """
 
-    def __init__(self, arm: Arm, torque: str) -> None:
-        robot, spec = arm.robot, arm.scenario.sensing
-        self.arm, self.torque = arm, torque
-        self.interval = 1.0 / log_rate(spec, robot)
-        self.rng = np.random.default_rng(arm.seeds["sensing"])
-        self.q_noise = spec.noise * known_noise(robot.noise.q)
-        self.dq_noise = spec.noise * known_noise(robot.noise.qd)
-        if robot.torque_source == "current" and robot.torque_constant is not None:
-            current = spec.noise * known_noise(robot.noise.current)
-            if spec.current_noise is not None:
-                current = np.full(robot.joints, spec.current_noise)
-            self.torque_noise = current * robot.torque_constant
-        else:
-            self.torque_noise = spec.noise * known_noise(robot.noise.tau)
-        self.grain = spec.position_step
-
-    def read(self) -> tuple[Array, Array, Array]:
-        """Positions, velocities and drive torques now. (n,) each [rad, rad/s, N·m]"""
-        arm, n = self.arm, self.arm.robot.joints
-        q = arm.q + self.q_noise * self.rng.standard_normal(n)
-        if self.grain > 0:
-            q = np.round(q / self.grain) * self.grain
-        dq = arm.v + self.dq_noise * self.rng.standard_normal(n)
-        span = self.interval if self.torque == "average" else arm.scenario.step
-        return q, dq, arm.mean_torque(span) + self.torque_noise * self.rng.standard_normal(n)
-
-
-class Loop:
-    """The controller's side of the loop: observer, phases, law, inverse kinematics."""
-
     def __init__(
-        self, arm: Arm, controller: Controller, observer: KalmanObserver, sensors: Sensors
+        self,
+        arm: Arm,
+        controller: Controller,
+        observer: KalmanObserver,
+        torque: str,
     ) -> None:
-        self.arm, self.controller, self.sensors = arm, controller, sensors
-        averaged = sensors.torque == "average"
-        self.sensor = OnlineKalman(observer, arm.true.nominal, sensors.interval, averaged=averaged)
-        self.solver = FlangeSolver(arm.true.nominal)
+        self.arm, self.controller = arm, controller
+        nominal, self.interval = arm.true.nominal, 1.0 / log_rate(arm.scenario.sensing, arm.robot)
+        averaged = torque == "average"
+        self.span = self.interval if averaged else arm.scenario.step
+        self.rng = np.random.default_rng(arm.seeds["sensing"])
+        q_noise, dq_noise, effort_noise = noise_sizes(arm)
+        K = drive_constants(arm.robot)
+        self.noise = q_noise, dq_noise, effort_noise if K is None else effort_noise * K
+        self.sensor = OnlineKalman(observer, nominal, self.interval, averaged=averaged)
+        self.solver = FlangeSolver(nominal)
         self.start = self.solver.check_start(arm.q.copy())
         self.rotation, self.translation = self.solver.pose(self.start)
         self.law = Recursion([controller])
         self.dragged = np.zeros(6, dtype=bool)
-        self.q_measured = self.start
-        self.q_command, self.q_before = self.start, self.start
-        speed = arm.robot.limits.qd_max
-        self.reach_step = np.where(np.isfinite(speed), speed, np.inf) * controller.parameters.period
+        self.q_measured = self.q_command = self.q_before = self.start
+        speed = np.fmin(arm.robot.limits.qd_max, np.inf)
+        self.reach_step = speed * controller.parameters.period
         self.reached = True
         self.zeros: list[Array] = []
         self.zero = np.zeros(6)
 
     def sample(self) -> None:
-        """Read the sensors and run the observer."""
-        self.q_measured, dq, torque = self.sensors.read()
-        self.sensor.sample(self.q_measured, dq, torque)
+        """Read positions, velocities and drive torques, noise and all, and run the observer."""
+        arm = self.arm
+        q, dq, torque = (size * self.rng.standard_normal(len(size)) for size in self.noise)
+        self.q_measured = rounded(arm.q + q, arm.scenario.sensing.position_step)
+        self.sensor.sample(self.q_measured, arm.v + dq, arm.mean_torque(self.span) + torque)
 
-    def rest(self, counts: bool) -> Array:
-        """Before the zero is known: hold still, and average the wrench if this instant counts."""
-        wrench = self.sensor.wrench(self.q_measured)
-        if counts:
+    def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
+        """What happens in a control period: Algorithm 1, or rest until the zero's span is over."""
+        t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
+        # A controller that followed its own drift would never find the zero of a still arm.
+        waits = zero is not None and t <= zero[1]
+        if zero is not None and waits and t >= zero[0]:
             self.zeros.append(wrench)
             self.zero = np.mean(self.zeros, axis=0)
-        return wrench - self.zero
+        wrench = wrench - self.zero
+        if not waits:
+            self.control(wrench)
+        return {
+            "t": t,
+            "estimate": wrench,
+            "dragged": self.dragged.copy(),
+            "commanded": self.law.x[0].copy(),
+            "q": self.arm.q.copy(),
+            "reached": self.reached,
+        }
 
-    def control(self) -> Array:
-        """One control period of Algorithm 1; returns the wrench it acted on. (6,) [N, N·m]"""
-        p = self.controller.parameters
-        wrench = self.sensor.wrench(self.q_measured) - self.zero
-        size = np.abs(wrench)
+    def control(self, wrench: Array) -> None:
+        """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
+        p, size = self.controller.parameters, np.abs(wrench)
         release = p.threshold * (1.0 - np.asarray(p.hysteresis))
         self.dragged = (size > p.threshold) | (self.dragged & (size > release))
         x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
@@ -156,7 +141,6 @@ class Loop:
         else:  # out of reach or too fast for a joint: wait at rest, as at a wall
             self.law.x, self.law.v, self.law.turn = x, 0.0 * v, turn
             self.q_before = self.q_command
-        return wrench
 
     def solve(self, x: Array) -> tuple[Array, bool]:
         """Joint positions for a deviation (6,) [m, rad], inside the joints' limits and speeds."""
@@ -192,8 +176,7 @@ def run_closed_loop(
 ) -> ClosedLoop:
     """Run a scenario's contacts against an arm under admittance control.
 
-    The scenario's own trajectory is not followed: the arm starts where it starts, and where it goes
-    is the controller's doing.
+    The arm starts where the trajectory does; where it goes is the controller's doing.
 
     Args:
         scenario: The experiment: arm, contacts, friction, mismatch, sensing.
@@ -201,50 +184,44 @@ def run_closed_loop(
         observer: The Kalman filter of the virtual sensor.
         seed: Seed of everything drawn; the scenario's own if not given.
         torque: "average" over the sampling interval, or the last "instant".
-        zero: Unloaded span whose mean wrench is removed; the controller holds still until it ends.
-            None removes nothing. [s]
+        zero: Unloaded span, None for none: the arm holds still, its mean wrench is removed. [s]
         force_unstable: Run unstable settings too.
         progress: Told how far the run is.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")
     check_stable([controller], force_unstable=force_unstable)
-    arm = still_arm(scenario, controller.parameters.period, seed)
-    sensors = Sensors(arm, torque)
-    loop = Loop(arm, controller, observer, sensors)
-    log: list[Row] = []
-    every_sample = steps_in(sensors.interval, arm.scenario.step, "sampling interval")
-    every_control = steps_in(controller.parameters.period, arm.scenario.step, "control period")
-    forward = arm.servo.feed_forward(loop.reference)[0]
+    period = controller.parameters.period
+    arm = still_arm(scenario, period, seed)
+    loop, log = Loop(arm, controller, observer, torque), list[dict[str, Any]]()
+    every_sample = steps_in(loop.interval, arm.scenario.step, "sampling interval")
+    every_control = steps_in(period, arm.scenario.step, "control period")
     for k in range(arm.steps):
         if k % every_sample == 0:
             loop.sample()
         if k % every_control == 0:
-            log.append(act(loop, zero))
-            forward = arm.servo.feed_forward(loop.reference)[0]
-            x, fastest = loop.law.x[0], np.max(np.abs(loop.arm.v))
+            log.append(loop.act(zero))
+            reference = loop.reference
+            forward = arm.servo.feed_forward(reference)[0]
+            x, fastest = loop.law.x[0], np.max(np.abs(arm.v))
             near = np.all(np.isfinite(x)) and np.linalg.norm(x[:3]) <= FARTHEST
             if not near or fastest > 50.0:  # the arm has run away
                 break
             if progress is not None:
                 progress(k, arm.steps)
-        reference = loop.reference
         arm.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
     return closed_loop_of(loop, log, zero)
 
 
 def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
     """The scenario's arm at rest at its start, with an inner step that divides the period."""
-    from vftcli.robots import load_robot
-    from vftcli.simulation.trajectories import plan
-
     robot = load_robot(scenario.robot)
     divided = abs(period / scenario.step - round(period / scenario.step)) < 1e-9
     inner = scenario.step if divided else period / np.ceil(period / scenario.step + 2)
     scenario = replace(scenario, step=float(inner))
     duration = scenario.duration or scenario.trajectory.motion(robot).duration
-    start = plan(scenario.trajectory, robot, np.array([0.0]))
-    still = Reference(start.q[:1], 0.0 * start.dq[:1], 0.0 * start.ddq[:1])
+    q = plan(scenario.trajectory, robot, np.array([0.0])).q
+    still = Reference(q, 0.0 * q, 0.0 * q)
     return Arm(scenario, scenario.seed if seed is None else seed, still, duration)
 
 
@@ -259,26 +236,17 @@ def steps_in(interval: float, step: float, what: str) -> int:
     return count
 
 
-def act(loop: Loop, zero: tuple[float, float] | None) -> Row:
-    """Act once, or wait until the span of the zero is over, and write down what happened."""
-    t = loop.arm.t
-    # A controller that followed its own drift would never find the zero of a still arm.
-    waits = zero is not None and t <= zero[1]
-    wrench = loop.rest(counts=zero is not None and t >= zero[0]) if waits else loop.control()
-    commanded, q = loop.law.x[0].copy(), loop.arm.q.copy()
-    return Row(t, wrench, loop.dragged.copy(), commanded, q, loop.reached)
-
-
-def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | None) -> ClosedLoop:
+def closed_loop_of(
+    loop: Loop, log: Sequence[dict[str, Any]], zero: tuple[float, float] | None
+) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
     arm = loop.arm
-    columns = dict(zip(Row._fields, map(np.array, zip(*log, strict=True)), strict=True))
+    columns = {name: np.array([row[name] for row in log]) for name in log[0]}
     t = columns["t"]
-    simulation = observe(arm) if arm.made == arm.steps else None
-    truth = np.full((len(t), 6), np.nan)
-    if simulation is not None:
-        seen = simulation.truth
-        truth = resample_columns(t, seen.t, seen.wrench)
+    simulation, truth = None, np.full((len(t), 6), np.nan)
+    if arm.made == arm.steps:
+        simulation = observe(arm)
+        truth = resample_columns(t, simulation.truth.t, simulation.truth.wrench)
     if zero is not None:
         columns["estimate"][t < zero[0]] = np.nan
     return ClosedLoop(
@@ -289,3 +257,78 @@ def closed_loop_of(loop: Loop, log: Sequence[Row], zero: tuple[float, float] | N
         simulation=simulation,
         **columns,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Latency:
+    """One application of a force, all in seconds; None where it did not happen."""
+
+    axis: int  #: Index of the axis whose true force is the first to pass its threshold.
+    force: float  #: When it passes.
+    detection: float | None  #: Time from then until the estimate passes it.
+    #: Time from `force` until the flange has moved by `STARTED` (or `TURNED`).
+    motion: float | None
+    #: Time from the true force's fall below the threshold to the estimate's.
+    withdrawal: float | None
+    #: Time from detection until the flange has moved by as much from where it was then.
+    reaction: float | None
+    #: Time from the estimate's fall below the threshold until the flange goes no farther.
+    turn: float | None
+    #: Whether the flange was at rest when the force came, without which `motion` says nothing.
+    rested: bool
+
+
+def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
+    """One entry for each application of a force above a threshold."""
+    threshold = run.controller.parameters.threshold
+    above = np.any(np.abs(run.truth) > threshold, axis=1)
+    period = run.controller.parameters.period
+    quiet = max(round(REST / period), 1)
+    found, last = [], -quiet
+    for k in np.flatnonzero(above).tolist():
+        if k - last >= quiet:
+            found.append(latency_of(run, k, threshold))
+        last = k
+    return tuple(found)
+
+
+def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
+    """The latencies of the contact whose force first passes a threshold in row `k`."""
+    axis = int(np.argmax(np.abs(run.truth[k]) / threshold))
+    limit, t = threshold[axis], run.t
+    felt, there = np.abs(run.estimate[:, axis]) > limit, np.abs(run.truth[:, axis]) > limit
+    part = slice(0, 3) if axis < 3 else slice(3, 6)
+    start = STARTED if axis < 3 else TURNED
+
+    def far(since: int) -> Mask:
+        way = np.linalg.norm(run.moved[:, part] - run.moved[since, part], axis=1)
+        return np.asarray(way > start)
+
+    before = run.moved[max(k - 3, 0) : k + 1, part]
+    speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
+    seen, ends = first_true(felt, k), first_true(~there, k)
+    lost = None if ends is None else first_true(~felt, ends)
+    out = np.linalg.norm(run.moved[:, part], axis=1)
+    turned = np.append(np.diff(out) <= 0.0, False)
+    return Latency(
+        axis=axis,
+        force=float(t[k]),
+        detection=time_until(felt, k, t),
+        motion=time_until(far(k), k, t),
+        withdrawal=None if ends is None else time_until(~felt, ends, t),
+        reaction=None if seen is None else time_until(far(seen), seen, t),
+        turn=None if lost is None else time_until(turned, lost, t),
+        rested=bool(speed < STILL[0 if axis < 3 else 1]),
+    )
+
+
+def first_true(flags: Mask, start: int) -> int | None:
+    """First row from `start` on that is set, or None."""
+    found = np.flatnonzero(flags[start:])
+    return start + int(found[0]) if found.size else None
+
+
+def time_until(flags: Mask, start: int, t: Array) -> float | None:
+    """Time from row `start` to the first row from there on that is set, or None. [s]"""
+    row = first_true(flags, start)
+    return None if row is None else float(t[row] - t[start])

@@ -41,9 +41,8 @@ class FlangeSolver:
         self.model: Any = robot.model
         self.data: Any = self.model.createData()
         self.frame = self.model.getFrameId("flange")
-        limits = robot.limits
-        self.lower = np.where(np.isfinite(limits.q_min), limits.q_min, -np.inf)
-        self.upper = np.where(np.isfinite(limits.q_max), limits.q_max, np.inf)
+        self.lower = np.fmax(robot.limits.q_min, -np.inf)
+        self.upper = np.fmin(robot.limits.q_max, np.inf)
 
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
@@ -108,50 +107,36 @@ class JointPath:
 
 
 def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> JointPath:
-    """Joint positions for flange deviations from a start pose.
+    """Joint positions for flange deviations (T, N, 6) [m, rad] from a start pose (n,) [rad].
 
-    Args:
-        solver: The arm's.
-        start: Joint positions of the target pose X_d. (n,) [rad]
-        x: Deviations in base axes, rotation vectors last. (T, N, 6) [m, rad]
-        period: Time between rows. [s]
+    Deviations are in base axes, rotation vectors last, a `period` [s] apart.
     """
     rotation, translation = solver.pose(start)
-    samples, count = x.shape[:2]
-    q = np.empty((samples, count, solver.robot.joints))
-    reached = np.zeros((samples, count), dtype=bool)
-    for i in range(count):
-        goals = exp_matrix(x[:, i, 3:]) @ rotation
-        points = translation + x[:, i, :3]
-        same = np.zeros(samples, dtype=bool)
-        same[1:] = np.all(x[1:, i] == x[:-1, i], axis=1)
-        fill_path(solver, start, (goals, points, same), q[:, i], reached[:, i])
+    q, reached = np.empty((*x.shape[:2], len(start))), np.zeros(x.shape[:2], dtype=bool)
+    for i in range(x.shape[1]):
+        goals, points = exp_matrix(x[:, i, 3:]) @ rotation, translation + x[:, i, :3]
+        same = np.all(x[1:, i] == x[:-1, i], axis=1)
+        shown, last, before, good = start, start, start, True
+        for k, (goal, point) in enumerate(zip(goals, points, strict=True)):
+            if k and same[k - 1]:
+                before = last
+            else:
+                # Straight on from the two poses before: the arm moves evenly between periods.
+                found, good = try_pose(
+                    solver, goal, point, 2.0 * last - before if good else last, last
+                )
+                last, before = found, last if good else found
+                shown = found if good else shown
+            q[k, i], reached[k, i] = shown, good
     return JointPath(q=q, reached=reached, speed=largest_speed(solver.robot, q, reached, period))
 
 
-def fill_path(
-    solver: FlangeSolver,
-    start: Array,
-    goals: tuple[Array, Array, Mask],
-    q: Array,
-    reached: Mask,
-) -> None:
-    """Fill in one controller's joint positions (T, n), each guessed from the two before it."""
-    shown, last, before, good = start, start, start, True
-    for k, (rotation, point, same) in enumerate(zip(*goals, strict=True)):
-        if not same:
-            # Straight on from the two poses before: the arm moves evenly from period to period.
-            guess = 2.0 * last - before if good else last
-            found, good = try_pose(solver, rotation, point, guess, last)
-            last, before = found, last if good else found
-            shown = found if good else shown
-        else:
-            before = last
-        q[k], reached[k] = shown, good
-
-
 def try_pose(
-    solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
+    solver: FlangeSolver,
+    rotation: Array,
+    point: Array,
+    guess: Array,
+    last: Array,
 ) -> tuple[Array, bool]:
     """Reach a pose from a guess, and if that fails or leaps, from the joints before it."""
     if not np.all(np.isfinite(point)):

@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.motion import AxisMotion
+from vftcli.admittance.motion import AxisMotion, Phases
 from vftcli.admittance.parameters import AXES
-from vftcli.admittance.thresholds import Phases
 from vftcli.signals.arrays import Array
 from vftcli.signals.intervals import runs_of
 
@@ -55,15 +54,16 @@ def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
 
 
 def rows_of(
-    controllers: Sequence[Controller], motion: AxisMotion, drags: Sequence[Drag], wrench: Array
+    controllers: Sequence[Controller],
+    motion: AxisMotion,
+    drags: Sequence[Drag],
+    wrench: Array,
 ) -> list[dict[str, Any]]:
     """The comparison as rows, one for each controller, axis and drag.
 
-    Times are in seconds: `start_s` and `release_s` on the motion's clock, `time_to_peak_s` and
-    `idle_s` from the start of the drag, the return times from the release. `overshoot` is the
-    largest deviation to the other side after the release, as a share of that at the release.
-    `work_J` is the work of the hand's force during the drag phase. What does not happen before the
-    record ends or the next drag begins is None.
+    `start_s` and `release_s` are on the motion's clock, `time_to_peak_s` and `idle_s` from the
+    drag's start, return times from its release [s]; `work_J` is the hand's in the drag phase. What
+    does not happen before the record ends or the next drag begins is None.
     """
     rows = [
         row_of(controller, motion, n, drag, wrench)
@@ -82,7 +82,11 @@ def rows_of(
 
 
 def row_of(
-    controller: Controller, motion: AxisMotion, n: int, drag: Drag, wrench: Array
+    controller: Controller,
+    motion: AxisMotion,
+    n: int,
+    drag: Drag,
+    wrench: Array,
 ) -> dict[str, Any]:
     """One controller's figures for one drag of one axis."""
     axis, t = drag.axis, motion.t

@@ -1,14 +1,58 @@
-"""Algorithm 1's recursion (48)–(51): many controllers, or many releases, side by side."""
+"""Algorithm 1: an axis is dragged or recovers, what force enters, and the recursion (48)–(51)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.admittance.law import Controller
+from vftcli.admittance.parameters import Admittance
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product
+
+
+class Phases(NamedTuple):
+    """Algorithm 1's phases along a force record."""
+
+    dragged: Mask  #: Whether each axis is in the drag phase. (T, 6)
+    force: Array  #: Force and moment that enter the law, see `entering_force`. (T, 6) [N, N·m]
+
+
+def phases(wrench: Array, parameters: Admittance) -> Phases:
+    """Split a record (T, 6) [N, N·m] into drag and recovery phases, axis by axis.
+
+    An axis is dragged from |F_i| > F_tsd,i until |F_i| ≤ (1 − hysteresis) F_tsd,i. An unknown (NaN)
+    force counts as none.
+    """
+    wrench = np.nan_to_num(wrench, nan=0.0)
+    size = np.abs(wrench)
+    release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
+    dragged = held(size > parameters.threshold, size <= release)
+    return Phases(dragged, entering_force(wrench, dragged, parameters))
+
+
+def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Array:
+    """The force that enters (49), by the threshold's mode. (…, 6) [N, N·m]
+
+    "hard" passes the whole force of a dragged axis, "soft" F − F_tsd·sign(F), which starts from
+    zero; an axis that recovers has none. "literal" is Algorithm 1 as printed: all always enters.
+    """
+    if parameters.threshold_mode == "literal":
+        return wrench
+    soft = parameters.threshold_mode == "soft"
+    over = np.abs(wrench) - (parameters.threshold if soft else 0.0)
+    return np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0)
+
+
+def held(on: Mask, off: Mask) -> Mask:
+    """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
+    # The last row at which anything was switched tells the state: no loop over samples.
+    rows = np.arange(len(on))[:, None]
+    last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
+    state = np.take_along_axis(on, np.maximum(last, 0), axis=0)
+    return np.where(last >= 0, state, False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,8 +71,7 @@ class AxisMotion:
     @property
     def escaped(self) -> Mask:
         """Controllers whose motion left the finite numbers: finite-time escape. (N,)"""
-        found: Mask = ~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2))
-        return found
+        return np.asarray(~np.all(np.isfinite(self.x) & np.isfinite(self.v), axis=(0, 2)))
 
 
 class Recursion:
@@ -41,7 +84,10 @@ class Recursion:
     """
 
     def __init__(
-        self, controllers: Sequence[Controller], x: Array | None = None, v: Array | None = None
+        self,
+        controllers: Sequence[Controller],
+        x: Array | None = None,
+        v: Array | None = None,
     ) -> None:
         """Start at deviations `x` with velocities `v`, (N, 6) or (6,), zero if not given."""
         if not controllers:
@@ -66,12 +112,7 @@ class Recursion:
         self.turns = bool(np.any(self.x[:, 3:]) or np.any(self.v[:, 3:]))
 
     def step(self, force: Array, dragged: Mask) -> None:
-        """Move one control period on under the force that enters the law.
-
-        Args:
-            force: Force and moment that enter the law. (6,) [N, N·m]
-            dragged: Which axes are in the drag phase. (6,)
-        """
+        """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
         x, v, period = self.x, self.v, self.period
         swell = np.exp(np.abs(v) * self.rate)
         swell *= self.alpha
@@ -124,7 +165,10 @@ def run(
 
 
 def release(
-    controllers: Sequence[Controller], x: Array, duration: float, v: Array | None = None
+    controllers: Sequence[Controller],
+    x: Array,
+    duration: float,
+    v: Array | None = None,
 ) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))

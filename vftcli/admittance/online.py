@@ -8,28 +8,30 @@ from vftcli.observers.paper import KalmanObserver
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array
-from vftcli.signals.packages import needed
 from vftcli.virtual_sensor.solvers import wrench_of
 
 
 class OnlineKalman:
     """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
 
-    A drive torque that is the mean over the sampling interval is what the momentum has gained by
-    it, exactly; the trapezoid over two such means is half a sample late, and in a loop that half
-    sample turns every jerk of the arm into a false force. So a mean enters as it is, and only the
-    rest of μ by the trapezoid. An instantaneous torque enters by the trapezoid: then the numbers
-    are those of `KalmanObserver.estimate` over the log.
+    A mean torque over the sampling interval enters as it is: the trapezoid over two is half a
+    sample late, which turns every jerk of the arm into a false force. An instantaneous one enters
+    by the trapezoid, as the rest of μ: the numbers are those of `KalmanObserver.estimate`.
 
     Attributes:
         tau: The estimate now. (n,) [N·m]
     """
 
     def __init__(
-        self, observer: KalmanObserver, robot: Robot, step: float, *, averaged: bool
+        self,
+        observer: KalmanObserver,
+        robot: Robot,
+        step: float,
+        *,
+        averaged: bool,
     ) -> None:
         """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
-        pin = needed("pinocchio", "a closed loop")
+        import pinocchio as pin
 
         n = robot.joints
         self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
@@ -43,30 +45,17 @@ class OnlineKalman:
         self.mu = np.zeros(n)
         self.tau = np.zeros(n)
 
-    def terms(self, q: Array, dq: Array) -> tuple[Array, Array]:
-        """P = M q̇ and Cᵀq̇ − g − F_f of the next sample. (n,) each [kg·m²/s, N·m]
-
-        The second is μ without the drives; presliding friction goes on from the sample before.
-        """
+    def sample(self, q: Array, dq: Array, torque: Array) -> Array:
+        """The external torque after one more sample [rad, rad/s, N·m]. (n,) [N·m]"""
         pin, model, data = self.pin, self.model, self.data
         C = pin.computeCoriolisMatrix(model, data, q, dq)
         p = pin.crba(model, data, q) @ dq
         gravity = pin.computeGeneralizedGravity(model, data, q)
-        rest = C.T @ dq - gravity
-        if self.robot.friction:
-            rest = rest - self.friction.torque(q[None], dq[None], gravity[None])[0]
-        return p, rest
-
-    def sample(self, q: Array, dq: Array, torque: Array) -> Array:
-        """Take one sample and return the external torque. (n,) [N·m]
-
-        Args:
-            q: Measured positions. (n,) [rad]
-            dq: Measured velocities. (n,) [rad/s]
-            torque: Measured drive torque. (n,) [N·m]
-        """
-        p, rest = self.terms(q, dq)
-        mu = rest if self.averaged else rest + torque
+        mu = C.T @ dq - gravity
+        if self.robot.friction:  # presliding friction goes on from the sample before
+            mu = mu - self.friction.torque(q[None], dq[None], gravity[None])[0]
+        if not self.averaged:
+            mu = mu + torque
         if self.p is None:
             self.p, self.mu = p, mu
             return self.tau

@@ -1,7 +1,7 @@
 """Admittance parameters: one number for each Cartesian axis, as in Tables III and IV."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,9 +23,24 @@ GROUPS: dict[str, tuple[int, ...]] = {
 THRESHOLD_MODES = ("hard", "soft", "literal")
 
 
-def axis(*letters: str, positive: bool = True, endless: bool = False) -> dict[str, Any]:
-    """What is known of a field with one number an axis: the paper's letters, its bounds."""
-    return {"letters": letters, "positive": positive, "endless": endless}
+#: Parameter with one number an axis → the paper's letters, accepted beside the words.
+PER_AXIS = {
+    "mass": ("m", "m_d"),
+    "damping": ("b", "b_d"),
+    "stiffness": ("k", "k_d"),
+    "alpha": (),
+    "threshold": ("f_tsd",),
+    "xi": (),
+    "hysteresis": (),
+    "speed_limit": ("v_tsd",),
+    "speed_scale": ("v0",),
+}
+LETTERS = {letter: name for name, letters in PER_AXIS.items() for letter in letters}
+LETTERS["ts"] = "period"
+MAY_BE_ZERO = ("damping", "threshold", "hysteresis")
+MAY_BE_ENDLESS = ("threshold", "speed_limit")
+#: Keys of ``[admittance]`` that are not one number an axis.
+PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,43 +48,41 @@ class Admittance:
     """What the variable-parameter law (45)–(51) and Algorithm 1 are run with.
 
     Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad, N·m/rad,
-    N·m, rad/s. Every array is (6,), in the order of `AXES`.
+    N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that of all axes.
     """
 
-    mass: Array = field(metadata=axis("m", "m_d"))  #: M_d.
-    damping: Array = field(metadata=axis("b", "b_d", positive=False))  #: B_d.
-    stiffness: Array = field(metadata=axis("k", "k_d"))  #: K_d.
-    alpha: Array = field(metadata=axis())  #: α of (47).
-    #: F_tsd: above it an axis is dragged, below it recovers.
-    threshold: Array = field(metadata=axis("f_tsd", positive=False, endless=True))
-    #: ξ of (47), which the paper does not print; None takes B_d/(2√(M_d K_d)), the damping ratio of
-    #: the drag phase.
-    xi: Array | None = field(default=None, metadata=axis())
+    mass: Array  #: M_d.
+    damping: Array  #: B_d.
+    stiffness: Array  #: K_d.
+    alpha: Array  #: α of (47).
+    threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
+    #: ξ of (47), which the paper does not print; None, and NaN for an axis, is B_d/(2√(M_d K_d)),
+    #: the damping ratio of the drag phase.
+    xi: Array | None = None
     #: Share of the threshold by which the force has to fall below it before an axis that is dragged
     #: recovers; 0 is the paper's.
-    hysteresis: Array | float = field(default=0.0, metadata=axis(positive=False))
-    #: Ẋ_tsd; infinite for none.
-    speed_limit: Array | float = field(default=np.inf, metadata=axis("v_tsd", endless=True))
-    #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
-    speed_scale: Array | float = field(default=1.0, metadata=axis("v0"))
+    hysteresis: Array | float = 0.0
+    speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
+    speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
     period: float  #: Control period. [s]
-    threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.thresholds`.
+    threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.motion`.
     source: str = ""  #: Where the numbers come from, in words.
 
     def __post_init__(self) -> None:
-        for name, key in PER_AXIS.items():
+        for name in PER_AXIS:
             if getattr(self, name) is None:
                 continue
             array = spread(getattr(self, name), 6, "axes", f"admittance.{name}")
+            if name == "xi":
+                array = np.where(np.isnan(array), self.drag_ratio, array)
             object.__setattr__(self, name, frozen(array))
-            fits = array > 0.0 if key.metadata["positive"] else array >= 0.0
-            if not key.metadata["endless"]:
-                fits &= np.isfinite(array)
+            zero, endless = name in MAY_BE_ZERO, name in MAY_BE_ENDLESS
+            fits = ((array > 0.0) | (zero & (array == 0.0))) & (np.isfinite(array) | endless)
             if not np.all(fits):
                 k = int(np.argmin(fits))
-                needed = "positive" if key.metadata["positive"] else "zero or positive"
                 raise ParameterError(
-                    f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be {needed}"
+                    f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
+                    f"{'zero or ' * zero}positive"
                 )
         if np.any(np.asarray(self.hysteresis) >= 1.0):
             raise ParameterError(
@@ -80,42 +93,25 @@ class Admittance:
             raise ParameterError(
                 f"admittance.period is {self.period:g} s; the control period must be positive"
             )
-        if self.threshold_mode not in THRESHOLD_MODES:
-            raise ParameterError(
-                f"threshold mode {self.threshold_mode!r}; there is {', '.join(THRESHOLD_MODES)}"
-            )
+        check_known(
+            self.threshold_mode, THRESHOLD_MODES, f"no threshold mode {self.threshold_mode!r}"
+        )
+
+    @property
+    def drag_ratio(self) -> Array:
+        """Damping ratio of the drag phase, B_d/(2√(M_d K_d)). (6,)"""
+        return np.asarray(self.damping / (2.0 * np.sqrt(self.mass * self.stiffness)))
 
     @property
     def damping_ratio(self) -> Array:
-        """ξ as it is used: given, or B_d/(2√(M_d K_d)). (6,)"""
-        if self.xi is not None:
-            return self.xi
-        ratio: Array = self.damping / (2.0 * np.sqrt(self.mass * self.stiffness))
-        return ratio
-
-    @property
-    def recovery_damping(self) -> Array:
-        """B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α. (6,)"""
-        damping: Array = 2.0 * self.damping_ratio * np.sqrt(self.mass * self.stiffness)
-        return damping
-
-    def with_alpha(self, alpha: float) -> "Admittance":
-        """The same with one α for all axes."""
-        return replace(self, alpha=np.full(6, alpha))
-
-
-PER_AXIS = {key.name: key for key in fields(Admittance) if key.metadata}
-#: The paper's letters, accepted beside the words.
-LETTERS = {
-    **{letter: name for name, key in PER_AXIS.items() for letter in key.metadata["letters"]},
-    "ts": "period",
-}
-#: Keys of ``[admittance]`` that are not one number an axis.
-PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
+        """ξ as it is used. (6,)"""
+        return self.drag_ratio if self.xi is None else self.xi
 
 
 def from_table(
-    table: Mapping[str, Any], robot: str, settings: Mapping[str, Mapping[str, Any]]
+    table: Mapping[str, Any],
+    robot: str,
+    settings: Mapping[str, Mapping[str, Any]],
 ) -> Admittance:
     """Build the parameters from a robot file's ``[admittance]`` and the user's assignments.
 
@@ -128,20 +124,20 @@ def from_table(
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
     """
     groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
-    values = {name: np.full(6, np.nan) for name in PER_AXIS}
+    # What has a default begins with it; ξ, which has none of its own, and all else with NaN.
+    values: dict[str, Any] = {
+        name: np.full(6, getattr(Admittance, name, None), np.float64) for name in PER_AXIS
+    }
     for section, entries in (*groups, *settings.items()):
         axes = list(GROUPS[section])
         for name, value in entries.items():
-            if name in PLAIN:
-                continue
-            check_known(name, PER_AXIS, f"the admittance has no parameter {name!r}")
-            values[name][axes] = spread(value, len(axes), "axes", f"{section}.{name}")
+            if name not in PLAIN:
+                check_known(name, PER_AXIS, f"the admittance has no parameter {name!r}")
+                values[name][axes] = spread(value, len(axes), "axes", f"{section}.{name}")
     where = "its [admittance]" if table else "an [admittance] section, which it lacks,"
-    for name, key in PER_AXIS.items():
-        absent = np.isnan(values[name])
-        if name != "xi" and key.default is not MISSING:
-            values[name][absent] = key.default
-        elif name != "xi" and np.any(absent):
+    for name, found in values.items():
+        absent = np.isnan(found)
+        if name != "xi" and np.any(absent):
             listed = ", ".join(np.array(AXES)[absent])
             section = next(group for group, axes in GROUPS.items() if np.all(absent[list(axes)]))
             raise ParameterError(
@@ -155,17 +151,10 @@ def from_table(
             "with --set admittance.period=0.008"
         )
     NUMBER.check("admittance.period", plain["period"])
+    words = {name: plain[name] for name in ("threshold_mode", "source") if name in plain}
     xi = values.pop("xi")
-    found = Admittance(
-        **values,
-        period=float(plain["period"]),
-        threshold_mode=plain.get("threshold_mode", "hard"),
-        source=plain.get("source", ""),
-    )
-    if np.all(np.isnan(xi)):
-        return found
-    # Axes without a ξ of their own keep that of the drag phase.
-    return replace(found, xi=np.where(np.isnan(xi), found.damping_ratio, xi))
+    own = None if np.all(np.isnan(xi)) else xi
+    return Admittance(**values, xi=own, period=float(plain["period"]), **words)
 
 
 def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:

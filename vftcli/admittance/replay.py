@@ -7,31 +7,29 @@ from typing import Any
 import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
-from vftcli.admittance.law import Controller, energy, printed_energy
+from vftcli.admittance.law import Controller, Verdict, check_stable, energy, printed_energy
 from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
-from vftcli.admittance.motion import AxisMotion, release, run
-from vftcli.admittance.parameters import Admittance
-from vftcli.admittance.replay_checks import (
-    arm_moved,
-    drags_at_rest,
-    implausible_travel,
-    limits_met,
-    nothing_dragged,
-    unknown_force,
-)
-from vftcli.admittance.stability import Verdict, check_stable
-from vftcli.admittance.thresholds import Phases, phases
+from vftcli.admittance.motion import AxisMotion, Phases, phases, release, run
+from vftcli.admittance.parameters import AXES, Admittance
+from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import refuse_mostly_gap
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.pose import log_matrix
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
 
 #: A step in which W rises by more than this share of its value at the phase's start is told.
 RISE = 1e-12
 LONGEST = 600.0  #: Longest release that is computed. [s]
+Counts = np.ndarray[Any, np.dtype[np.int64]]
+
+#: A drag in which the log's arm stays within this distance for so long is told. [s, m]
+RESTING = (2.0, 0.01)
+#: A log whose flange stays this near to its first pose replays as it was: no remark. [m]
+STILL = 0.01
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +40,7 @@ class Lyapunov:
     printed: Array  #: V of (52). [J]
     #: Steps in which W rises by more than `RISE` of its value at the phase's start, for each
     #: controller; the three axes of a rotation that recover together count together. (N,)
-    rises: np.ndarray[tuple[int, ...], np.dtype[np.int64]]
+    rises: Counts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,14 +129,7 @@ def replay_release(
 ) -> Replay:
     """Let go of the arm at rest at deviation `x` (6,) [m, rad] from the pose `start` (n,) [rad].
 
-    Args:
-        x: Deviation.
-        robot: The arm.
-        parameters: Shared parameters.
-        controllers: The controllers.
-        start: Joint positions of the target pose.
-        duration: How long to watch; None for as long as it takes. [s]
-        force_unstable: Run unstable settings too.
+    It is watched for `duration` [s], None for as long as it takes; else as `replay`.
     """
     if not np.any(x):
         raise ParameterError(
@@ -166,18 +157,9 @@ def judge_motion(
     drags: Sequence[Drag],
     force: Array,
 ) -> Replay:
-    """Follow a motion with the joints, and tell its energies, its figures and what limits it met.
+    """Joints along a motion from a pose (n,) [rad], its energies, figures and limits.
 
-    Args:
-        solver: The arm's.
-        start: Joint positions of the target pose. (n,) [rad]
-        parameters: Shared parameters.
-        controllers: The controllers.
-        verdicts: Their stability.
-        motion: Their motion.
-        split: The phases of the force.
-        drags: Its drags.
-        force: Force on the robot, NaN where unknown. (T, 6) [N, N·m]
+    The force (T, 6) [N, N·m] is NaN where it is unknown.
     """
     path = follow(solver, start, motion.x, parameters.period)
     lyapunov = lyapunov_along(controllers, motion, split)
@@ -212,17 +194,12 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
-def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
-    """Sample columns as a controller does: the newest sample at each control period.
-
-    Args:
-        t: Times of the log. (T,) [s]
-        values: Columns. (T, …)
-        period: Control period. [s]
-
-    Returns:
-        Times from the log's first sample on (S,) [s], and the columns then. (S, …)
-    """
+def on_control_clock(
+    t: Array,
+    values: Sequence[Array],
+    period: float,
+) -> tuple[Array, list[Array]]:
+    """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay in step.
@@ -232,9 +209,6 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
 
 def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     """Where the log's own arm was, as a deviation from the start pose. (T, 6) [m, rad]"""
-    from vftcli.robots.kinematics import link_poses
-    from vftcli.signals.pose import log_matrix
-
     poses = link_poses(solver.robot.chain, q)
     rotation, translation = solver.pose(start)
     turned = log_matrix(poses.rotation[:, -1] @ rotation.T)
@@ -271,3 +245,99 @@ def count_rises(W: Array, recovering: Mask) -> int:
         origin = np.maximum.accumulate(np.where(begins, np.arange(len(flags)), 0))
         rises += int(np.count_nonzero(flags & (np.diff(w) > RISE * w[:-1][origin])))
     return rises
+
+
+def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:
+    """Say so if some samples of the wrench are not known, so that they count as no force."""
+    count = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
+    return (caution("force-unknown", samples=count),) if count else ()
+
+
+def nothing_dragged(
+    wrench: Array,
+    parameters: Admittance,
+    dragged: bool,
+) -> tuple[Remark, ...]:
+    """Say so if a force (T, 6) [N, N·m] never passed a threshold, and which axis came nearest."""
+    if dragged or not len(wrench):
+        return ()
+    largest = np.max(np.abs(np.nan_to_num(wrench)), axis=0)
+    share = largest / np.maximum(parameters.threshold, 1e-12)
+    k = int(np.argmax(share))
+    threshold = float(parameters.threshold[k])
+    return (caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=threshold),)
+
+
+def drags_at_rest(
+    drags: Sequence[Drag],
+    logged: Array,
+    period: float,
+) -> tuple[Remark, ...]:
+    """The longest drag of each axis in which the log's flange rests. (T, 6) [m, rad], [s]"""
+    longest: dict[str, int] = {}
+    long, near = round(RESTING[0] / period), RESTING[1]
+    for drag in drags:
+        part = logged[drag.begin : drag.release, :3]
+        if len(part) <= long:
+            continue
+        apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
+        # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
+        held = np.max(np.linalg.norm(part - part.mean(axis=0), axis=1))
+        if np.any(apart < near) and (held < near or np.median(apart) < near):
+            axis = AXES[drag.axis]
+            longest[axis] = max(longest.get(axis, 0), len(part))
+    return tuple(
+        caution("drag-at-rest", axis=axis, duration_s=count * period)
+        for axis, count in longest.items()
+    )
+
+
+def limits_met(
+    controllers: Sequence[Controller],
+    motion: AxisMotion,
+    path: JointPath,
+    rises: Counts,
+) -> tuple[Remark, ...]:
+    """What went wrong or was limited, controller by controller."""
+    found = []
+    for n, controller in enumerate(controllers):
+        where = Where(controller.name)
+        if motion.escaped[n]:
+            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
+            found.append(warning("motion-escaped", where, time_s=float(motion.t[k])))
+        if acted := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
+            found.append(fact("speed-limit-acted", where, periods=acted))
+        if lost := int(np.count_nonzero(~path.reached[:, n])):
+            first = float(motion.t[int(np.argmin(path.reached[:, n]))])
+            rows = {"lost": lost, "poses": len(motion.t)}
+            found.append(caution("poses-out-of-reach", where, **rows, first_s=first))
+        if path.speed[n] > 1.0:
+            found.append(caution("joint-too-fast", where, share=float(path.speed[n])))
+        if rises[n]:
+            found.append(warning("energy-rises", where, steps=int(rises[n])))
+    return tuple(found)
+
+
+def implausible_travel(
+    parameters: Admittance,
+    controllers: Sequence[Controller],
+    motion: AxisMotion,
+    path: JointPath,
+) -> tuple[Remark, ...]:
+    """Say so if the travel is none that the arm could make, and what to do under a hard threshold.
+
+    Where every pose is reached the travel is plausible, however long.
+    """
+    lost = [n for n in range(len(controllers)) if not np.all(path.reached[:, n])]
+    if not lost:
+        return ()
+    travel = np.nan_to_num(np.linalg.norm(motion.x[:, lost, :3], axis=2), nan=np.inf)
+    hard = parameters.threshold_mode == "hard"
+    code = "travel-implausible-hard" if hard else "travel-implausible"
+    return (caution(code, travel_m=float(travel.max())),)
+
+
+def arm_moved(logged: Array) -> tuple[Remark, ...]:
+    """Say so if the log's arm moved while the replay holds it at its first pose. (T, 6) [m, rad]"""
+    far = float(np.linalg.norm(logged[:, :3], axis=1).max())
+    return (fact("log-arm-moved", distance_m=far),) if far >= STILL else ()

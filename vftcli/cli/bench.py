@@ -27,7 +27,7 @@ def bench(measured: BenchOptions, json: opt.Json = False) -> None:
     from vftcli.cli.console import say_json
     from vftcli.outputs.grid import latex, terminal
     from vftcli.outputs.listings import bench_grid
-    from vftcli.reproduction.benchmark import benchmark
+    from vftcli.reproduction.timing import benchmark
 
     result = benchmark(measured.robot, measured.samples, measured.rounds)
     if json:

@@ -73,7 +73,7 @@ def save(
 def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
     """Write one log and what stands beside it into a folder."""
     from vftcli.simulation.writers import WRITERS
-    from vftcli.simulation.writers.parquet import write_truth
+    from vftcli.simulation.writers.tables import write_truth
 
     truth, scenario, record = (file.name for file in companions(path))
     with table_file(folder / path.name) as file:

@@ -6,21 +6,19 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, run_closed_loop
-from vftcli.admittance.latency import Latency, latencies
+from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, Latency, latencies, run_closed_loop
+from vftcli.admittance.law import UnstableError
 from vftcli.admittance.metrics import drags_of, releases_of, rows_of
 from vftcli.admittance.motion import release
 from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling
-from vftcli.admittance.stability import UnstableError
 from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance.page import charts as replay_charts
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
 from vftcli.robots import load_robot
-from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import fact
 from vftcli.simulation import load_scenario
 from vftcli.simulation.sensing import log_rate
@@ -37,7 +35,11 @@ FARTHEST_RELEASE = 0.5
 
 
 def closed_loop(
-    seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
+    seed: int,
+    *,
+    scenario: str,
+    figures: Sequence[str],
+    alphas: Sequence[float],
 ) -> RunResult:
     """Latencies of a controller in the loop, and its force through controllers of every α."""
     result = RunResult()
@@ -74,8 +76,7 @@ def looped(
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # The same enters, whoever is driven by it: no controller has a tail of the force that another
-    # does not see.
+    # The same enters, whoever is driven by it.
     everything = replace(alone, alphas=tuple(alphas)).controllers(parameters)
     source = fact("force-of-loop")
     return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
@@ -85,30 +86,23 @@ def ungated(found: Replay) -> Replay:
     """A replay with a traditional controller that has no threshold: (45) under the whole force."""
     force, motion = np.nan_to_num(found.wrench), found.motion
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
-    x, v = (
-        np.concatenate([one, all_[:, 1:]], axis=1)
-        for one, all_ in ((alone.x, motion.x), (alone.v, motion.v))
-    )
+    x, v = motion.x.copy(), motion.v.copy()
+    x[:, :1], v[:, :1] = alone.x, alone.v
     motion = replace(motion, x=x, v=v)
     drags = drags_of(found.phases, found.parameters.period)
-    return replace(
-        found, motion=motion, rows=tuple(rows_of(found.controllers, motion, drags, force))
-    )
+    rows = rows_of(found.controllers, motion, drags, force)
+    return replace(found, motion=motion, rows=tuple(rows))
 
 
 def latency_values(held: Sequence[Latency]) -> dict[str, float | None]:
     """Times of each contact, None of one that found the arm moving."""
-    return {
-        f"{key}/{k}": value
-        for k, one in enumerate(held, start=1)
-        for key, value in (
-            ("detection", one.detection),
-            ("motion", one.motion if one.rested else None),
-            ("withdrawal", one.withdrawal),
-            ("reaction", one.reaction if one.rested else None),
-            ("stop", one.turn),
-        )
-    }
+    values: dict[str, float | None] = {}
+    for k, one in enumerate(held, start=1):
+        for key in ("detection", "motion", "withdrawal", "reaction"):
+            shown = one.rested or key in {"detection", "withdrawal"}
+            values[f"{key}/{k}"] = getattr(one, key) if shown else None
+        values[f"stop/{k}"] = one.turn
+    return values
 
 
 def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:
@@ -148,9 +142,8 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
     """How late the UR5 turns after a release at most, and how much earlier the variable law is.
 
-    Without force x(t) and v(t) of the traditional law turn at the latest where x = 0 at the
-    release: after arccos(ζ)/ω_d. The advance is the largest over deviations from 0 on, released at
-    the speed limit, in steps of the control period.
+    The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance is the
+    largest over deviations released at the speed limit, in steps of the control period.
     """
     control = ControlChoice(alphas=tuple(alphas))
     parameters = control.parameters(load_robot("ur5"))
@@ -178,10 +171,7 @@ def released(
 ) -> RunResult:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
-    Args:
-        robot: The arm.
-        deviation: How far off it is let go along x. [m]
-        alphas: Values of α; none for the table's own.
+    It is let go off by `deviation` [m] along x; without `alphas` α is the table's own.
     """
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -197,27 +187,21 @@ def released(
                 result.put(variant, {f"{key}/{name}": row[key]})
             result.put(variant, {f"overshoot/{name}": 100.0 * (row["overshoot"] or 0.0)})
         if xi is None:
-            for key in ("mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"):
-                put_axes(result, key, getattr(parameters, key))
-            put_axes(result, "xi", parameters.damping_ratio)
+            keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
+            table = {key: getattr(parameters, key) for key in keys}
+            for key, values in {**table, "xi": parameters.damping_ratio}.items():
+                each = zip(AXES, values.tolist(), strict=True)
+                result.put(variant, {f"{key}/{axis}": value for axis, value in each})
     return result
-
-
-def put_axes(result: RunResult, key: str, parameter: Sequence[float] | Array) -> None:
-    """Add a parameter of a robot's table, axis by axis."""
-    found = zip(AXES, parameter, strict=True)
-    result.put(CORRECTED, {f"{key}/{axis}": float(value) for axis, value in found})
 
 
 def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:
     """Force and motion of the loop: what the sensor says and the law commands, and the truth."""
-
-    def both(force: Array, motion: Array) -> Array:
-        return np.column_stack([force[:, part], motion[:, part]])
-
+    true = np.column_stack([run.truth[:, part], run.moved[:, part]])
+    ours = np.column_stack([run.estimate[:, part], run.commanded[:, part]])
     lines = (
-        ChartLine("true force, flange", both(run.truth, run.moved), "#8a929a", "5 3"),
-        ChartLine("virtual sensor, command", both(run.estimate, run.commanded), "#0b6fb8"),
+        ChartLine("true force, flange", true, "#8a929a", "5 3"),
+        ChartLine("virtual sensor, command", ours, "#0b6fb8"),
     )
     letter, *units = ("F", "N", "m") if part == FORCE else ("M", "N·m", "rad")
     band = np.concatenate([found.parameters.threshold[part], np.full(3, np.nan)])

@@ -7,17 +7,17 @@ how many run beside one another.
 import multiprocessing
 import os
 import signal
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
-from itertools import chain
-from typing import NamedTuple
+from itertools import chain, product
+from typing import Any, NamedTuple
 
-from vftcli.reproduction.circle import tapped_circle
 from vftcli.reproduction.control import closed_loop, latest_turns, released
-from vftcli.reproduction.paper import Paper, PaperItem, RunResult, ShownItem, paper_of
-from vftcli.reproduction.sensor import assembled_bearing, dragged_sensor
+from vftcli.reproduction.estimates import assembled_bearing, dragged_sensor, tapped_circle
+from vftcli.reproduction.paper import Paper, RunResult, ShownItem, paper_of
 from vftcli.reproduction.timing import computing_time
 from vftcli.signals.errors import VftError
 
@@ -80,7 +80,11 @@ def end_with_terminal() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
-def run_jobs(jobs: Sequence[Job], tell: Hearer, workers: int | None = None) -> dict[Job, Result]:
+def run_jobs(
+    jobs: Sequence[Job],
+    tell: Hearer,
+    workers: int | None = None,
+) -> dict[Job, Result]:
     """Run jobs, those that take the time last and by themselves."""
     alone = [job for job in jobs if paper_of(job.paper).experiments[job.experiment].alone]
     beside = [job for job in jobs if job not in alone]
@@ -117,20 +121,17 @@ def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
 
 
 def gather(paper: Paper, names: Sequence[str], results: dict[Job, Result]) -> dict[str, ShownItem]:
-    """What each item shows of the results."""
-    return {name: shown(name, paper.items[name], results) for name in names}
-
-
-def shown(name: str, item: PaperItem, results: dict[Job, Result]) -> ShownItem:
-    """One item with its values, a list over the seeds for each."""
-    values: dict[str, dict[str, list[float | None]]] = {}
-    own = [result for job, result in results.items() if job.experiment in item.experiments]
-    made = [result for result in own if isinstance(result, RunResult)]
-    for one in made:
-        for line in item.lines:
+    """Name of an item → its values, a list over the seeds for each."""
+    found = {}
+    for name in names:
+        item, values = paper.items[name], defaultdict[str, Any](lambda: defaultdict(list))
+        own = [result for job, result in results.items() if job.experiment in item.experiments]
+        made = [result for result in own if isinstance(result, RunResult)]
+        for one, line in product(made, item.lines):
             for variant, value in one.values.get(line.key, {}).items():
-                values.setdefault(line.key, {}).setdefault(variant, []).append(value)
-    charts = [one.charts[name] for one in made if name in one.charts]
-    chart = charts[0]._replace(key=name, title=item.traces) if charts else None
-    failures = tuple(result for result in own if isinstance(result, str))
-    return ShownItem(item, values, chart, failures)
+                values[line.key][variant].append(value)
+        charts = [one.charts[name] for one in made if name in one.charts]
+        chart = charts[0]._replace(key=name, title=item.traces) if charts else None
+        failures = tuple(result for result in own if isinstance(result, str))
+        found[name] = ShownItem(item, values, chart, failures)
+    return found

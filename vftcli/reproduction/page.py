@@ -154,7 +154,10 @@ def item_section(name: str, shown: ShownItem) -> str:
 
 
 def render_markdown(
-    paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job], command: str
+    paper: Paper,
+    found: Mapping[str, ShownItem],
+    jobs: Sequence[Job],
+    command: str,
 ) -> str:
     """The same in Markdown, with the command that made it."""
     parts = [

@@ -1,22 +1,164 @@
-"""Table II: what an observation costs, by the paper's own way and by this program's."""
+"""Computing times: Table II by the paper's own way and by this program's, and the benchmark.
 
-from collections.abc import Callable
+All are measured interleaved round by round, so that a machine whose speed drifts drifts for all.
+Medians over the rounds are reported.
+"""
+
+import os
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from vftcli.observers import PAPER, KalmanObserver
+from vftcli.observers import BEST, PAPER, KalmanObserver
+from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
-from vftcli.reproduction.benchmark import SAMPLES, Timings, circle, one_core
-from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, RunResult
-from vftcli.robots import load_robot
+from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
+from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import DynamicsTerms, dynamics_terms
 from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
+SAMPLES = 30_060  #: Samples of the paper's Table II.
+#: Length of the part that counts as free for the observers that the log tunes. [s]
+FREE_SECONDS = 8.0
+TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
+SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
+LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
+#: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
+PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 #: Samples the paper's way runs over, one after another; its time is scaled to all samples.
 SCRIPT_SAMPLES = 1_500
-ROUNDS = 3  #: Interleaved repetitions; the median counts.
+ROUNDS = 3  #: Interleaved repetitions for Table II; the median counts.
+
+
+@dataclass
+class Timings:
+    """Seconds by name, one value a round."""
+
+    seconds: dict[str, list[float]] = field(default_factory=dict)
+
+    def measure(self, name: str, work: Callable[[], object], scale: float = 1.0) -> None:
+        """Time one call; `scale` extrapolates a shortened one."""
+        begin = time.perf_counter()
+        work()
+        self.seconds.setdefault(name, []).append((time.perf_counter() - begin) * scale)
+
+    def rounds(
+        self,
+        work: Mapping[str, Callable[[], object]],
+        count: int,
+        scales: Mapping[str, float] | None = None,
+    ) -> None:
+        """Time every call in turn, so many rounds."""
+        for _ in range(count):
+            for name, call in work.items():
+                self.measure(name, call, (scales or {}).get(name, 1.0))
+
+    def median(self, name: str) -> float:
+        """Median over the rounds. [s]"""
+        return float(np.median(self.seconds[name]))
+
+    def row(self, name: str, samples: int) -> dict[str, float]:
+        """The time of one name, in all and for each of so many samples."""
+        total = self.median(name)
+        return {"total_s": total, "per_sample_us": total / samples * 1e6}
+
+
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process on one core while it is measured, where the system lets it choose."""
+    if not hasattr(os, "sched_setaffinity"):
+        yield
+        return
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {max(before)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, before)
+
+
+def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
+    """A smooth periodic motion of an arm with plausible currents, seed 0."""
+    rng = np.random.default_rng(0)
+    t = np.arange(samples) / rate
+    phase = rng.uniform(0.0, 2.0 * np.pi, robot.joints)
+    omega = 2.0 * np.pi / 4.0
+    angle = omega * t[:, None] + phase
+    q, dq = 0.4 * np.sin(angle), 0.4 * omega * np.cos(angle)
+    current = rng.normal(0.0, 1.0, q.shape)
+    return Recording(t=t, q=q, dq=dq, current=current, torque=current)
+
+
+def simd() -> str:
+    """The widest instructions that NumPy found on this machine, as it names them."""
+    found = np.show_config(mode="dicts") or {}
+    return str((found.get("SIMD Extensions", {}).get("found") or ["baseline"])[-1])
+
+
+def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) -> dict[str, Any]:
+    """Time the observers.
+
+    Returns:
+        ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
+        ``dynamics``: the batched terms; ``complete_log``: the spectra and the observers that need
+        a complete log, with their tuning but for ``best``; and what was run.
+    """
+    robot, timings = load_robot(robot_name), Timings()
+    with one_core():
+        work = work_of(robot, circle(robot, samples))
+        for call in work.values():  # once unmeasured
+            call()
+        timings.rounds(work, rounds)
+    return {
+        "simd": simd(),
+        "robot": robot.name,
+        "samples": samples,
+        "rounds": rounds,
+        "observers": [
+            {"name": name, **timings.row(name, samples), "paper_s": PRINTED[f"seconds/{name}"]}
+            for name in PAPER
+        ],
+        "complete_log": [
+            {"name": name, **timings.row(name, samples)}
+            for name in ("spectra", *LOOKING_BACK, SMOOTHER)
+            if name in timings.seconds
+        ],
+        "dynamics": timings.row("dynamics", samples),
+    }
+
+
+def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
+    """Tune an observer to spectra and run it."""
+    tune_to_spectra(name, found).estimate(terms)
+
+
+def work_of(robot: Robot, recording: Recording) -> dict[str, Callable[[], object]]:
+    """Name → what the benchmark times along a recording."""
+    observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
+    run = Run(recording=recording, robot=robot)
+    terms = run.terms
+    free = recording.t < FREE_SECONDS
+    part = [RunSamples(run, free)]
+    spectra = partial(spectra_of, RunSamples(run, ~free), part)
+    found = spectra()
+    return {
+        "dynamics": partial(dynamics_terms, recording, robot),
+        **{observer.name: partial(observer.estimate, terms) for observer in observers},
+        "spectra": spectra,
+        BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
+        **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
+        **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
+    }
 
 
 def computing_time(_seed: int) -> RunResult:
@@ -45,24 +187,20 @@ def timed() -> Timings:
     kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
     dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
     built, _ = ObserverChoice(names=PAPER).build(robot, step)
-    work: dict[str, Callable[[], object]] = {
-        f"{CORRECTED} {o.name}": partial(o.estimate, terms) for o in built
-    }
-    work[f"{CORRECTED} dynamics"] = partial(dynamics_terms, log, robot)
     # Both first-order observers run in one loop: each is half of it.
     both = partial(first_order_loops, short.p, short.mu, step)
-    scripts: dict[str, tuple[Callable[[], object], float]] = {
-        "dynamics": (partial(literal_momentum_terms, robot.model, q, dq), 1.0),
-        "fdo": (both, 0.5),
-        "gmo": (both, 0.5),
-        "kfo-fe": (dense, 1.0),
-        "kfo-zoh": (partial(dense, rebuild=True), 1.0),
+    work: dict[str, Callable[[], object]] = {
+        **{f"{CORRECTED} {o.name}": partial(o.estimate, terms) for o in built},
+        f"{CORRECTED} dynamics": partial(dynamics_terms, log, robot),
+        f"{AS_PRINTED} dynamics": partial(literal_momentum_terms, robot.model, q, dq),
+        f"{AS_PRINTED} fdo": both,
+        f"{AS_PRINTED} gmo": both,
+        f"{AS_PRINTED} kfo-fe": dense,
+        f"{AS_PRINTED} kfo-zoh": partial(dense, rebuild=True),
     }
-    for _ in range(ROUNDS):
-        for name, call in work.items():
-            timings.measure(name, call)
-        for name, (script, share) in scripts.items():
-            timings.measure(f"{AS_PRINTED} {name}", script, share * SAMPLES / len(q))
+    scales = {name: SAMPLES / len(q) for name in work if name.startswith(AS_PRINTED)}
+    halves = {name: 0.5 * SAMPLES / len(q) for name, call in work.items() if call is both}
+    timings.rounds(work, ROUNDS, scales | halves)
     return timings
 
 
@@ -114,17 +252,13 @@ def dense_kalman_loop(
     n = p.shape[1]
     model, prior = kalman.model(step, n), kalman.steady(step, n).prior
     densities = kalman.densities(n)
-    eye, zero = np.eye(n), np.zeros((n, n))
-    A = np.block([[eye, np.diag(model.a12)], [zero, np.diag(model.a22)]])
-    B, C = np.vstack([step * eye, zero]), np.hstack([eye, zero])
-    Q = np.block(
-        [[np.diag(model.q11), np.diag(model.q12)], [np.diag(model.q12), np.diag(model.q22)]]
-    )
+    one, none, identity = np.ones(n), np.zeros(n), np.eye(2 * n)
+    A = in_pairs((one, model.a12), (none, model.a22))
+    B, C = step * identity[:, :n], identity[:n]
+    Q = in_pairs((model.q11, model.q12), (model.q12, model.q22))
     R = np.diag(model.r)
-    P = np.block(
-        [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
-    )
-    x, identity = np.concatenate([p[0], np.zeros(n)]), np.eye(2 * n)
+    P = in_pairs((prior.p11, prior.p12), (prior.p12, prior.p22))
+    x = np.concatenate([p[0], none])
     for k in range(len(p)):
         if rebuild:
             A, B, Q = held_matrices(step, densities.q_p, densities.q_tau)
@@ -136,3 +270,8 @@ def dense_kalman_loop(
         I_LC = identity - L @ C
         P = I_LC @ P @ I_LC.T + L @ R @ L.T
     return x
+
+
+def in_pairs(*rows: tuple[Array, Array]) -> Array:
+    """The matrix of two states a joint whose four blocks have these diagonals. (2n, 2n)"""
+    return np.block([[np.diag(entry) for entry in row] for row in rows])

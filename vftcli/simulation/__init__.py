@@ -1,10 +1,9 @@
 """Simulated experiments: a robot's log with the truth beside it."""
 
 from vftcli.simulation.arm import Arm
-from vftcli.simulation.experiment import Simulation, observe, prepare, simulate
+from vftcli.simulation.experiment import Simulation, Truth, observe, prepare, simulate
 from vftcli.simulation.load import load_scenario, scenario_names
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.truth import Truth
 
 __all__ = [
     "Arm",

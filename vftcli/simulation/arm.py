@@ -5,21 +5,38 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots import Robot, load_robot
+from vftcli.robots import Payload, Robot, load_robot
+from vftcli.robots.bounds import out_of_bounds
+from vftcli.robots.chain import Chain
 from vftcli.robots.robot import REFERENCE
 from vftcli.robots.temperature import COLDEST, WARMEST, friction_factor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.mismatch import TrueArm, build_arm
+from vftcli.simulation.friction import DRY, WET, TrueFriction, true_friction
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.plant import Plant
-from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
 from vftcli.simulation.servo import Servo
 from vftcli.simulation.touch import Touching
 
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.
 RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
+#: Largest relative deviation: drawn twice as large, it leaves nothing negative.
+LARGEST_SHARE = 0.45
+#: Deviations that are not relative, and their largest. [m, N·m]
+ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrueArm:
+    """The arm as it is, beside the robot the controller and the observers believe in."""
+
+    chain: Chain  #: Geometry and inertia, payload and sensor mounted.
+    friction: TrueFriction  #: Friction.
+    gain: Array  #: What the torque measurement reads for a unit of torque. (n,)
+    offset: Array  #: What it reads for none. (n,) [N·m]
+    nominal: Robot  #: The controller's robot: the profile with the payload it knows of.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,29 +60,13 @@ class History(JointSignals):
     State and reference are those at the start of a step, all else holds over it.
     """
 
-    step: float  #: Inner step. [s]
     wrenches: Array  #: Wrench of each contact at the middle of the step. (N, C, 6) [N, N·m]
-    walk: Array  #: Joint torque of the random walks. (N, n) [N·m]
-
-    @classmethod
-    def room(cls, step: float, steps: int, joints: int, contacts: int) -> "History":
-        """Return room for `steps` steps, and one more for the state after the last."""
-        rows = steps + 1
-        arrays = {field.name: np.zeros((rows, joints)) for field in fields(JointSignals)}
-        walk, wrenches = np.zeros((rows, joints)), np.zeros((rows, contacts, 6))
-        return cls(step=step, wrenches=wrenches, walk=walk, **arrays)
-
-    def until(self, rows: int) -> "History":
-        """The first rows alone."""
-        names = [field.name for field in fields(self) if field.name != "step"]
-        return replace(self, **{name: getattr(self, name)[:rows] for name in names})
 
 
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `step` with its command and reads `q`, `v` and the mean torque of
-    the last interval; `vftcli.simulation.simulate` does so with the scenario's own trajectory.
+    A controller in the loop calls `step` and reads `q`, `v` and `mean_torque`.
 
     Attributes:
         scenario: The experiment.
@@ -79,14 +80,7 @@ class Arm:
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
-        """Prepare a run.
-
-        Args:
-            scenario: The experiment.
-            seed: Seed of everything drawn.
-            start: The reference at the start, one row; the arm starts on it.
-            duration: Length of the run. [s]
-        """
+        """Prepare a run of so long [s]; the arm starts on the reference's one row."""
         if seed < 0:
             raise ParameterError(f"the seed is {seed}; it must be zero or positive")
         for name in ("temperature_begin", "temperature_end"):
@@ -97,9 +91,9 @@ class Arm:
                 )
         self.scenario, self.seed = scenario, seed
         self.robot: Robot = load_robot(scenario.robot)
-        self.seeds: dict[str, Any] = dict(
-            zip(("arm", "contacts", "sensing"), np.random.SeedSequence(seed).spawn(3), strict=True)
-        )
+        names = "arm", "contacts", "sensing"
+        seeds = np.random.SeedSequence(seed).spawn(3)
+        self.seeds: dict[str, Any] = dict(zip(names, seeds, strict=True))
         rng = np.random.default_rng(self.seeds["arm"])
         self.true: TrueArm = build_arm(scenario, self.robot, rng)
         h = scenario.step
@@ -110,8 +104,10 @@ class Arm:
         self.touching = Touching(
             scenario.contacts, self.robot.chain, self.steps, h, self.seeds["contacts"]
         )
-        contacts = len(self.touching.mounted)
-        self.history = History.room(h, self.steps, self.robot.joints, contacts)
+        # One row more is for the state after the last step.
+        room = {f.name: np.zeros((self.steps + 1, len(q))) for f in fields(JointSignals)}
+        wrenches = np.zeros((self.steps + 1, *self.touching.wrenches.shape))
+        self.history = History(wrenches=wrenches, **room)
 
     @property
     def t(self) -> float:
@@ -129,24 +125,22 @@ class Arm:
         return self.plant.v
 
     def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
-        """Make one inner step towards a commanded position, with the servo's own feed-forward.
-
-        A position outside the joint limits is brought to them.
+        """Make one inner step with the servo's own feed-forward.
 
         Args:
-            q_d: Commanded positions. (n,) [rad]
+            q_d: Commanded positions, brought to the joint limits. (n,) [rad]
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
         """
-        q_d = self.servo.clip_to_limits(np.asarray(q_d, dtype=float))
-        nothing = np.zeros_like(q_d)
-        rows = [q_d, nothing if dq_d is None else dq_d, nothing if ddq_d is None else ddq_d]
-        reference = Reference(*(np.asarray(row, dtype=float)[None] for row in rows))
-        forward = self.servo.feed_forward(reference)[0]
-        self.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
+        rows = np.zeros((3, len(self.q)))
+        rows[0] = np.clip(q_d, self.servo.q_min, self.servo.q_max)
+        rows[1] = 0.0 if dq_d is None else dq_d
+        rows[2] = 0.0 if ddq_d is None else ddq_d
+        forward = self.servo.feed_forward(Reference(*rows[:, None]))[0]
+        self.step(rows[0], rows[1], rows[2], forward)
 
     def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
-        """Make one inner step with a feed-forward torque `forward` (n,) [N·m] already known."""
+        """Make one inner step with a feed-forward torque (n,) [N·m]."""
         history, plant, k = self.history, self.plant, self.made
         if k >= self.steps:
             raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
@@ -155,7 +149,9 @@ class Arm:
         history.target_q[k], history.target_dq[k], history.target_ddq[k] = q_d, dq_d, ddq_d
         t = (k + 0.5) * plant.step
         if k % WARMING_STEPS == 0:
-            self.warm_up(t)
+            temperature = self.temperature(np.array([t]))
+            if (factor := friction_factor(self.robot.friction, temperature)) is not None:
+                plant.true_friction = self.true.friction.warmed(factor[0])
         # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
@@ -177,11 +173,7 @@ class Arm:
             )
 
     def temperature(self, t: Array) -> Array:
-        """The joints' temperature at some times of the run. (N, n) [°C]
-
-        Args:
-            t: True times. (N,) [s]
-        """
+        """The joints' temperature at true times (N,) [s] of the run. (N, n) [°C]"""
         spec, friction = self.scenario.friction, self.robot.friction
         references = [joint.reference_temperature for joint in friction]
         begin = np.array(references or [REFERENCE] * len(self.q))
@@ -189,32 +181,93 @@ class Arm:
             begin[:] = spec.temperature_begin
         end = begin if spec.temperature_end is None else np.full_like(begin, spec.temperature_end)
         share = (t / (self.steps * self.scenario.step))[:, None]
-        found: Array = begin + (end - begin) * share
-        return found
-
-    def warm_up(self, t: float) -> None:
-        """Let the friction follow the joints' temperature."""
-        factor = friction_factor(self.robot.friction, self.temperature(np.array([t])))
-        if factor is not None:
-            self.plant.true_friction = self.true.friction.warmed(factor[0])
+        return np.asarray(begin + (end - begin) * share)
 
     def close(self) -> History:
-        """The history so far, with the state after the last step as its closing row.
-
-        What has no value after the last step keeps its last one.
-        """
+        """The history so far; what has no value after the last step keeps its last."""
         self.check_motion()
         history, k = self.history, self.made
         history.q[k], history.v[k] = self.plant.q, self.plant.v
         for name in ("target_q", "target_dq", "target_ddq", "tau", "friction", "a"):
             array = getattr(history, name)
             array[k] = array[k - 1]
-        for walk in self.touching.walks:
-            history.walk[:k] += walk.torque[:k]
-        return history.until(k + 1)
+        every = [field.name for field in fields(History)]
+        return History(**{name: getattr(history, name)[: k + 1] for name in every})
 
     def mean_torque(self, interval: float) -> Array:
         """Mean drive torque over the last `interval` [s], as the log measures it. (n,) [N·m]"""
         rows = max(round(interval / self.scenario.step), 1)
         mean: Array = self.history.tau[max(self.made - rows, 0) : max(self.made, 1)].mean(axis=0)
         return mean / self.true.gain + self.true.offset
+
+
+def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
+    """Normal deviates of standard deviation `size`, cut at two standard deviations."""
+    return np.asarray(size * np.clip(rng.standard_normal(shape), -2.0, 2.0))
+
+
+def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
+    """A payload section as a load on the flange, scaled."""
+    values = {"mass": (spec.mass,), "com": spec.com, "inertia": spec.inertia}
+    for key, numbers in values.items():
+        if why := out_of_bounds(key, numbers):
+            raise ParameterError(f"payload.{why}")
+    inertia = np.diag(scale * np.array(spec.inertia))
+    return Payload(mass=scale * spec.mass, com=np.array(spec.com), inertia=inertia)
+
+
+def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> TrueArm:
+    """Draw the arm of a scenario.
+
+    Whatever the sizes are, the same numbers are drawn: errors stay when one is off.
+    """
+    sizes, n = scenario.mismatch, robot.joints
+    for name, size in vars(sizes).items():
+        most = ABSOLUTE.get(name, LARGEST_SHARE)
+        if not 0 <= size <= most:
+            raise ParameterError(f"mismatch.{name} is {size:g}; it lies within 0 to {most:g}")
+    chain = perturbed_chain(robot.loaded_chain, sizes, rng)
+    friction = perturbed_friction(true_friction(robot, scenario.friction), sizes, rng)
+    gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
+    offset = deviate(rng, sizes.torque_offset, (n,))
+    # Drawn whether or not there is a payload, so that other draws do not move.
+    scale = 1.0 + float(deviate(rng, sizes.payload, (1,))[0])
+    nominal = robot.loaded_chain
+    if scenario.payload is not None:
+        chain = chain.with_payload(as_payload(scenario.payload, scale))
+        if scenario.payload.known:
+            nominal = nominal.with_payload(as_payload(scenario.payload))
+    if (sensor := scenario.force_sensor) is not None:
+        if why := out_of_bounds("mass", (sensor.mass, sensor.tool_mass)):
+            raise ParameterError(f"force_sensor.{why}")
+        body = Payload(mass=sensor.mass, com=np.array(sensor.com), inertia=np.zeros((3, 3)))
+        chain = chain.with_payload(body)
+        if sensor.known:
+            nominal = nominal.with_payload(body)
+    believed = replace(robot, chain=nominal, payload=None)
+    return TrueArm(chain=chain, friction=friction, gain=gain, offset=offset, nominal=believed)
+
+
+def perturbed_chain(chain: Chain, sizes: MismatchSpec, rng: np.random.Generator) -> Chain:
+    """A chain with erring masses, centres of mass and rotor inertias."""
+    n = chain.joints
+    mass = 1.0 + deviate(rng, sizes.mass, (n,))
+    com = deviate(rng, sizes.com, (n, 3))
+    rotor = 1.0 + deviate(rng, sizes.rotor_inertia, (n,))
+    return replace(
+        chain,
+        mass=chain.mass * mass,
+        com=chain.com + com,
+        inertia=chain.inertia * mass[:, None, None],
+        rotor_inertia=chain.rotor_inertia * rotor,
+    )
+
+
+def perturbed_friction(
+    friction: TrueFriction, sizes: MismatchSpec, rng: np.random.Generator
+) -> TrueFriction:
+    """Friction whose dry and viscous levels err independently."""
+    n = len(friction.coulomb)
+    dry, wet = (1.0 + deviate(rng, sizes.friction, (n,)) for _ in range(2))
+    levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}
+    return replace(friction, **{name: getattr(friction, name) * k for name, k in levels.items()})

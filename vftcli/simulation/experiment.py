@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -13,19 +14,50 @@ from vftcli.signals.remarks import fact
 from vftcli.signals.source import Source
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
-from vftcli.simulation.force_sensor import read_force_sensor
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.sensing import Measured, Samples, check_sensing, measure_run, sample_run
+from vftcli.simulation.sensing import (
+    Measured,
+    Samples,
+    Vendor,
+    check_sensing,
+    interpolate,
+    measure_run,
+    read_force_sensor,
+    sample_run,
+    vendor_view,
+)
+from vftcli.simulation.touch import joint_jacobian
 from vftcli.simulation.trajectories import plan
-from vftcli.simulation.truth import Truth, truth_of
-from vftcli.simulation.vendor import Vendor, vendor_view
 
 MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
 REPORT_STEPS = 500  #: Inner steps between two reports of progress.
 #: Offset between the seeds of the two runs' sensors, so that their noise differs.
 PAIR_SEED = 1_000_003
+AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 Progress = Callable[[int, int], None]  #: Called with the steps done and the steps in all.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Truth:
+    """What really happened at each sample, on the log's clock."""
+
+    t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
+    tau_ext: Array  #: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
+    wrench: Array  #: Wrench of all contacts on the flange, about its origin, in base axes. (M, 6)
+    #: Name → wrench of each contact elsewhere, about its own point, in base axes. (M, 6)
+    contacts: dict[str, Array]
+    walks: dict[str, Array]  #: Name → joint torque of each random walk. (M, n) [N·m]
+
+    def columns(self) -> dict[str, Array]:
+        """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
+        table = {"t": self.t}
+        table |= {f"tau_ext/{j}": c for j, c in enumerate(self.tau_ext.T, start=1)}
+        table |= {f"wrench/{a}": c for a, c in zip(AXES, self.wrench.T, strict=True)}
+        for name, values in (self.contacts | self.walks).items():
+            labels = AXES if name in self.contacts else range(1, values.shape[1] + 1)
+            table |= {f"contact/{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+        return table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,14 +81,13 @@ class Simulation:
         written = np.array(self.measured.rows)
         rows = np.unique(written)
         seen = self.measured
-        t = seen.stamp[rows] - seen.stamp[rows[0]]
         duplicates = len(written) - len(rows)
         repeated = "repeats-dropped" if duplicates > 1 else "repeat-dropped"
         remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
         in_current = seen.current is not None
         current = self.vendor.target_current
         return Recording(
-            t=t,
+            t=seen.stamp[rows] - seen.stamp[rows[0]],
             q=seen.q[rows],
             dq=seen.dq[rows],
             current=seen.current[rows] if seen.current is not None else None,
@@ -148,13 +179,15 @@ def observe(arm: Arm) -> Simulation:
         samples=samples,
         measured=measured,
         vendor=vendor_view(arm, samples, measured),
-        force_sensor=read_force_sensor(arm, samples, truth),
+        force_sensor=read_force_sensor(arm, samples, truth.wrench),
         truth=truth,
     )
 
 
 def simulate_pair(
-    scenario: Scenario, seed: int | None = None, progress: Progress | None = None
+    scenario: Scenario,
+    seed: int | None = None,
+    progress: Progress | None = None,
 ) -> list[Simulation]:
     """Run an experiment, and if it is one of a pair also the free run of the same arm.
 
@@ -167,3 +200,51 @@ def simulate_pair(
         raise ParameterError("pair = true needs a payload or contacts that the free run lacks")
     free = replace(scenario, payload=None, contacts=(), pair=False)
     return [run, simulate(free, run.seed, progress, noise_seed=run.seed + PAIR_SEED)]
+
+
+def truth_of(arm: Arm, samples: Samples) -> Truth:
+    """Evaluate the contacts at the log's sampling instants."""
+    touching, made = arm.touching, arm.made
+    middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
+    wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
+    walk = np.zeros((made, arm.robot.joints))
+    for each in touching.walks.values():
+        walk += each[:made]
+    data = arm.plant.model.createData()
+    tau_ext, wrench = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
+    for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
+        tau, flange = torque_and_wrench(arm, data, samples.q[k], wrenches[k])
+        tau_ext[k] += tau
+        wrench[k] = flange
+    contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
+    walks = {k: interpolate(samples.time, middle, w[:made]) for k, w in touching.walks.items()}
+    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=wrench, contacts=contacts, walks=walks)
+
+
+def torque_and_wrench(
+    arm: Arm,
+    data: Any,  # noqa: ANN401 - Pinocchio is untyped
+    q: Array,
+    wrenches: Array,
+) -> tuple[Array, Array]:
+    """Joint torque of all contacts (n,) [N·m] and the wrench of those on the flange (6,)."""
+    import pinocchio as pin
+
+    model, chain = arm.plant.model, arm.true.chain
+    pin.computeJointJacobians(model, data, q)
+    tau, flange = np.zeros(len(q)), np.zeros(6)
+    for contact, wrench in zip(arm.touching.mounted, wrenches, strict=True):
+        R = data.oMi[contact.joint].rotation
+        if contact.on_flange:
+            flange += at_other_point(wrench, R @ contact.turn @ contact.lever)
+        else:
+            J = joint_jacobian(model, data, contact.joint)
+            tau += J.T @ at_other_point(wrench, R @ contact.point)
+    last = len(q)
+    offset = data.oMi[last].rotation @ chain.flange_translation
+    return tau + joint_jacobian(model, data, last).T @ at_other_point(flange, offset), flange
+
+
+def at_other_point(wrench: Array, lever: Array) -> Array:
+    """A wrench referred to a point from which its own point lies `lever` (3,) [m] away. (6,)"""
+    return np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])

@@ -2,8 +2,7 @@
 
 τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest (Coulomb, load and
 Stribeck), s the state of the play operator (`vftcli.robots.presliding`) and
-λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: a joint that gives holds at rest what its teeth hold, a·s, and
-the rest of its dry friction fades with the speed, v₀ = 3 mrad/s (`CREEP`);
+λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a joint that gives holds a·s, v₀ is `CREEP`;
 smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
 + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).
 """
@@ -55,14 +54,10 @@ class TrueFriction:
     stribeck_velocity: float = 0.05  #: Velocity over which it fades. [rad/s]
 
     def dry(self, dq: Array, load: Array | None = None) -> Array:
-        """Largest dry friction torque at velocities `dq` (n,) [rad/s]. (n,) [N·m]
+        """Largest dry friction at velocities (n,) [rad/s] and loads (n,) [N·m]. (n,) [N·m]
 
         F_c (1 + s exp(−(q̇/v_s)²)), the Stribeck curve of Armstrong-Hélouvry, Dupont and Canudas
         de Wit, Automatica 30 (1994), and f_l |load| with the gravity torque that the gears carry.
-
-        Args:
-            dq: Velocities. (n,) [rad/s]
-            load: Gravity torques, None for none. (n,) [N·m]
         """
         dry = self.coulomb
         if self.stribeck != 0.0:
@@ -75,12 +70,7 @@ class TrueFriction:
     def creep(self, dq: Array, dry: Array) -> tuple[Array, Array, Array]:
         """What fades of the dry friction, of joints that give, its slope, and what sticks.
 
-        Args:
-            dq: Velocities. (n,) [rad/s]
-            dry: Largest dry friction torques. (n,) [N·m]
-
-        Returns:
-            (n,) [N·m], (n,) [N·m·s/rad] and (n,) [N·m].
+        (n,) each [N·m, N·m·s/rad, N·m], at velocities [rad/s].
         """
         gives = self.presliding > 0.0
         fading, sign = np.where(gives, dry, 0.0), np.tanh(dq / CREEP)
@@ -91,7 +81,7 @@ class TrueFriction:
         speed = np.abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
-        if self.has_logarithm:
+        if "logarithmic" in self.present:
             bend = self.logarithmic_velocity
             torque = torque + self.logarithmic * np.log1p(speed / bend) * np.sign(dq)
             slope = slope + self.logarithmic / (bend + speed)
@@ -99,28 +89,18 @@ class TrueFriction:
             beyond = np.maximum(speed - self.bends, 0.0)
             torque = torque + np.add.reduce(self.bend_slopes * beyond) * np.sign(dq)
             slope = slope + np.add.reduce(np.where(beyond > 0.0, self.bend_slopes, 0.0))
-        if self.has_sigmoid:
+        if "amplitude" in self.present:
             bell = 1.0 / (1.0 + np.exp(-self.slope * (dq + self.shift)))
             rest = 1.0 / (1.0 + np.exp(-self.slope * self.shift))
             torque = torque + self.amplitude * (bell - rest)
             slope = slope + self.amplitude * self.slope * bell * (1.0 - bell)
-        # The step treats the slope implicitly; a negative one would pump energy into the joint.
+        # The slope is implicit: a negative one would pump energy into the joint.
         return torque, np.maximum(slope, 0.0)
 
     @cached_property
-    def is_loaded(self) -> bool:
-        """Whether any joint rubs more under load; gravity is left out where none does."""
-        return bool(self.load_coulomb.any())
-
-    @cached_property
-    def has_logarithm(self) -> bool:
-        """Whether the friction of any joint rises as a logarithm."""
-        return bool(self.logarithmic.any())
-
-    @cached_property
-    def has_sigmoid(self) -> bool:
-        """Whether any joint has sigmoid friction; exponentials are left out where none has."""
-        return bool(self.amplitude.any())
+    def present(self) -> frozenset[str]:
+        """Names of what any joint has; what none has is left out of a step."""
+        return frozenset(name for name in SHAPES if getattr(self, name).any())
 
     def warmed(self, factor: Array) -> "TrueFriction":
         """The friction, its offset apart, multiplied by a factor of each joint. (n,) [1]"""
@@ -169,11 +149,8 @@ def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
             raise ParameterError(
                 f"friction.{name} is for an arm whose file has no friction; {robot.name!r} has some"
             )
-        if (
-            len(values) != robot.joints
-            or np.any(values < 0)
-            or out_of_bounds(name, values.tolist())
-        ):
+        low = len(values) != robot.joints or np.any(values < 0)
+        if low or out_of_bounds(name, values.tolist()):
             raise ParameterError(
                 f"friction.{name} must have one number a joint, {robot.joints} of them, none "
                 "negative or beyond what robots have"

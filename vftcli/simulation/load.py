@@ -1,17 +1,31 @@
 """Scenarios by name or file, with the user's overrides, and back to TOML."""
 
-from collections.abc import Sequence
-from dataclasses import fields, is_dataclass
+import types
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, toml_tables
+from vftcli.signals.parsing import assignment, check_known, toml_tables
+from vftcli.signals.schema import LIST, SWITCH, TABLE, TEXT, WHOLE, ValueKind, is_finite
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import section_from, unknown_name
 
 FOLDER = Path(__file__).parent / "scenarios"
+Section = TypeVar("Section")
+#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below it.
+LARGEST = 1e10
+#: Type of a field → its kind.
+KINDS = {
+    bool: SWITCH,
+    float: ValueKind(
+        f"a finite number, {LARGEST:g} at most", lambda v: is_finite(v) and abs(v) <= LARGEST
+    ),
+    int: WHOLE,
+    str: TEXT,
+}
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -39,58 +53,84 @@ def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
     if not path.is_file():
         path = Path(name)
         if path.suffix.lower() != ".toml":
-            names = scenario_names()
-            raise ParameterError(
-                unknown_name(f"scenario {str(name)!r}", str(name), names) + " Or give a FILE.toml."
-            )
-    table = read_table(path)
+            check_known(str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}")
+    try:
+        table = toml_tables(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
     table.setdefault("name", path.stem)
     for override in overrides:
         apply_override(table, override)
     return section_from(Scenario, table, "")
 
 
-def read_table(path: Path) -> dict[str, Any]:
-    """The tables of a scenario file."""
-    try:
-        return toml_tables(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or "not text"
-        raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
-    except ParameterError as error:
-        raise ParameterError(f"{path}: {error}") from None
-
-
 def apply_override(table: dict[str, Any], override: str) -> None:
     """Put one `key=value` into the parsed file; contacts are addressed by name."""
     key, text = assignment(override, "--set", "key=value")
     parts = key.split(".")
-    node: Any = table
-    for depth, part in enumerate(parts[:-1]):
-        node = section_of(node, part, ".".join(parts[: depth + 1]))
-    node[parts[-1]] = parse_value(text)
-
-
-def section_of(node: Any, part: str, where: str) -> Any:  # noqa: ANN401 - TOML values
-    """Return the section or the named contact `part` of a parsed table, made if not there."""
-    if isinstance(node, list):
-        node = {str(c.get("name")): c for c in reversed(node) if isinstance(c, dict)}
-        if part not in node:
-            raise ParameterError(
-                unknown_name(f"contact {where!r}", part, [*node][::-1] or ["none"])
-            )
-    found = node.setdefault(part, {})
-    if not isinstance(found, dict | list):
-        raise ParameterError(f"{where} is a value, not a section")
-    return found
-
-
-def parse_value(text: str) -> Any:  # noqa: ANN401
-    """Return a TOML value; what is none is a string."""
+    node: Any = {"": table}
+    for depth, part in enumerate(["", *parts[:-1]]):
+        where = ".".join(parts[:depth])
+        if isinstance(node, list):
+            node = {str(c.get("name")): c for c in reversed(node) if isinstance(c, dict)}
+            check_known(part, [*node][::-1] or ["no contact"], f"no contact {where!r}")
+        node = node.setdefault(part, {})
+        if not isinstance(node, dict if depth == len(parts) - 1 else dict | list):
+            raise ParameterError(f"{where} is a value, not a section")
     try:
-        return toml_tables(f"x = {text}")["x"]
+        node[parts[-1]] = toml_tables(f"x = {text}")["x"]
     except ParameterError:
-        return text
+        node[parts[-1]] = text
+
+
+def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
+    """A section's dataclass of its TOML table; complaints name the key that is wrong."""
+    paths = {f.name: f"{where}.{f.name}".lstrip(".") for f in fields(cls)}  # type: ignore[arg-type]
+    for key in table:
+        check_known(key, paths, f"no scenario key {f'{where}.{key}'.lstrip('.')!r}")
+    for field in fields(cls):  # type: ignore[arg-type]
+        if field.name not in table and field.default is field.default_factory is MISSING:
+            raise ParameterError(
+                f"the scenario lacks {paths[field.name]}; [{where or 'scenario'}] takes "
+                f"{', '.join(paths)}"
+            )
+    hints = get_type_hints(cls)
+    return cls(**{key: convert(value, hints[key], paths[key]) for key, value in table.items()})
+
+
+def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML values
+    """A TOML value as the type that a field declares."""
+    items = get_args(hint)
+    if get_origin(hint) in {Union, types.UnionType}:
+        return convert_union(value, items, where)
+    if get_origin(hint) is tuple:
+        LIST.check(where, value)
+        items = items[:1] * len(value) if items[-1] is Ellipsis else items
+        if len(value) != len(items):
+            raise ParameterError(f"{where} has {len(value)} entries; it must have {len(items)}")
+        pairs = enumerate(zip(value, items, strict=True))
+        return tuple(convert(v, item, f"{where}[{i}]") for i, (v, item) in pairs)
+    KINDS.get(hint, TABLE).check(where, value)
+    if hint in KINDS:
+        return float(value) if hint is float else value
+    return section_from(hint, value, where)
+
+
+def convert_union(value: Any, options: tuple[Any, ...], where: str) -> Any:  # noqa: ANN401
+    """A value as the first type that accepts it, a table as the section its `kind` names."""
+    if tagged := {o.KIND: o for o in options if hasattr(o, "KIND")}:
+        TABLE.check(where, value)
+        kind = str(value.get("kind", ""))
+        check_known(kind, tagged, f"no {where}.kind {kind!r}")
+        return section_from(tagged[kind], {k: v for k, v in value.items() if k != "kind"}, where)
+    *others, last = (option for option in options if option is not type(None))
+    for option in others:
+        with suppress(ParameterError):
+            return convert(value, option, where)
+    return convert(value, last, where)
 
 
 def to_toml(scenario: Scenario, seed: int) -> str:
@@ -99,15 +139,14 @@ def to_toml(scenario: Scenario, seed: int) -> str:
 
 
 def as_table(section: Any) -> dict[str, Any]:  # noqa: ANN401
-    """Return a dataclass as TOML would hold it, without what is None."""
+    """A dataclass as TOML would hold it, without what is None."""
     table: dict[str, Any] = {"kind": section.KIND} if hasattr(section, "KIND") else {}
     for field in fields(section):
         value = getattr(section, field.name)
-        if value is None:
-            continue
         if is_dataclass(value):
             value = as_table(value)
         elif isinstance(value, tuple) and value and is_dataclass(value[0]):
             value = [as_table(v) for v in value]
-        table[field.name] = value
+        if value is not None:
+            table[field.name] = value
     return table

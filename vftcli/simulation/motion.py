@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,20 +20,7 @@ class Reference(NamedTuple):
     ddq: Array
 
 
-class Command(Protocol):
-    """A commanded motion of known length: what every ``[trajectory]`` becomes."""
-
-    @property
-    def duration(self) -> float:
-        """Time from its start to its end. [s]"""
-        ...
-
-    def at(self, t: Array) -> Reference:
-        """The reference at times `t` (T,) [s]; before its start and after its end it rests."""
-        ...
-
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Periodic:
     """Joint positions as a Fourier series in the phase 2πt/period."""
 
@@ -60,7 +47,7 @@ class Periodic:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Stretches:
     """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them."""
 
@@ -94,6 +81,10 @@ class Stretches:
         return out
 
 
+#: A commanded motion of known length: what every ``[trajectory]`` becomes.
+Command = Periodic | Stretches
+
+
 def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
     """Paths of `Stretches` that lead from each of the points (n,) [rad] to the next."""
     return tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points))
@@ -101,5 +92,4 @@ def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
 
 def minimum_jerk(u: Number) -> Number:
     """The way 10u³ − 15u⁴ + 6u⁵ from 0 to 1 over u in [0, 1]."""
-    way: Number = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-    return way
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)

@@ -1,14 +1,22 @@
-"""What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy."""
+"""What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy.
+
+Its estimate of contact: measured torque less the nominal model's, low-passed.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from vftcli.robots import Robot
+from vftcli.robots.friction import friction_torque
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.arm import Arm, History, JointSignals
-from vftcli.simulation.scenario import SensingSpec
+from vftcli.signals.pose import rpy_matrix
+from vftcli.simulation.arm import Arm, JointSignals
+from vftcli.simulation.motion import Reference
+from vftcli.simulation.scenario import ForceSensorSpec, SensingSpec
+from vftcli.simulation.servo import rigid_torque
 
 #: Logging rate by kind of drive measurement, for robots that state none. [Hz]
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
@@ -40,20 +48,24 @@ class Measured:
     rows: tuple[int, ...]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Vendor:
+    """The controller's own quantities at each sample."""
+
+    target_torque: Array  #: Nominal rigid-body torque of the reference. (M, n) [N·m]
+    #: That and the nominal friction as current, None without drive constants. (M, n) [A]
+    target_current: Array | None
+    tau_ext: Array  #: Its estimate of the external torque ON the robot. (M, n) [N·m]
+
+
 def check_sensing(spec: SensingSpec) -> None:
     """Raise unless the sensing section describes something that can be."""
-    shares = {"dropped": spec.dropped, "repeated": spec.repeated}
-    if bad := [name for name, value in shares.items() if not 0 <= value < 1]:
-        raise ParameterError(f"sensing.{bad[0]} is {shares[bad[0]]:g}; it is a share from 0 to 1")
-    sizes = {
-        "rate": spec.rate,
-        "noise": spec.noise,
-        "current_noise": spec.current_noise or 0.0,
-        "position_step": spec.position_step,
-        "jitter": spec.jitter,
-    }
-    if bad := [name for name, value in sizes.items() if value < 0]:
-        raise ParameterError(f"sensing.{bad[0]} is {sizes[bad[0]]:g}; it must not be negative")
+    for name in ("dropped", "repeated"):
+        if not 0 <= (value := getattr(spec, name)) < 1:
+            raise ParameterError(f"sensing.{name} is {value:g}; it is a share from 0 to 1")
+    for name in ("rate", "noise", "current_noise", "position_step", "jitter"):
+        if (value := getattr(spec, name) or 0.0) < 0:
+            raise ParameterError(f"sensing.{name} is {value:g}; it must not be negative")
     if spec.torque not in {"average", "instant"}:
         raise ParameterError(f"sensing.torque is {spec.torque!r}; it is average or instant")
     if abs(spec.clock_drift) >= 0.5 or spec.vendor_cutoff <= 0:
@@ -70,23 +82,22 @@ def log_rate(spec: SensingSpec, robot: Robot) -> float:
 
 
 def sample_run(arm: Arm) -> Samples:
-    """The true signals of a finished run at the instants of the log's own, drifting clock."""
+    """The true signals of a finished run on the log's drifting clock."""
     spec, history = arm.scenario.sensing, arm.close()
     rate = log_rate(spec, arm.robot)
-    grid = np.arange(len(history.q), dtype=float) * history.step
+    grid = np.arange(len(history.q), dtype=float) * arm.scenario.step
     end = grid[-1]
     count = int(np.floor(end * (1.0 + spec.clock_drift) * rate + 1e-6)) + 1
     stamp = np.arange(count, dtype=float) / rate
     time = np.minimum(stamp / (1.0 + spec.clock_drift), end)
     interval = 1.0 / rate / (1.0 + spec.clock_drift)
     names = ("q", "v", "target_q", "target_dq", "target_ddq")
-    states = {name: interpolate(time, grid, getattr(history, name)) for name in names}
-    middle = grid[:-1] + 0.5 * history.step
-    steps = {
-        name: interpolate(time, middle, getattr(history, name)[:-1]) for name in ("a", "friction")
-    }
-    tau = average_torque(history, grid, time, interval if spec.torque == "average" else 0.0)
-    return Samples(time=time, stamp=stamp, tau=tau, **states, **steps)
+    signals = {name: interpolate(time, grid, getattr(history, name)) for name in names}
+    for name in ("a", "friction"):
+        middle = grid[:-1] + 0.5 * arm.scenario.step
+        signals[name] = interpolate(time, middle, getattr(history, name)[:-1])
+    tau = average_torque(history.tau, grid, time, interval if spec.torque == "average" else 0.0)
+    return Samples(time=time, stamp=stamp, tau=tau, **signals)
 
 
 def interpolate(time: Array, grid: Array, values: Array) -> Array:
@@ -97,62 +108,64 @@ def interpolate(time: Array, grid: Array, values: Array) -> Array:
     share = np.clip(place - left, 0.0, 1.0)
     share[share < 1e-9] = 0.0
     share = share.reshape(-1, *([1] * (values.ndim - 1)))
-    mixed: Array = values[left] * (1.0 - share) + values[left + 1] * share
-    return mixed
+    return np.asarray(values[left] * (1.0 - share) + values[left + 1] * share)
 
 
-def average_torque(history: History, grid: Array, time: Array, interval: float) -> Array:
+def average_torque(tau: Array, grid: Array, time: Array, interval: float) -> Array:
     """Drive torque averaged over the `interval` before each sample, or over the last step. (M, n)
 
-    The torque is constant over an inner step, so its integral is piecewise linear and the average
-    exact. The first sample has no interval before it and reports the first step's torque.
+    Exact, for it is constant over a step. The first sample reports the first step's.
     """
-    span = max(interval, history.step)
-    total = np.zeros_like(history.tau)
-    np.cumsum(history.tau[:-1] * history.step, axis=0, out=total[1:])
+    step, total = grid[1], np.zeros_like(tau)
+    span = max(interval, step)
+    np.cumsum(tau[:-1] * step, axis=0, out=total[1:])
     begin = np.maximum(time - span, 0.0)
     end = np.maximum(time, grid[1])
     grown = interpolate(end, grid, total) - interpolate(begin, grid, total)
-    mean: Array = grown / (end - begin)[:, None]
-    return mean
+    return np.asarray(grown / (end - begin)[:, None])
+
+
+def noise_sizes(arm: Arm) -> tuple[Array, Array, Array]:
+    """Noise of positions, velocities, and torques or currents. (n,) each [rad, rad/s, N·m, A]"""
+    spec, noise = arm.scenario.sensing, arm.robot.noise
+    K = drive_constants(arm.robot)
+    own = noise.tau if K is None else noise.current
+    q, dq, effort = (spec.noise * np.nan_to_num(size) for size in (noise.q, noise.qd, own))
+    if K is not None and spec.current_noise is not None:
+        effort = np.full(arm.robot.joints, spec.current_noise)
+    return q, dq, effort
+
+
+def drive_constants(robot: Robot) -> Array | None:
+    """Drive constants of an arm that measures motor currents, else None. (n,) [N·m/A]"""
+    return robot.torque_constant if robot.torque_source == "current" else None
 
 
 def measure_run(arm: Arm, samples: Samples) -> Measured:
-    """Report what the sensors make of the true signals; everything random is from the seed."""
-    spec, robot = arm.scenario.sensing, arm.robot
+    """What the sensors make of the true signals, noise from the seed."""
+    spec, K = arm.scenario.sensing, drive_constants(arm.robot)
     rng = np.random.default_rng(arm.seeds["sensing"])
-    shape = samples.q.shape
-    q = samples.q + spec.noise * known_noise(robot.noise.q) * rng.standard_normal(shape)
-    if spec.position_step > 0:
-        q = np.round(q / spec.position_step) * spec.position_step
-    dq = samples.v + spec.noise * known_noise(robot.noise.qd) * rng.standard_normal(shape)
+    sizes, shape = noise_sizes(arm), samples.q.shape
+    q = rounded(samples.q + sizes[0] * rng.standard_normal(shape), spec.position_step)
+    dq = samples.v + sizes[1] * rng.standard_normal(shape)
     seen = samples.tau / arm.true.gain + arm.true.offset
-    noise = rng.standard_normal(shape)
-    current = None
-    if robot.torque_source == "current" and robot.torque_constant is not None:
-        size = spec.noise * known_noise(robot.noise.current)
-        if spec.current_noise is not None:
-            size = np.full(robot.joints, spec.current_noise)
-        current = seen / robot.torque_constant + size * noise
-        torque = current * robot.torque_constant
-    else:
-        torque = seen + spec.noise * known_noise(robot.noise.tau) * noise
+    noise = sizes[2] * rng.standard_normal(shape)
+    current = None if K is None else seen / K + noise
     stamp = with_jitter(samples.stamp, spec.jitter, rng)
-    rows = rows_logged(len(stamp), spec, rng)
     return Measured(
         stamp=stamp,
         q=q,
         dq=dq,
-        torque=torque,
+        torque=seen + noise if K is None or current is None else current * K,
         current=current,
         temperature=arm.temperature(samples.time),
-        rows=rows,
+        rows=rows_logged(len(stamp), spec, rng),
     )
 
 
-def known_noise(size: Array) -> Array:
-    """Noise sizes with zero where the profile has none. (n,)"""
-    return np.where(np.isfinite(size), size, 0.0)
+def rounded(q: Array, step: float) -> Array:
+    """Positions quantised to a step, 0 for none. [rad]"""
+    return np.round(q / step) * step if step > 0 else q
 
 
 def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
@@ -162,12 +175,11 @@ def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
         return stamp
     # Less than half a period to either side: stamps must go on increasing.
     bound = 0.45 * (stamp[1] - stamp[0])
-    moved: Array = stamp + np.clip(size * draw, -bound, bound)
-    return moved
+    return stamp + np.clip(size * draw, -bound, bound)
 
 
 def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tuple[int, ...]:
-    """Which sample each row of the log holds. The first and the last are always there."""
+    """Which sample each row of the log holds, first and last always."""
     lost = rng.random(count) < spec.dropped
     again = rng.random(count) < spec.repeated
     inner = np.arange(count) > 0
@@ -175,3 +187,87 @@ def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tupl
     source = np.arange(count)
     source[again & inner] -= 1
     return tuple(int(k) for k in source[~(lost & inner)])
+
+
+def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
+    """Evaluate the controller's nominal model along a run.
+
+    As Universal Robots', its friction knows load and temperature, no presliding.
+    """
+    nominal: Robot = arm.true.nominal
+    target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
+    still, warm = np.zeros_like(samples.target_q), measured.temperature
+    load = momentum_terms(nominal.loaded_chain, samples.target_q, still).gravity
+    target_torque = rigid_torque(nominal.model, target)
+    target_current = None
+    if nominal.torque_constant is not None:
+        rubs = friction_torque(nominal.friction, samples.target_dq, load, temperature=warm)
+        target_current = (target_torque + rubs) / nominal.torque_constant
+    motion = Reference(measured.q, measured.dq, samples.target_ddq)
+    model_torque = rigid_torque(nominal.model, motion)
+    model_torque += friction_torque(nominal.friction, measured.dq, load, temperature=warm)
+    spec = arm.scenario.sensing
+    step = 1.0 / log_rate(spec, arm.robot)
+    residual = first_order_low_pass(measured.torque - model_torque, spec.vendor_cutoff, step)
+    return Vendor(target_torque=target_torque, target_current=target_current, tau_ext=-residual)
+
+
+def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
+    """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
+    # Exact discretisation of the first-order filter for an input held over the step.
+    share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
+    out = np.empty_like(signal)
+    state = signal[0].copy()
+    for k, row in enumerate(signal):
+        state = state + share * (row - state)
+        out[k] = state
+    return out
+
+
+def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
+    """Wrench in sensor axes about the sensor's origin, as force ON the robot. (M, 6) [N, N·m]
+
+    Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without one.
+    """
+    spec = arm.scenario.force_sensor
+    if spec is None:
+        return None
+    # Its own generator: mounting a sensor leaves the noise of all other signals as it was.
+    rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
+    clean = np.zeros((len(samples.time), 6))
+    turn = rpy_matrix(spec.rpy)
+    rotations, specific = tool_motion(arm, samples, spec, turn)
+    for k, R in enumerate(rotations):
+        force = R.T @ wrench[k, :3]
+        lever = turn.T @ np.array(spec.position)
+        moment = R.T @ wrench[k, 3:] - np.cross(lever, force)
+        weight = spec.tool_mass * (R.T @ specific[k])
+        clean[k, :3] = force + weight
+        clean[k, 3:] = moment + np.cross(spec.tool_com, weight)
+    noise = np.repeat([spec.noise_force, spec.noise_torque], 3)
+    drift = np.repeat([spec.drift_force, spec.drift_torque], 3)
+    reading: Array = clean + np.array(spec.bias) + np.outer(samples.time, drift)
+    return reading + noise * rng.standard_normal(clean.shape)
+
+
+def tool_motion(
+    arm: Arm, samples: Samples, spec: ForceSensorSpec, turn: Array
+) -> tuple[Array, Array]:
+    """Orientation of the sensor in the base (M, 3, 3), and g − a of the tool's centre. (M, 3)"""
+    import pinocchio as pin
+
+    model, data = arm.plant.model, arm.plant.model.createData()
+    frame = model.getFrameId("flange")
+    rotations = np.empty((len(samples.time), 3, 3))
+    specific = np.empty((len(samples.time), 3))
+    for k, (q, v, a) in enumerate(zip(samples.q, samples.v, samples.a, strict=True)):
+        pin.forwardKinematics(model, data, q, v, a)
+        pose = pin.updateFramePlacement(model, data, frame)
+        axes = pin.LOCAL_WORLD_ALIGNED
+        moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
+        spin = pin.getFrameVelocity(model, data, frame, axes).angular
+        rotations[k] = pose.rotation @ turn
+        lever = pose.rotation @ np.array(spec.position) + rotations[k] @ np.array(spec.tool_com)
+        swing = np.cross(moving.angular, lever) + np.cross(spin, np.cross(spin, lever))
+        specific[k] = model.gravity.linear - (moving.linear + swing)
+    return rotations, specific

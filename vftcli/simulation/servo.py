@@ -8,10 +8,9 @@ from vftcli.robots import Robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.packages import needed
+from vftcli.signals.parsing import check_known
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import ServoSpec
-from vftcli.simulation.schema import unknown_name
 
 #: Natural frequency of the position loop by name. [rad/s]
 STIFFNESS = {"stiff": 90.0, "soft": 28.0}
@@ -28,17 +27,17 @@ class Servo:
     Attributes:
         omega: Natural frequency ω of the loop. [rad/s]
         limit: Torque limits; infinite where unknown. (n,) [N·m]
+        q_min, q_max: Joint limits, likewise. (n,) [rad]
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
-        pin = needed("pinocchio", "a simulation")
+        import pinocchio as pin
 
         self.inertia = pin.crba
-        if isinstance(spec.stiffness, str) and spec.stiffness not in STIFFNESS:
-            raise ParameterError(
-                unknown_name(f"servo.stiffness {spec.stiffness!r}", spec.stiffness, STIFFNESS)
-            )
-        omega = STIFFNESS[spec.stiffness] if isinstance(spec.stiffness, str) else spec.stiffness
+        omega = spec.stiffness
+        if isinstance(omega, str):
+            check_known(omega, STIFFNESS, f"no servo.stiffness {omega!r}")
+            omega = STIFFNESS[omega]
         if omega <= 0 or spec.damping < 0:
             raise ParameterError("servo.stiffness must be positive and damping not negative")
         if omega * step > FASTEST_LOOP:
@@ -49,14 +48,9 @@ class Servo:
         self.spec, self.robot = spec, robot
         self.model, self.data = robot.model, robot.model.createData()
         self.omega, self.rate = omega, 2.0 * spec.damping * omega
-        known = np.isfinite(robot.limits.tau_max) & spec.torque_limits
-        self.limit = np.where(known, robot.limits.tau_max, np.inf)
-        self.q_min = np.where(np.isfinite(robot.limits.q_min), robot.limits.q_min, -np.inf)
-        self.q_max = np.where(np.isfinite(robot.limits.q_max), robot.limits.q_max, np.inf)
-
-    def clip_to_limits(self, q_d: Array) -> Array:
-        """A commanded position brought inside the joint limits. (n,) [rad]"""
-        return np.clip(q_d, self.q_min, self.q_max)
+        limits = robot.limits
+        self.limit = np.fmin(limits.tau_max if spec.torque_limits else np.inf, np.inf)
+        self.q_min, self.q_max = np.fmax(limits.q_min, -np.inf), np.fmin(limits.q_max, np.inf)
 
     def feed_forward(self, reference: Reference) -> Array:
         """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""
@@ -75,7 +69,7 @@ class Servo:
 
 def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
     """Inverse dynamics of a Pinocchio model along a motion. (T, n) [N·m]"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     data, out = model.createData(), np.empty_like(reference.q)
     for k, (q, dq, ddq) in enumerate(zip(*reference, strict=True)):

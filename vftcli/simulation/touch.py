@@ -8,10 +8,17 @@ import numpy as np
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.packages import needed
 from vftcli.signals.pose import cross
-from vftcli.simulation.pushes import LoadSpec, Place, ProfileSpec, PushesSpec, Touch
-from vftcli.simulation.springs import HandSpec, StopSpec
+from vftcli.simulation.contacts import (
+    Hand,
+    HandSpec,
+    LoadSpec,
+    Place,
+    ProfileSpec,
+    PushesSpec,
+    Segments,
+    StopSpec,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +42,7 @@ class Mounted(NamedTuple):
     """A contact and the body it acts on."""
 
     name: str  #: The contact's name.
-    contact: Touch  #: What it exerts.
+    contact: Segments | Hand | StopSpec  #: What it exerts.
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
@@ -43,21 +50,18 @@ class Mounted(NamedTuple):
     lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
 
 
-class Walk(NamedTuple):
-    """A random walk of the joint torques: its value at each inner step. (N, n) [N·m]"""
-
-    name: str
-    torque: Array
-
-
-def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: float) -> Mounted:
+def mount(
+    spec: WrenchSpec,
+    chain: Chain,
+    rng: np.random.Generator,
+    duration: float,
+) -> Mounted:
     """Put a contact on its link."""
     if not 0 <= spec.link <= chain.joints:
         raise ParameterError(
             f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
         )
-    contact: Touch = spec.start(rng, duration)
-    lever = np.array(spec.point)
+    contact, lever = spec.start(rng, duration), np.array(spec.point)
     if spec.link == 0:
         point = chain.flange_rotation @ lever + chain.flange_translation
         return Mounted(spec.name, contact, chain.joints, chain.flange_rotation, point, True, lever)
@@ -65,9 +69,13 @@ def mount(spec: WrenchSpec, chain: Chain, rng: np.random.Generator, duration: fl
 
 
 def draw_walk(
-    spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
-) -> Walk:
-    """Draw a random walk of joint torques over `steps` inner steps of `step` [s]."""
+    spec: RandomWalkSpec,
+    joints: int,
+    steps: int,
+    step: float,
+    rng: np.random.Generator,
+) -> Array:
+    """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
     if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
         raise ParameterError(
             f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "
@@ -78,7 +86,7 @@ def draw_walk(
     walk += spec.initial * rng.standard_normal(joints)
     late = np.arange(steps) * step >= spec.begin
     begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
-    return Walk(spec.name, begun * late[:, None])
+    return np.asarray(begun * late[:, None])
 
 
 class Touching:
@@ -86,7 +94,7 @@ class Touching:
 
     Attributes:
         mounted: Contacts that exert wrenches.
-        walks: Contacts that exert joint torques.
+        walks: Name → joint torque of each random walk at each inner step. (N, n) [N·m]
         wrenches: The last wrench of each mounted contact about its point, base axes. (C, 6)
     """
 
@@ -104,10 +112,10 @@ class Touching:
         # A generator a contact: adding one leaves what the others draw as it was.
         rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
         self.mounted: list[Mounted] = []
-        self.walks: list[Walk] = []
+        self.walks: dict[str, Array] = {}
         for spec, rng in zip(specs, rngs, strict=True):
             if isinstance(spec, RandomWalkSpec):
-                self.walks.append(draw_walk(spec, chain.joints, steps, step, rng))
+                self.walks[spec.name] = draw_walk(spec, chain.joints, steps, step, rng)
             else:
                 self.mounted.append(mount(spec, chain, rng, steps * step))
         self.wrenches = np.zeros((len(self.mounted), 6))
@@ -120,33 +128,23 @@ class Touching:
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
         tau = np.zeros_like(v)
-        for walk in self.walks:
-            tau += walk.torque[min(int(t / self.step), len(walk.torque) - 1)]
+        for walk in self.walks.values():
+            tau += walk[min(int(t / self.step), len(walk) - 1)]
         for k, mounted in enumerate(self.mounted):
-            if mounted.contact.active(t):
-                J = joint_jacobian(model, data, mounted.joint)
-                tau += self.push(k, mounted, t, J, data.oMi[mounted.joint], v)
-            else:
-                self.wrenches[k] = 0.0
-        return tau
-
-    def push(self, k: int, mounted: Mounted, t: float, J: Array, pose: Any, v: Array) -> Array:  # noqa: ANN401
-        """Joint torque of one contact, its wrench kept. (n,) [N·m]"""
-        R, origin = pose.rotation, pose.translation
-        arm = R @ mounted.point
-        twist = J @ v
-        velocity = twist[:3] + cross(twist[3:], arm)
-        place = Place(R @ mounted.turn, origin + arm, velocity, twist[3:])
-        wrench = mounted.contact.wrench(t, place)
-        self.wrenches[k] = wrench
-        moment = wrench[3:] + cross(arm, wrench[:3])
-        tau: Array = J[:3].T @ wrench[:3] + J[3:].T @ moment
+            self.wrenches[k] = 0.0
+            if not mounted.contact.active(t):
+                continue
+            J, pose = joint_jacobian(model, data, mounted.joint), data.oMi[mounted.joint]
+            R, arm, twist = pose.rotation, pose.rotation @ mounted.point, J @ v
+            velocity = twist[:3] + cross(twist[3:], arm)
+            place = Place(R @ mounted.turn, pose.translation + arm, velocity, twist[3:])
+            self.wrenches[k] = wrench = mounted.contact.wrench(t, place)
+            tau += J[:3].T @ wrench[:3] + J[3:].T @ (wrench[3:] + cross(arm, wrench[:3]))
         return tau
 
 
 def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
     """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
-    J: Array = pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED)
-    return J
+    return np.asarray(pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED))

@@ -1,19 +1,27 @@
-"""The kinds of ``[trajectory]`` a scenario can have, each turned into a motion of the joints."""
+"""The kinds of ``[trajectory]`` a scenario can have, and the joints that reach flange poses."""
 
 from dataclasses import dataclass
-from typing import ClassVar
+from itertools import pairwise
+from typing import Any, ClassVar
 
 import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.calibration_motions import ExcitationSpec, JointwiseSpec, PosesSpec
-from vftcli.simulation.kinematics import FlangePose, check_limits, check_start, flange_pose, follow
 from vftcli.simulation.motion import Command, Periodic, Reference, Stretches, straight_paths
 
 #: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
 HARMONICS = 48
+TABLE = 0.15  #: Least height of the flange in poses that are drawn. [m]
+ITERATIONS = 100
+#: A pose counts as reached when position and rotation error are below this. [m, rad]
+REACHED = 1e-10
+#: Number of joints → a pose from which such an arm can work, the flange looking down. [rad]
+HOMES: dict[int, tuple[float, ...]] = {
+    6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
+    7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,19 +47,13 @@ class CircleSpec:
         toward = np.array([np.cos(self.towards), np.sin(self.towards), 0.0])
         centre = home.translation + self.radius * toward
         ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
-        poses = [FlangePose(home.rotation, centre + offset) for offset in ring]
-        q = follow(robot, [*poses, poses[0]], start, "the circle")
+        q = follow(robot, home.rotation, centre + ring[[*range(count), 0]], start, "the circle")
         closure = np.outer(np.arange(count) / count, q[-1] - q[0])
         if np.max(np.abs(closure)) > 1.0:
             raise ParameterError("the circle winds a joint up; choose another start or radius")
-        series = np.fft.rfft(q[:-1], axis=0) / count
-        return Periodic(
-            period=self.period,
-            cycles=self.cycles,
-            mean=series[0].real,
-            cosine=2.0 * series[1 : HARMONICS + 1].real,
-            sine=-2.0 * series[1 : HARMONICS + 1].imag,
-        )
+        mean, *series = np.fft.rfft(q[:-1], axis=0)[: HARMONICS + 1] / count
+        cosine, sine = 2.0 * np.real(series), -2.0 * np.imag(series)
+        return Periodic(self.period, self.cycles, mean.real, cosine, sine)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,12 +66,8 @@ class HoldSpec:
 
     def motion(self, robot: Robot) -> Command:
         """A motion that stays at the pose, the usual one if none is given."""
-        start = check_start(robot, self.start)
-        return Stretches(
-            times=np.array([[0.0, 1.0]]),
-            paths=straight_paths([start, start]),
-            duration=self.length,
-        )
+        points = [check_start(robot, self.start)] * 2
+        return Stretches(np.array([[0.0, 1.0]]), straight_paths(points), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,19 +87,18 @@ class OffsetsSpec:
 
         q = check_start(robot, self.start)
         home = flange_pose(robot.model, q)
-        check_times([m[:2] for m in self.moves], self.length)
+        times = np.array([m[:2] for m in self.moves])
+        check_times(times, self.length)
         before, paths = np.zeros(3), list[Array]()
         nodes = np.linspace(-1.0, 1.0, 33)
         for move in self.moves:
             after = np.array(move[2:])
             share = 0.5 * (nodes[:, None] + 1.0)
             points = home.translation + before + share * (after - before)
-            line = follow(robot, [FlangePose(home.rotation, p) for p in points], q, "a move")
+            line = follow(robot, home.rotation, points, q, "a move")
             paths.append(np.asarray(chebyshev.chebfit(nodes, line, 16), dtype=float))
             q, before = line[-1], after
-        return Stretches(
-            times=np.array([m[:2] for m in self.moves]), paths=tuple(paths), duration=self.length
-        )
+        return Stretches(times, tuple(paths), self.length)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,13 +119,99 @@ class JointMovesSpec:
             raise ParameterError(
                 f"trajectory.moves must have rows of two times and {robot.joints} displacements"
             )
-        check_times([(row[0], row[1]) for row in self.moves], self.length)
+        times = np.array([row[:2] for row in self.moves])
+        check_times(times, self.length)
         points = [start, *(start + np.array(row[2:]) for row in self.moves)]
-        return Stretches(
-            times=np.array([row[:2] for row in self.moves]),
-            paths=straight_paths(points),
-            duration=self.length,
+        return Stretches(times, straight_paths(points), self.length)
+
+
+@dataclass(frozen=True, kw_only=True)
+class PosesSpec:
+    """Drawn joint poses, approached one after the other and held."""
+
+    KIND: ClassVar[str] = "poses"
+    move: float = 2.5  #: Time of each move. [s]
+    dwell: float = 2.0  #: Rest at each pose. [s]
+    count: int = 12  #: How many poses are drawn.
+    spread: float = 0.7  #: How far they lie from the usual pose, evenly to both sides. [rad]
+
+    def motion(self, robot: Robot) -> Command:
+        """Straight joint-space moves between the poses."""
+        if self.move <= 0 or self.dwell < 0 or self.count < 2:
+            raise ParameterError(
+                "trajectory.move must be positive, dwell not negative, and count at least 2"
+            )
+        points = self.draw_poses(robot)
+        starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
+        times = np.column_stack([starts, starts + self.move])
+        return Stretches(times, straight_paths(points), float(times[-1, 1] + self.dwell))
+
+    def draw_poses(self, robot: Robot) -> list[Array]:
+        """Poses about the usual one, inside the limits and with the flange above the table."""
+        rng, home = np.random.default_rng(1), check_start(robot, ())
+        low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
+        high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
+        points: list[Array] = []
+        for _ in range(100 * self.count):
+            pose = np.clip(home + rng.uniform(-self.spread, self.spread, robot.joints), low, high)
+            if flange_pose(robot.model, pose).translation[2] > TABLE:
+                points.append(pose)
+            if len(points) == self.count:
+                return points
+        raise ParameterError(
+            f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} poses "
+            "above the table; make it smaller"
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointwiseSpec:
+    """One joint at a time swept back and forth at several speeds, the others at rest."""
+
+    KIND: ClassVar[str] = "jointwise"
+    amplitude: float = 0.4  #: Sweep to each side. [rad]
+    speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]
+    rest: float = 0.3  #: Rest between sweeps. [s]
+
+    def motion(self, robot: Robot) -> Command:
+        """Each sweep as minimum-jerk moves from the usual pose out, across and back."""
+        start = check_start(robot, ())
+        if min(self.speeds, default=0.0) <= 0:
+            raise ParameterError("trajectory.speeds must be positive")
+        t, times, paths = self.rest, [], []
+        for axis in self.amplitude * np.eye(robot.joints):
+            for speed in self.speeds:
+                for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
+                    length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
+                    times.append((t, t + length))
+                    paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
+                    t += length
+                t += self.rest
+        return Stretches(np.array(times), tuple(paths), t)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExcitationSpec:
+    """A Fourier series of the joints."""
+
+    KIND: ClassVar[str] = "excitation"
+    period: float = 10.0  #: Time of one round. [s]
+    cycles: float = 2.0  #: Rounds.
+    mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
+    cosine: tuple[tuple[float, ...], ...]  #: Cosine coefficients, one row a harmonic. (H, n) [rad]
+    sine: tuple[tuple[float, ...], ...]  #: Sine coefficients. (H, n) [rad]
+
+    def motion(self, robot: Robot) -> Command:
+        """The series, if its lengths are those of the arm's joints."""
+        sizes = {len(row) for row in (self.mean, *self.cosine, *self.sine)}
+        if sizes != {robot.joints} or len(self.cosine) != len(self.sine) or self.period <= 0:
+            raise ParameterError(
+                f"trajectory.mean and each row of cosine and sine must have {robot.joints} "
+                f"numbers, one a joint of {robot.name!r}, cosine and sine as many rows, and "
+                "trajectory.period must be positive"
+            )
+        series = (np.array(part) for part in (self.mean, self.cosine, self.sine))
+        return Periodic(self.period, self.cycles, *series)
 
 
 TrajectorySpec = (
@@ -142,9 +225,9 @@ TrajectorySpec = (
 )
 
 
-def check_times(times: list[tuple[float, float]], length: float) -> None:
-    """Raise unless moves follow one another inside the motion's length."""
-    flat = np.array(times, dtype=float).ravel()
+def check_times(times: Array, length: float) -> None:
+    """Raise unless moves (K, 2) [s] follow one another inside the motion's length."""
+    flat = times.ravel()
     good = len(flat) > 0 and flat[0] >= 0 and flat[-1] <= length
     if not good or np.any(np.diff(flat) < 0) or np.any(np.diff(flat)[::2] <= 0):
         raise ParameterError(
@@ -157,3 +240,83 @@ def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
     reference = spec.motion(robot).at(t)
     check_limits(robot, reference.q, reference.dq, f"trajectory {spec.KIND!r}")
     return reference
+
+
+def flange_pose(model: Any, q: Array) -> Any:  # noqa: ANN401 - Pinocchio is untyped
+    """Pose of the flange in the base frame at joint positions `q` (n,) [rad], an SE3 [m]."""
+    import pinocchio as pin
+
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
+    return data.oMf[model.getFrameId("flange")].copy()
+
+
+def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
+    """Joint positions that bring the flange to a pose, from a nearby guess, or None. (n,) [rad]
+
+    Gauss–Newton on log(T⁻¹ T_d), damped as it errs: redundant arms move least.
+    """
+    import pinocchio as pin
+
+    data, frame = model.createData(), model.getFrameId("flange")
+    q = np.array(guess, dtype=float)
+    for _ in range(ITERATIONS):
+        pin.framesForwardKinematics(model, data, q)
+        error = pin.log6(data.oMf[frame].inverse() * goal).vector
+        size = float(np.linalg.norm(error))
+        if size < REACHED:
+            return q
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL)
+        # Damping keeps far steps short at singularities and must not slow near ones.
+        damping = 1e-3 * min(size, 1.0) ** 2
+        q = q + J.T @ np.linalg.solve(J @ J.T + damping * np.eye(6), error)
+    return None
+
+
+def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str) -> Array:
+    """Joint positions along flange points (K, 3) [m], each from the one before. (K, n) [rad]"""
+    import pinocchio as pin
+
+    q, path = np.array(start, dtype=float), []
+    for k, point in enumerate(points):
+        found = reach(robot.model, pin.SE3(rotation, point), q)
+        # A jump of a radian is another branch of the inverse kinematics.
+        if found is None or np.max(np.abs(found - q)) > 1.0:
+            x, y, z = point
+            raise ParameterError(
+                f"{what}: the flange of {robot.name!r} cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m "
+                f"(point {k + 1} of {len(points)}); choose a smaller motion or another start"
+            )
+        q = found
+        path.append(q)
+    return np.array(path)
+
+
+def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
+    """Raise a ParameterError unless a motion (T, n) stays inside the robot's limits."""
+    limits = robot.limits
+    for j in range(robot.joints):
+        low, high, fastest = limits.q_min[j], limits.q_max[j], limits.qd_max[j]
+        span = (float(np.min(q[:, j])), float(np.max(q[:, j])))
+        if span[0] < low or span[1] > high:
+            raise ParameterError(
+                f"{what}: joint {j + 1} of {robot.name!r} would move over {span[0]:.3f} to "
+                f"{span[1]:.3f} rad; its limits are {low:.3f} to {high:.3f}"
+            )
+        speed = float(np.max(np.abs(dq[:, j])))
+        if speed > fastest:
+            raise ParameterError(
+                f"{what}: joint {j + 1} of {robot.name!r} would move at {speed:.2f} rad/s; "
+                f"its limit is {fastest:.2f}"
+            )
+
+
+def check_start(robot: Robot, start: tuple[float, ...]) -> Array:
+    """Return a start pose, the usual one if none is given. (n,) [rad]"""
+    start = start or HOMES.get(robot.joints, (0.0,) * robot.joints)
+    if len(start) != robot.joints:
+        raise ParameterError(
+            f"trajectory.start has {len(start)} angles; robot {robot.name!r} has {robot.joints} "
+            "joints"
+        )
+    return np.array(start, dtype=float)

@@ -4,10 +4,9 @@ import re
 import numpy as np
 import pytest
 
-from vftcli.admittance.law import variable
+from vftcli.admittance.law import judge, variable
 from vftcli.admittance.parameters import from_table
 from vftcli.admittance.replay import Replay
-from vftcli.admittance.stability import judge
 from vftcli.outputs.admittance.files import admittance_record
 from vftcli.outputs.admittance.page import (
     UNITS,

@@ -8,9 +8,9 @@ import numpy as np
 import polars as pl
 
 from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.law import Verdict
 from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
-from vftcli.admittance.stability import Verdict
 from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance.figures import REPLAY_FIGURES, replay_figures
 from vftcli.outputs.admittance.page import render_admittance

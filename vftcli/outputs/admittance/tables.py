@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.admittance.latency import latencies
+from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.grid import Column, Grid, latex, terminal

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from vftcli.robots import Robot
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import Scenario
-from vftcli.simulation.schema import unknown_name
-from vftcli.simulation.writers.parquet import write_parquet
+from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.simulation.writers.text import LIBFRANKA, RTDE, UR_RTDE
+from vftcli.simulation.writers.tables import LIBFRANKA, RTDE, UR_RTDE, write_parquet
 
 #: Name at ``--as`` → the function that writes it.
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {
@@ -31,8 +31,7 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
         ParameterError: If there is no such format, or the arm cannot log in it.
     """
     name = wanted or scenario.format or vendor_format(robot)
-    if name not in WRITERS:
-        raise ParameterError(unknown_name(f"log format {name!r}", name, WRITERS))
+    check_known(name, WRITERS, f"no log format {name!r}")
     if name in {"rtde", "ur-rtde"} and not is_ur(robot):
         raise ParameterError(
             f"robot {robot.name!r} has no motor currents or not six joints and cannot log in a UR "
@@ -48,8 +47,7 @@ def usual_format(scenario: Scenario, robot: Robot, wanted: str = "") -> str:
 
 def is_ur(robot: Robot) -> bool:
     """Whether an arm measures motor currents and has six joints."""
-    in_current = robot.torque_source == "current" and robot.torque_constant is not None
-    return in_current and robot.joints == UR_JOINTS
+    return drive_constants(robot) is not None and robot.joints == UR_JOINTS
 
 
 def vendor_format(robot: Robot) -> str:

@@ -16,7 +16,6 @@ from vftcli.readers.bags.ros_messages import (
     stamped,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.packages import needed
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
@@ -158,7 +157,7 @@ def robot_state(simulation: Simulation, rows: Rows) -> dict[str, Value]:
 
 def quaternions(rotation: Array) -> Array:
     """Rotations (M, 3, 3) as x, y, z, w. (M, 4)"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     return np.array([pin.Quaternion(R).coeffs() for R in rotation])
 

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array
-from vftcli.signals.packages import needed
 from vftcli.signals.pose import log_matrix
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.motion import Reference
@@ -26,7 +25,7 @@ class FlangeSignals(NamedTuple):
 
 def flange_signals(model: Any, q: Array, dq: Array) -> FlangeSignals:  # noqa: ANN401
     """The flange at positions and velocities (M, n) [rad, rad/s]."""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     data, frame, count = model.createData(), model.getFrameId("flange"), len(q)
     rotation, position = np.empty((count, 3, 3)), np.empty((count, 3))
@@ -80,8 +79,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
     def accelerometer() -> Array:
         weightless = np.gradient(samples.target_dq, samples.time, axis=0)
         felt = np.einsum("kij,kj->ki", target().jacobian[:, :3], weightless) - model.gravity.linear
-        seen: Array = np.einsum("kji,kj->ki", target().rotation, felt)
-        return seen
+        return np.asarray(np.einsum("kji,kj->ki", target().rotation, felt))
 
     def matrix() -> Array:
         pose = np.zeros((len(samples.time), 4, 4))
@@ -116,7 +114,7 @@ def pose_of(flange: FlangeSignals) -> Array:
 
 def linear_momentum(simulation: Simulation) -> Array:
     """Magnitude of the arm's linear momentum. (M,) [kg·m/s]"""
-    pin = needed("pinocchio", "a simulation")
+    import pinocchio as pin
 
     model, measured = simulation.nominal.model, simulation.measured
     data = model.createData()

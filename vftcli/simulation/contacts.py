@@ -1,20 +1,18 @@
-"""What every contact is, and those that do not depend on the arm.
+"""The kinds of contact that act with a wrench: given, hung, drawn, hand, hard stop.
 
-A contact acts at `point` of a link (`link` 0: the flange, else the link of that joint) with a
-wrench ON the robot in base axes. Given profiles, hung loads and pushes drawn at random are here;
-those of `springs` answer the arm's motion.
+It acts ON the robot at `point` of a `link` (0: the flange), in base axes.
 """
 
 import math
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.schema import unknown_name
+from vftcli.signals.parsing import check_known
+from vftcli.simulation.motion import minimum_jerk
 
 Vector = tuple[float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
@@ -29,18 +27,6 @@ class Place(NamedTuple):
     spin: Array  #: Angular velocity of the link. (3,) [rad/s]
 
 
-class Touch(Protocol):
-    """A contact during a run; it may remember where it took hold."""
-
-    def active(self, t: float) -> bool:
-        """Whether it may exert anything at time `t` [s]."""
-        ...
-
-    def wrench(self, t: float, place: Place) -> Array:
-        """Force and moment about the point ON the robot, in base axes. (6,) [N, N·m]"""
-        ...
-
-
 def ramp(t: float, start: float, rise: float, stop: float, fall: float) -> float:
     """A rounded trapezoid: 0, up from `start` within `rise`, down by `stop` within `fall`."""
     if t <= start or t >= stop:
@@ -48,13 +34,6 @@ def ramp(t: float, start: float, rise: float, stop: float, fall: float) -> float
     up = 1.0 if rise <= 0 else min((t - start) / rise, 1.0)
     down = 1.0 if fall <= 0 else min((stop - t) / fall, 1.0)
     return 0.25 * (1.0 - math.cos(math.pi * up)) * (1.0 - math.cos(math.pi * down))
-
-
-def check_choice(key: str, value: str, options: Iterable[str]) -> None:
-    """Raise unless `value` is one of the words a key takes."""
-    words = list(options)
-    if value not in words:
-        raise ParameterError(unknown_name(f"{key} {value!r}", value, words))
 
 
 class Push(NamedTuple):
@@ -117,7 +96,7 @@ class ProfileSpec:
     def start(self, rng: np.random.Generator, duration: float) -> Segments:
         """Make the contact ready to act; nothing is drawn."""
         del rng, duration
-        check_choice("axes", self.axes, ("base", "link"))
+        check_known(self.axes, ("base", "link"), f"no axes {self.axes!r}")
         wrench = np.concatenate([self.force, self.torque])
         rows = [Push(a, b, self.rise, self.fall, wrench) for a, b in self.spans]
         return Segments(rows, in_link=self.axes == "link")
@@ -181,7 +160,7 @@ class PushesSpec:
 
     def ranges(self) -> PushStyle:
         """The style's ranges, with those that are stated in their place."""
-        check_choice("style", self.style, STYLES)
+        check_known(self.style, STYLES, f"no style {self.style!r}")
         given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
         return STYLES[self.style]._replace(**given)
 
@@ -207,5 +186,115 @@ class PushesSpec:
 def direction(rng: np.random.Generator, vertical: float) -> Array:
     """A random direction whose vertical part is scaled by `vertical`. (3,)"""
     vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
-    unit: Array = vector / np.linalg.norm(vector)
-    return unit
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandSpec:
+    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
+
+    KIND: ClassVar[str] = "hand"
+    name: str  #: Name of the contact.
+    #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
+    spans: tuple[tuple[float, float], ...]
+    #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
+    moves: tuple[Vector, ...] = ()
+    #: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
+    turns: tuple[Vector, ...] = ()
+    reach: float = 0.6  #: Time in which the hand makes its move. [s]
+    release: float = 0.08  #: Time in which the hand lets go, before the end of each span. [s]
+    stiffness: float = 200.0  #: Spring to the hand's position. [N/m]
+    damping: float = 15.0  #: Damper. [N·s/m]
+    twist_stiffness: float = 0.0  #: Spring to the hand's orientation. [N·m/rad]
+    twist_damping: float = 0.0  #: Damper. [N·m·s/rad]
+    link: int = 0  #: The link it holds; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
+
+    def start(self, rng: np.random.Generator, duration: float) -> "Hand":
+        """Make the hand ready to grab; nothing is drawn."""
+        del rng, duration
+        for name in ("moves", "turns"):
+            if getattr(self, name) and len(getattr(self, name)) != len(self.spans):
+                raise ParameterError(
+                    f"contacts.{self.name}.{name} has {len(getattr(self, name))} rows; it must "
+                    f"have one for each of the {len(self.spans)} spans"
+                )
+        return Hand(self)
+
+
+class Hand:
+    """A hand during a run: it remembers where it took hold."""
+
+    def __init__(self, spec: HandSpec) -> None:
+        self.spec = spec
+        self.grip: int | None = None
+        self.held_at, self.held_as = np.zeros(3), np.eye(3)
+
+    def span(self, t: float) -> int | None:
+        """Index of the grab going on at `t` [s], or None."""
+        return next((k for k, (a, b) in enumerate(self.spec.spans) if a <= t < b), None)
+
+    def active(self, t: float) -> bool:
+        """Whether the hand holds the arm at time `t` [s]."""
+        return self.span(t) is not None
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Spring and damper between the handle and the hand. (6,) [N, N·m]"""
+        k = self.span(t)
+        if k is None:
+            return np.zeros(6)
+        if k != self.grip:
+            # A hand takes hold where the handle is at that moment, wherever that may be.
+            self.grip, self.held_at, self.held_as = k, place.position, place.rotation
+        spec = self.spec
+        u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
+        way = minimum_jerk(u)
+        move = np.array(spec.moves[k]) if spec.moves else np.zeros(3)
+        turn = np.array(spec.turns[k]) if spec.turns else np.zeros(3)
+        gap = self.held_at + way * move - place.position
+        force = spec.stiffness * gap - spec.damping * place.velocity
+        torque = -spec.twist_damping * place.spin
+        if spec.twist_stiffness:
+            import pinocchio as pin
+
+            goal = pin.exp3(way * turn) @ self.held_as
+            torque = torque + spec.twist_stiffness * pin.log3(goal @ place.rotation.T)
+        left = spec.spans[k][1] - t
+        hold = min(left / spec.release, 1.0) if spec.release > 0 else 1.0
+        return hold * np.concatenate([force, torque])
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopSpec:
+    """A hard stop: a plane that pushes back when the point goes beyond it."""
+
+    KIND: ClassVar[str] = "stop"
+    name: str  #: Name of the contact.
+    through: Vector  #: A point of the plane in the base frame. (3,) [m]
+    normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
+    stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
+    damping: float = 200.0  #: Damping while pressed. [N·s/m]
+    link: int = 0  #: The link that meets it; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
+
+    def start(self, rng: np.random.Generator, duration: float) -> "StopSpec":
+        """The stop itself: nothing is drawn, and it remembers nothing."""
+        del rng, duration
+        if not any(self.normal):
+            raise ParameterError(f"contacts.{self.name}.normal has no length")
+        return self
+
+    def active(self, t: float) -> bool:
+        """A stop is always there; whether it is met shows in its wrench."""
+        del t
+        return True
+
+    def wrench(self, t: float, place: Place) -> Array:
+        """Push along the normal, never a pull. (6,) [N, N·m]"""
+        del t
+        normal = np.array(self.normal) / float(np.linalg.norm(self.normal))
+        depth = float(normal @ (np.array(self.through) - place.position))
+        if depth <= 0.0:
+            return np.zeros(6)
+        size = max(self.stiffness * depth - self.damping * float(normal @ place.velocity), 0.0)
+        return np.concatenate([size * normal, np.zeros(3)])

@@ -1,9 +1,11 @@
-"""Figs. 4 and 12: the virtual sensor beside a real one on the UR5, and beside libfranka's."""
+"""Table I, Figs. 3, 4, 12: observers and virtual sensor beside what is known of the truth."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import polars as pl
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.driving_force import stored_force
@@ -12,11 +14,14 @@ from vftcli.admittance.replay import Replay, replay
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation.selection import facts
+from vftcli.observers import PAPER
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
-from vftcli.reproduction.circle import VARIANTS
+from vftcli.repetition.choice import FreeChoice
 from vftcli.reproduction.control import deviation_chart
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
@@ -30,6 +35,13 @@ from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
+#: Variant → how its observers are chosen; the last moves all to FDO's bandwidth, 10 rad/s.
+VARIANTS: dict[str, dict[str, Any]] = {
+    AS_PRINTED: {"as_printed": True},
+    CORRECTED: {},
+    DENSITY: {"assignments": ["kfo.noise_convention=density"]},
+    "at 1.59 Hz": {"match": "bandwidth=1.59"},
+}
 #: Variant → its observer, the one that the paper's virtual sensor takes.
 OBSERVERS = {
     variant: ObserverChoice.parsed(observer=["kfo-fe"], **VARIANTS[variant])
@@ -41,10 +53,7 @@ UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> RunResult:
     """RMSE of the virtual sensor against the real one, axis by axis, in flange axes.
 
-    Args:
-        seed: Of the simulation.
-        sensor_pose: Where the scenario has the sensor on the flange. [m, rad]
-        unloaded: Span in which nothing touches the arm. [s]
+    The file of the paper explains the arguments.
     """
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
     # A soft position loop: joints slide where a stiff one holds them.
@@ -130,12 +139,7 @@ def assembled_bearing(
 ) -> RunResult:
     """Zero drift, the bearing's weight, errors by phase, and what the controllers make of it.
 
-    Args:
-        seed: Of the simulation.
-        unloaded: Span in which nothing touches the arm. [s]
-        hung: Span in which the bearing alone hangs on it. [s]
-        phases: What is done with the arm → when. [s]
-        sampled: Its sampling interval. [s]
+    The file of the paper explains the arguments.
     """
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot, models = run.recording, load_robot("panda"), Runs()
@@ -171,14 +175,12 @@ def assembled_bearing(
 
 def within(wrench: Wrench, span: Sequence[float]) -> Mask:
     """The samples of a span."""
-    inside: Mask = (wrench.t > span[0]) & (wrench.t < span[1])
-    return inside
+    return np.asarray((wrench.t > span[0]) & (wrench.t < span[1]))
 
 
 def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:
     """Mean wrench over a span. (6,) [N, N·m]"""
-    mean: Array = np.nanmean(wrench.known[within(wrench, span)], axis=0)
-    return mean
+    return np.asarray(np.nanmean(wrench.known[within(wrench, span)], axis=0))
 
 
 def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> None:
@@ -190,7 +192,11 @@ def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> N
 
 
 def replay_bearing(
-    wrench: Wrench, made: Analysis, *, period: float | None = None, as_printed: bool = False
+    wrench: Wrench,
+    made: Analysis,
+    *,
+    period: float | None = None,
+    as_printed: bool = False,
 ) -> Replay:
     """The same force through the traditional and the variable controller of Table IV."""
     words = [] if period is None else [f"admittance.period={period}"]
@@ -201,7 +207,12 @@ def replay_bearing(
     return replay(wrench, made.recording.q, made.robot, parameters, laws, source=source)
 
 
-def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence[float]) -> None:
+def put_motion(
+    result: RunResult,
+    variant: str,
+    found: Replay,
+    knocked: Sequence[float],
+) -> None:
     """How soon the arm is back from where it was guided, what is left, how far knocks move it."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):
@@ -230,3 +241,60 @@ def beside_vendor(wrench: Wrench, vendor: Wrench) -> Chart:
     )
     units = tuple(map(unit_of, AXES))
     return Chart("wrench", "", units, AXES, wrench.t, lines, families=(1, 1, 1, 2, 2, 2))
+
+
+def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
+    """Errors joint by joint, lags, rms of the free cycle, and the guidelines' facts.
+
+    The first cycle of `period` [s] is free.
+    """
+    recording = simulate(load_scenario(scenario, ()), seed).recording
+    robot, models, result = load_robot("ur5"), Runs(), RunResult()
+    # The paper's difference: cycle by cycle, neither corrected nor filtered.
+    free = FreeChoice(period=period, alignment="period", low_pass=None)
+    for variant, chosen in VARIANTS.items():
+        choice = AnalysisChoice(
+            observers=ObserverChoice.parsed(observer=PAPER, **chosen),
+            free=free,
+            contacts=False,
+            reference=ReferenceChoice(name="two-cycle"),
+        )
+        made = analyse(recording, robot, choice, models)
+        put_errors(result, variant, made, period)
+        put_facts(result, variant, made)
+        if variant == CORRECTED:
+            chart = torque_chart(made)
+            # Four bands would hide one another.
+            lines = (line._replace(shown=True, leads=False, half=None) for line in chart.series)
+            result.charts["fig3"] = chart._replace(series=tuple(lines))
+    return result
+
+
+def put_errors(result: RunResult, variant: str, made: Analysis, period: float) -> None:
+    """RMSE and floor by joint, lag and free rms as means of joints 1 to 3."""
+    assert made.errors is not None, "a reference was asked for"
+    rows = made.errors.filter(pl.col("joint").is_not_null())
+    for row in rows.iter_rows(named=True):
+        key = f"{row['observer']}/{row['joint']}"
+        result.put(variant, {key: row["rmse_Nm"]})
+        result.put(FLOOR, {key: row["reference_floor_Nm"]})
+    for estimate in made.estimates:
+        free = (estimate.t > 1.0) & (estimate.t < period)
+        rms = float(np.sqrt(np.mean(estimate.tau[free, :3] ** 2)))
+        result.put(variant, {f"free/{estimate.name}": rms})
+        own = rows.filter((pl.col("observer") == estimate.name) & (pl.col("joint") <= 3))
+        if lags := own["lag_s"].drop_nulls().to_list():
+            result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
+
+
+def put_facts(result: RunResult, variant: str, made: Analysis) -> None:
+    """What the guidelines go by."""
+    for each in facts(made.observers, made.tunings, made.motion.log, made.errors):
+        found = {
+            "response": each.response,
+            "delay": each.delay,
+            "passed": 100.0 * each.passed,
+            "rmse": each.rmse,
+            "numbers": float(each.parameter_count),
+        }
+        result.put(variant, {f"{key}/{each.name}": value for key, value in found.items()})

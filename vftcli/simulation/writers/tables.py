@@ -1,4 +1,4 @@
-"""The vendors' text tables: which signal each column holds, and how its numbers are written.
+"""The vendors' text tables, flat Parquet tables under our own column names, and the truth file.
 
 UR's two RTDE recorders: the official client writes one header row, single spaces and CR LF; SDU's
 ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the layout of 0.9.1 and
@@ -11,9 +11,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.signals.arrays import Array
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.signals import vendor_signals
+from vftcli.simulation.experiment import AXES, Simulation, Truth
+from vftcli.simulation.writers.signals import joint_signals, vendor_signals
 
 #: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
 #: row that follows, the last repeated: a command is executed one cycle later.
@@ -79,6 +81,9 @@ FRANKA: Columns = {
 #: The short recipe of a UR log: joint motion, currents and the target moment alone.
 SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment", "actual_q",
          "actual_qd", "actual_current")  # fmt: skip
+TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
+#: Of the wrench of one contact elsewhere on the arm.
+AT_CONTACT = "base axes, moment about the point that is touched"
 
 
 class VendorTable(NamedTuple):
@@ -131,3 +136,35 @@ class VendorTable(NamedTuple):
 RTDE = VendorTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
 UR_RTDE = VendorTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
 LIBFRANKA = VendorTable(FRANKA, "[{}]", ",", "\n", "%.6g")
+
+
+def write_parquet(path: Path, simulation: Simulation) -> None:
+    """Write the log as one flat table, `t`, `q/1`, `dq/1` and so on."""
+    rows = np.array(simulation.measured.rows)
+    start = simulation.scenario.sensing.start
+    columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
+    for name, values in joint_signals(simulation).items():
+        labels = AXES if name == "wrench" else tuple(map(str, range(1, values.shape[1] + 1)))
+        columns |= {f"{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+    write_columns(path, {name: values[rows] for name, values in columns.items()})
+
+
+def write_truth(path: Path, truth: Truth, start: float) -> None:
+    """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
+    columns = truth.columns()
+    touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
+    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(touched, StatedFrame(AT_CONTACT))
+    write_columns(path, columns | {"t": columns["t"] + start}, frames)
+
+
+def write_columns(
+    path: Path,
+    columns: dict[str, Array],
+    frames: Mapping[str, StatedFrame] | None = None,
+) -> None:
+    """Write named columns (M,) of doubles as one Parquet table; wrenches have these frames."""
+    import polars as pl
+
+    table = pl.DataFrame(columns)
+    schema = described_schema(table, frames)
+    table.write_parquet(path, compression="zstd", arrow_schema=schema)
