@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.joints import effort_of, kinematic_order
-from vftcli.readers.rtde_names import JOINT_COLUMNS
 from vftcli.readers.table import (
     Cell,
     Pick,
@@ -162,7 +161,7 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
         found = _clock(table) if signal == "t" else None
         found = _pick_of(table, signal, groups) if signal in ALIASES else found
         if signal == "wrench":
-            controllers = groups.get(JOINT_COLUMNS[signal].lower())
+            controllers = groups.get("actual_tcp_force")  # UR's
             own = None if controllers is None else vendor_pick(signal, signal, controllers.cells)
             found = _wrench(table) or own
         if found is None:

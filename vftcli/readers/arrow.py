@@ -4,12 +4,10 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from vftcli.readers.columnar import HeldColumns, episodes_of, read_columns
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.pyarrow_table import PyarrowTable
+from vftcli.readers.parquet import ColumnarTable, HeldColumns, episodes_of, read_columns
 from vftcli.readers.reader import LogFile, Reader
 from vftcli.signals.errors import LogError
-from vftcli.signals.packages import needed
 
 FILE_MAGIC, STREAM_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
 
@@ -19,15 +17,12 @@ NUMBER = struct.Struct("<q")  #: A whole number in a message.
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
 
 
-class ArrowTable(PyarrowTable):
+class ArrowTable(ColumnarTable):
     """An Arrow file or stream; a file is a stream behind its magic, its index is not needed."""
 
-    def __init__(self, file: LogFile) -> None:
-        needed("pyarrow", f"{file.path}: an Arrow file", error=LogError)
-        super().__init__(file)
-
     def _opened(self, file: LogFile) -> HeldColumns:
-        pa = needed("pyarrow", "an Arrow file")
+        import pyarrow as pa
+
         content = pa.py_buffer(file.content)
         self._content = content.slice(len(FILE_MAGIC) if file.head.startswith(FILE_MAGIC) else 0)
         batches = tuple(claims(self._content))
@@ -54,7 +49,7 @@ class ArrowTable(PyarrowTable):
 
     def _stream(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         """The batches, of some columns."""
-        pa = needed("pyarrow", "an Arrow file")
+        import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
         return pa.ipc.open_stream(self._content, options=options)
@@ -62,7 +57,7 @@ class ArrowTable(PyarrowTable):
 
 def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
     """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
-    pa = needed("pyarrow", "an Arrow file")
+    import pyarrow as pa
 
     reader = pa.ipc.MessageReader.open_stream(content)
     while True:

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.ahead import TextParse
 from vftcli.readers.reader import InOnePieceError, LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
@@ -191,17 +190,19 @@ class TextTable:
 
     def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
         """The rows by polars, every wanted column with its type."""
-        whole = isinstance(source, Path)
-        parse = TextParse(
+        import polars as pl
+
+        return pl.read_csv(
+            source,
+            has_header=False,
+            skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
             separator=self.separator,
-            width=self.width,
-            kinds=kinds,
-            skip=self._lines_before_rows if whole else 0,
-            quoted=any('"' in line for line in self.sample),
+            columns=sorted(kinds),
+            schema={str(c): kinds.get(c, pl.String) for c in range(self.width)},
+            quote_char='"' if any('"' in line for line in self.sample) else None,
             decimal_comma=self.decimal_comma,
+            glob=False,
         )
-        found = self.file.ahead.frame(parse) if whole and self.file.ahead is not None else None
-        return parse.frame(source) if found is None else found
 
     @property
     def _lines_before_rows(self) -> int:

@@ -1,4 +1,4 @@
-"""HDF5 logs: the layouts of ALOHA, robomimic, roboset and DROID, and any other by its paths."""
+"""HDF5 logs: the layouts of ALOHA and DROID, and any other by its paths."""
 
 import json
 import re
@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,14 +24,13 @@ from vftcli.signals.remarks import fact
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
-FASTEST = 1e6  #: Highest rate that is believed. [Hz]
 
 DROID_STATE = "observation/robot_state/"
 DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
 #: What DROID measures, gravity included, and what its controller commands, without gravity.
 DROID_TORQUE, DROID_COMPUTED = "motor_torques_measured", "joint_torques_computed"
-#: robosuite's name of a robot in lower case → profile.
-ROBOSUITE = {"panda": "panda", "ur5e": "ur5e"}
+#: Where projects that record no torque keep their positions → the project.
+TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
 FRANKA = ("panda", "fr3")
 TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
@@ -42,24 +41,19 @@ class Layout(NamedTuple):
 
     name: str  #: The project.
     anchor: str  #: Path of the positions, below the group of an episode.
-    beside: tuple[str, ...]  #: Further paths that make it this layout.
-    #: Reads one episode of an open file: its table, the file's attributes, the request.
-    read: Callable[[Hdf5Table, Any, ReadChoice], RawLog]
+    read: Callable[[Hdf5Table, ReadChoice], RawLog]  #: Reads one episode of an open file.
 
     def groups(self, names: Sequence[str]) -> tuple[str, ...]:
         """The groups of its episodes, in their order; none where the file is laid out otherwise."""
-        there = set(names)
         ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
-        found = [e for e in ends if (not e or e.endswith("/"))]
-        found = [e for e in found if all(e + name in there for name in self.beside)]
-        return tuple(sorted(found, key=natural))
+        return tuple(sorted((e for e in ends if not e or e.endswith("/")), key=natural))
 
 
-def read_aloha(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
     names = table.names or ()
     if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
-        return read_any(table, None, request)
+        return read_any(table, request)
     if stated := states_positions(request):
         refuse_arm(table.path, request)
     told = "left: columns 0-5, right: columns 7-12"
@@ -77,41 +71,7 @@ def read_aloha(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa
     return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
 
 
-def read_robomimic(table: Hdf5Table, group: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401
-    """robomimic: positions and velocities, the rate and the robot in env_args, no torque."""
-    refuse_arm(table.path, request)
-    told = environment(group)
-    rate, robots = told.get("control_freq"), told.get("robots")
-    usual = "q[rad]=obs/robot0_joint_pos"
-    usual += ",dq=obs/robot0_joint_vel" if "obs/robot0_joint_vel" in (table.names or ()) else ""
-    good = isinstance(rate, int | float) and 0 < rate < FASTEST
-    usual = f"t@{rate:.9g}Hz,{usual}" if good else usual
-    robot = robots[0] if isinstance(robots, list) and robots else robots
-    raw = described(table, usual, request, robot_hint=ROBOSUITE.get(str(robot).lower()))
-    own = good and raw.clock == rate_words(float(f"{rate:.9g}"))
-    return replace(raw, clock=f"none: {rate:g} Hz, env_args' control_freq") if own else raw
-
-
-def environment(group: Any) -> dict[str, Any]:  # noqa: ANN401 - h5py
-    """env_kwargs of the env_args beside an episode of robomimic, {} where there are none."""
-    text = group.parent.attrs.get("env_args", "{}")
-    if not isinstance(text, str | bytes) or len(text) > TOLD_LIMIT:
-        return {}
-    try:
-        told = json.loads(text)
-        told = told.get("env_kwargs", {})
-    except (ValueError, RecursionError, AttributeError):
-        return {}
-    return told if isinstance(told, dict) else {}
-
-
-def read_roboset(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
-    """Roboset of RoboHive: positions, velocities and a clock of its own."""
-    refuse_arm(table.path, request)
-    return described(table, "t=time,q[rad]=qp_arm,dq=qv_arm", request)
-
-
-def read_droid(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
     refuse_arm(table.path, request)
     if states_positions(request):
@@ -146,7 +106,7 @@ def robot_of(folder: Path) -> str | None:
     return None
 
 
-def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """Any other file: by --columns, or by alias among the datasets of one group."""
     refuse_arm(table.path, request)
     if states_positions(request):
@@ -157,6 +117,13 @@ def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: 
             "--columns, as in t=…,q=PATH/OF/POSITIONS."
         )
     names = table.names or ()
+    for path, project in TORQUELESS.items():
+        if any(f"/{name}".endswith(f"/{path}") for name in names):
+            raise LogError(
+                f"{table.path}: laid out as {project}'s, which hold no torque, so no force can be "
+                "estimated. Where you added torques, name all with --columns, as in "
+                "t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
+            )
     # The datasets of the one group that has positions by name, and those at the top.
     top = [name for name in names if "/" not in name]
     return from_table(table.within(level_of(table.path, names, "/"), top), request)
@@ -179,13 +146,11 @@ def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
 
 #: The layouts that are known.
 LAYOUTS = (
-    Layout("ALOHA", ALOHA, (), read_aloha),
-    Layout("robomimic", "obs/robot0_joint_pos", (), read_robomimic),
-    Layout("roboset", "qp_arm", ("qv_arm", "time"), read_roboset),
-    Layout("DROID", f"{DROID_STATE}joint_positions", (), read_droid),
+    Layout("ALOHA", ALOHA, read_aloha),
+    Layout("DROID", f"{DROID_STATE}joint_positions", read_droid),
 )
 
-ANY = Layout("HDF5", "", (), read_any)
+ANY = Layout("HDF5", "", read_any)
 
 
 def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
@@ -212,7 +177,7 @@ def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
         group = groups[numbers.index(number)]
         if part:
             remarks = (*remarks, fact("episode-place", place=group.rstrip("/")))
-        raw = layout.read(table.within(group), content[group or "/"], request)
+        raw = layout.read(table.within(group), request)
         parts = " ".join(word for word in (part, raw.part) if word)
         return replace(raw, part=parts, remarks=(*remarks, *raw.remarks))
 

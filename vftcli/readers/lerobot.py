@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import ALIASES
-from vftcli.readers.columnar import EPISODE, ColumnarTable, episodes_of
 from vftcli.readers.columns import SIGNALS, parse_columns
 from vftcli.readers.joints import kinematic_order
-from vftcli.readers.parquet import parquet_table
+from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, open_log
 from vftcli.readers.table import listed
@@ -102,7 +101,7 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
 
 
 def columns_of(
-    path: Path, table: ColumnarTable, features: Mapping[str, Any], request: ReadChoice
+    path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
 ) -> tuple[str, tuple[str, ...], str, tuple[Any, ...]]:
     """Which columns hold which signals of which arm, by the names of features and their elements.
 
@@ -138,7 +137,7 @@ def columns_of(
     return ",".join(["t=timestamp", *items]), names, side, remarks
 
 
-def wrenches_left(table: ColumnarTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
+def wrenches_left(table: ParquetTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
     """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
     observed = [name for name in table.names or () if name.startswith("observation.")]
     found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
@@ -160,7 +159,7 @@ def in_order(
     return [by_joint[name] for name in names]
 
 
-def elements_of(name: str, table: ColumnarTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
@@ -191,7 +190,7 @@ def measured_by(label: str) -> tuple[str, str] | None:
     return None
 
 
-def by_frames(raw: RawLog, table: ColumnarTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
     if not good or FRAME not in (table.names or ()) or raw.clock != "column timestamp":
@@ -241,7 +240,7 @@ def episodes_told(folder: Path) -> list[Episode]:
         found = remembered_episodes(folder, states)
     else:
         files = sorted((folder / "data").rglob("*.parquet"))
-        each = (episodes_of(parquet_table(open_log(path)).episodes()) for path in files)
+        each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
         found = [Episode(number) for numbers in each for number in numbers]
     if not found:
         raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
@@ -261,7 +260,7 @@ def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...])
 
 def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     """The episodes of a table of version 3."""
-    table = parquet_table(open_log(path))
+    table = ParquetTable(open_log(path))
     names = list(table.names or ())
     if missing := [name for name in EPISODES_TABLE if name not in names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
@@ -298,14 +297,14 @@ def data_file(folder: Path, episode: Episode) -> Path:
     files = sorted((folder / "data").rglob("*.parquet"))
     own = [path for path in files if path.name == f"episode_{episode.number:06d}.parquet"]
     for path in own or files:
-        if own or episode.number in episodes_of(parquet_table(open_log(path)).episodes()):
+        if own or episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
             return path
     raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
 
 
-def rows_of(file: LogFile, episode: Episode) -> ColumnarTable:
+def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     """The rows of an episode in its data file, checked against the table of episodes."""
-    table = parquet_table(file)
+    table = ParquetTable(file)
     numbers = table.episodes()
     if not numbers.size:
         return table

@@ -10,7 +10,6 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import Self
 
-from vftcli.readers.ahead import Ahead
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array, Indices
@@ -30,8 +29,6 @@ class LogFile:
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
     wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
-    #: Its table that is being parsed already, or None.
-    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_folder(self) -> bool:
@@ -181,8 +178,6 @@ class ReadChoice:
     blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
     #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
-    #: A log that is being parsed already, or None.
-    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.arm is not None:

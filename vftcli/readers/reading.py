@@ -73,14 +73,13 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
             f"{path}: --episode all is for commands that take several logs (compare, report, "
             "contacts, thresholds, identify); name one: --episode K"
         )
-    ahead = choice.ahead if choice.ahead is not None and choice.ahead.path == path else None
-    file = replace(open_log(path), ahead=ahead)
+    file = open_log(path)
     reader = _reader(file, choice.format, choice.columns)
     if choice.episode is not None and reader.episodes is None:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     if not reader.arms:
         refuse_arm(path, choice)
-    digest = Digest((path,)) if ahead is None else ahead.digest
+    digest = Digest((path,))
     if "polars" not in sys.modules and reader.episodes is None:
         digest.start()  # its import takes longer than the hash and leaves a core idle
 

@@ -9,13 +9,28 @@ import numpy as np
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.rtde_names import CLOCK, JOINT_COLUMNS, PAYLOAD
 from vftcli.readers.table import Cell, Pick, Picks, Table, checked
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
+CLOCK = "timestamp"  #: The controller's clock. [s]
+#: Field of Recording → RTDE's name; all have six elements, name_0 to name_5.
+JOINT_COLUMNS = {
+    "q": "actual_q",
+    "dq": "actual_qd",
+    "current": "actual_current",
+    "torque_without_gravity": "actual_current_as_torque",
+    "target_q": "target_q",
+    "target_dq": "target_qd",
+    "target_current": "target_current",
+    "target_torque": "target_moment",
+    "temperature": "joint_temperatures",
+    "wrench": "actual_TCP_force",
+}
+#: The payload that the controller was told of; its last value counts.
+PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 CLOCK_WORDS = "controller clock (timestamp, seconds since power-on)"
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
