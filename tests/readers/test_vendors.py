@@ -99,7 +99,7 @@ def test_missing_positions_or_clock_say_what_to_record(tmp_path: Path) -> None:
     with pytest.raises(LogError, match="t@125Hz"):
         read(path)
     path.write_text(text.replace("actual_q_5", "target_q_0"))
-    with pytest.raises(LogError, match="Add actual_q to the recipe"):
+    with pytest.raises(LogError, match="Add timestamp and actual_q to the recipe"):
         read(path)
 
 

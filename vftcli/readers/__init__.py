@@ -1,6 +1,7 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.formats import FORMATS, LogFormat
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.reading import (
     episode_numbers,
     holds_episodes,
@@ -9,14 +10,13 @@ from vftcli.readers.reading import (
     read_first_recording,
     recognise,
 )
-from vftcli.readers.registry import READERS
 
 __all__ = [
-    "READERS",
+    "FORMATS",
     "LogFile",
+    "LogFormat",
     "RawLog",
     "ReadChoice",
-    "Reader",
     "episode_numbers",
     "holds_episodes",
     "read",

@@ -9,18 +9,16 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.libfranka import read_array_fields
+from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
-from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array
+from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array, read_layout
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
-#: The fields of libfranka's state that are taken from panda-py's get_log().
-PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
 
 
 def npz_arrays(file: LogFile) -> dict[str, Column]:
@@ -64,7 +62,7 @@ def read_arrays(
             "name them, as in t[ms]=time,q=q,tau=tau_J."
         )
     if {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped):
-        return read_array_fields(table, PANDA_PY, request)
+        return read_layout(table, FORMATS["npz"], request)
     return from_table(table, request)
 
 
@@ -139,8 +137,6 @@ def _read_frankapy(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -
     return read_arrays(file, kept, (), replace(request, columns=columns))
 
 
-NPZ = Reader(
-    name="npz",
-    recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
-    read=lambda file, request: read_arrays(file, npz_arrays(file), (), request),
-)
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read an .npz file."""
+    return read_arrays(file, npz_arrays(file), (), request)

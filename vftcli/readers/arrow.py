@@ -4,14 +4,13 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.parquet import ColumnarTable, HeldColumns, episodes_of, read_columns
-from vftcli.readers.reader import LogFile, Reader
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.signals.errors import LogError
 
-FILE_MAGIC, STREAM_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
-
-LONGEST_HEAD = 1 << 24  #: Bytes that the first message of a stream, its schema, may take.
+FILE_MAGIC = b"ARROW1\0\0"  #: How a file begins; a stream has no such mark.
 NUMBER = struct.Struct("<q")  #: A whole number in a message.
 #: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs).
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
@@ -140,16 +139,11 @@ class Flat:
             yield self._at("<q", at), self._at("<q", at + 8)
 
 
-def is_arrow(head: bytes) -> bool:
-    """Whether a file starts as an Arrow file, or as a stream: a mark and its schema's length."""
-    if head.startswith(FILE_MAGIC):
-        return True
-    return head.startswith(STREAM_MAGIC) and 0 < int.from_bytes(head[4:8], "little") < LONGEST_HEAD
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read an Arrow file or stream."""
+    return read_columns(ArrowTable(file), request)
 
 
-ARROW = Reader(
-    name="arrow",
-    recognises=lambda file: is_arrow(file.head),
-    read=lambda file, request: read_columns(ArrowTable(file), request),
-    episodes=lambda file: episodes_of(ArrowTable(file).episodes()),
-)
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of its episodes."""
+    return episodes_of(ArrowTable(file).episodes())

@@ -17,16 +17,8 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import Remark
 
-MAGIC = b"\x89HDF\r\n\x1a\n"
-
 #: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
 MOST_OBJECTS, DEEPEST = 100_000, 32
-
-
-def is_hdf5(head: bytes) -> bool:
-    """Whether a file is HDF5: from its start, or behind a user block of 512 bytes or more."""
-    places = [0, *(512 << k for k in range(7))]
-    return any(head[place : place + len(MAGIC)] == MAGIC for place in places)
 
 
 @contextmanager

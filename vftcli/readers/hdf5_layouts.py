@@ -12,10 +12,11 @@ import numpy as np
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.hdf5 import Hdf5Table, is_hdf5, natural, opened, table_of
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.hdf5 import Hdf5Table, natural, opened, table_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.picking import rate_words
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
 from vftcli.signals.errors import LogError, UnknownFormatError
@@ -167,7 +168,7 @@ def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
     return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
 
 
-def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat | None = None) -> RawLog:
     """Read an HDF5 log, or one episode of it."""
     with opened(file) as content:
         table = table_of(file.path, content)
@@ -198,12 +199,3 @@ def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
         anchor = anchor or level_of(file.path, table.names or (), "/")
     below = anchor[: anchor.rfind("/") + 1]
     return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))
-
-
-HDF5 = Reader(
-    name="hdf5",
-    recognises=lambda file: is_hdf5(file.head) and not file.head.startswith(b"MATLAB"),
-    read=read_hdf5,
-    episodes=episodes_in,
-    arms=True,
-)

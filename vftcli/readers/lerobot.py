@@ -12,10 +12,11 @@ import numpy as np
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, open_log
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described, states_positions
 from vftcli.signals.errors import LogError
@@ -75,7 +76,7 @@ class Element(NamedTuple):
     side: str  #: left, right, or "" for neither.
 
 
-def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read an episode of a dataset."""
     info = info_of(file.path)
     episodes = episodes_told(file.path)
@@ -324,10 +325,11 @@ def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     return table
 
 
-LEROBOT = Reader(
-    name="lerobot",
-    recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
-    read=read_lerobot,
-    episodes=lambda file: [episode.number for episode in episodes_told(file.path)],
-    arms=True,
-)
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder is a dataset."""
+    return "meta" in file.entries and (file.path / "meta" / "info.json").is_file()
+
+
+def episodes_in(file: LogFile) -> list[int]:
+    """The numbers of its episodes."""
+    return [episode.number for episode in episodes_told(file.path)]

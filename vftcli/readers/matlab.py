@@ -9,16 +9,17 @@ from typing import Any, Literal
 import numpy as np
 
 from vftcli.readers.aliases import CLOCKS
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.hdf5 import opened, table_of
 from vftcli.readers.hdf5_layouts import level_of
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, from_table, states_positions
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
-V5, V73 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+V73 = b"MATLAB 7.3 MAT-file"  #: How a file of HDF5 begins.
 
 HEADER, TAG = 128, 8  #: Bytes before the first variable, and of the tag before each.
 COMPRESSED = 15  #: Type of a variable that is packed.
@@ -29,7 +30,7 @@ NUMBERS = {
 }  # fmt: skip
 
 
-def read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read a .mat file; signals of joints × samples are turned, and said."""
     variables = variables_of_v73(file) if file.head.startswith(V73) else variables_of_v5(file)
     if not variables:
@@ -151,10 +152,3 @@ def unpacked_size(packed: memoryview, limit: int) -> int:
             break  # told when it is read
         rest = unpacker.unconsumed_tail
     return total
-
-
-MATLAB = Reader(
-    name="mat",
-    recognises=lambda file: file.head.startswith((V5, V73)),
-    read=read_matlab,
-)

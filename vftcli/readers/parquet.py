@@ -15,9 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
 from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import InOnePieceError, LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import InOnePieceError, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
@@ -296,9 +297,11 @@ class ParquetTable(ColumnarTable):
                     yield {c: self._column(table.column(names[c]), c, clock) for c in columns}
 
 
-PARQUET = Reader(
-    name="parquet",
-    recognises=lambda file: file.head.startswith(b"PAR1"),
-    read=lambda file, request: read_columns(ParquetTable(file), request),
-    episodes=lambda file: episodes_of(ParquetTable(file).episodes()),
-)
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read a Parquet file."""
+    return read_columns(ParquetTable(file), request)
+
+
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of its episodes."""
+    return episodes_of(ParquetTable(file).episodes())

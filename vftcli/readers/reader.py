@@ -3,10 +3,9 @@
 import math
 import mmap
 import re
-import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
@@ -156,7 +155,7 @@ class ReadChoice:
         ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
-    #: Name of a format in `vftcli.readers.READERS`, None to recognise it by its content.
+    #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: str | None = None
     columns: str | None = None  #: The text of ``--columns``, or None.
     #: The signals that are wanted; None for all. Others may be left unread.
@@ -250,34 +249,6 @@ class ReadChoice:
     def wants(self, signal: str) -> bool:
         """Whether a signal has to be read; the clock and the positions always are."""
         return self.signals is None or signal in self.signals or signal in {"t", "q"}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Reader:
-    """One log format."""
-
-    name: str  #: Name for ``--format``, and of its words in `formats.toml`.
-    #: Whether a file's content is of this format.
-    recognises: Callable[[LogFile], bool] = field(repr=False)
-    read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)  #: Reads it.
-    general: bool = False  #: Whether it takes any table, and is asked only if no other format fits.
-    columns: bool = True  #: Whether the columns may be described by ``--columns``.
-    describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
-    #: The numbers of a file's episodes, None for a format that holds one recording.
-    episodes: Callable[[LogFile], Sequence[int]] | None = field(default=None, repr=False)
-    arms: bool = False  #: Whether a log may be of two arms.
-
-    @property
-    def words(self) -> Mapping[str, str]:
-        """What a user reads of it: title, recording (how to), takes (which signals), pitfalls."""
-        return format_words()[self.name]
-
-
-@cache
-def format_words() -> dict[str, dict[str, str]]:
-    """The words of every format, by its name."""
-    text = (Path(__file__).parent / "formats.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
 
 
 def open_log(path: Path) -> LogFile:

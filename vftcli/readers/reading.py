@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.parts import refuse_arm
@@ -17,10 +18,8 @@ from vftcli.readers.reader import (
     LogFile,
     RawLog,
     ReadChoice,
-    Reader,
     open_log,
 )
-from vftcli.readers.registry import READERS, TEXTS_OF_MAKERS
 from vftcli.readers.rows import without_unknown_rows
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.names import EFFORTS
@@ -46,7 +45,7 @@ def read(
 
     Args:
         path: A file, a bag folder or a dataset's folder.
-        format: Name of a format in READERS.
+        format: Name of a format in FORMATS.
         columns: Which columns hold which signals, in the grammar of ``--columns``.
         signals: Fields of Recording that are wanted; others may be left unread. None for all.
         label: What to call it in tables; its file's name if "".
@@ -75,12 +74,12 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
         )
     file = open_log(path)
     reader = _reader(file, choice.format, choice.columns)
-    if choice.episode is not None and reader.episodes is None:
+    if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     if not reader.arms:
         refuse_arm(path, choice)
     digest = Digest((path,))
-    if "polars" not in sys.modules and reader.episodes is None:
+    if "polars" not in sys.modules and not reader.episodes:
         digest.start()  # its import takes longer than the hash and leaves a core idle
 
     def found(choice: ReadChoice = choice) -> RawLog:
@@ -108,16 +107,16 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     """The numbers of the episodes that a file holds, rising."""
     file = open_log(Path(path))
     reader = _reader(file, choice.format, choice.columns)
-    if reader.episodes is None:
+    if not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
-    return reader.episodes(file)
+    return reader.numbers(file)
 
 
 def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
     """Whether a file holds several episodes."""
     file = open_log(Path(path))
     reader = _reader(file, choice.format, choice.columns)
-    return reader.episodes is not None and len(reader.episodes(file)) > 1
+    return len(reader.numbers(file)) > 1
 
 
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
@@ -136,42 +135,39 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
-def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
-    """Return the reader that a path's content calls for, or that is chosen."""
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> LogFormat:
+    """The format that a path's content calls for, or that is chosen."""
     choice = choice or ReadChoice()
     return _reader(open_log(Path(path)), choice.format, choice.columns)
 
 
-def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
-    """The reader that is named, or that the content calls for."""
-    if name is not None and name not in READERS:
+def _reader(file: LogFile, name: str | None, columns: str | None) -> LogFormat:
+    """The format that is named, or that the content calls for."""
+    if name is not None and name not in FORMATS:
         raise UnknownFormatError(
-            f"no format {name!r}; known formats: {', '.join(READERS)}.{did_you_mean(name, READERS)}"
+            f"no format {name!r}; known formats: {', '.join(FORMATS)}.{did_you_mean(name, FORMATS)}"
         )
-    reader = READERS[name] if name else _recognise(file)
+    reader = FORMATS[name] if name else _recognise(file)
     if columns is None:
         return reader
-    if not reader.columns:
-        takers = ", ".join(r.name for r in READERS.values() if r.columns)
+    if not reader.takes_columns:
+        takers = ", ".join(r.name for r in FORMATS.values() if r.takes_columns)
         raise LogError(
             f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
             f"It applies to {takers}."
         )
     whole = reader.general or reader.describes or not file.lines
-    return reader if whole else READERS["table"]
+    return reader if whole else FORMATS["table"]
 
 
-def _recognise(file: LogFile) -> Reader:
-    """The one reader that knows the content; a general one only where no other does."""
-    for name in TEXTS_OF_MAKERS:
-        if (reader := READERS[name]).recognises(file):
-            return reader
+def _recognise(file: LogFile) -> LogFormat:
+    """The one format that knows the content; a general one only where no other does."""
     from vftcli.readers.unrecognised import description, known_kind
 
-    # A general reader would take nearly any text, also that of a vendor: it is asked last.
-    found = [r for r in READERS.values() if not r.general and r.recognises(file)]
+    # A general format would take nearly any text, also that of a vendor: it is asked last.
+    found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
-        found = [r for r in READERS.values() if r.general and r.recognises(file)]
+        found = [r for r in FORMATS.values() if r.general and r.recognises(file)]
     if len(found) == 1:
         return found[0]
     if not found:

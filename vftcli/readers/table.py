@@ -131,8 +131,9 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
             else [Cell(column)]
         )
     ]
-    if spec.width != len(cells):
-        missing = len(cells) - spec.width
+    missing = len(cells) - spec.width
+    rest = any(item.count == 0 for item in spec.items)
+    if missing < 0 or (missing and not rest):
         remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
         raise LogError(
             f"{table.path}: --columns describes {spec.width} columns, the table has "
@@ -142,8 +143,9 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     for item in spec.items:
         if item.rate is not None:
             continue
-        picks.append(pick_of(item, tuple(cells[start : start + item.count])))
-        start += item.count
+        count = item.count or missing
+        picks.append(pick_of(item, tuple(cells[start : start + count])))
+        start += count
     return picks
 
 
@@ -173,7 +175,7 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     )
     found = {
         int(match[1]): column
-        for column, name in enumerate(names)
+        for column, name in reversed(list(enumerate(names)))  # of two of one name the first
         if (match := template.fullmatch(name))
     }
     if not found:

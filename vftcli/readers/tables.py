@@ -2,7 +2,7 @@
 
 import math
 import tokenize
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import picks_by_alias
+from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, table_clock
 from vftcli.readers.columns import ColumnSpec, Item, parse_columns
 from vftcli.readers.delimited import TextTable, as_number
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.headless import guessed
 from vftcli.readers.joints import robot_of
 from vftcli.readers.picking import picked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, Table, missing_column, picks_of
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.table import Cell, Column, Table, missing_column, named_cells, picks_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
@@ -62,6 +63,54 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         robot_hint=robot_of(joints),
         **more,
     )
+
+
+def read_layout(
+    table: Table,
+    layout: LogFormat,
+    request: ReadChoice,
+    constants: Sequence[str] = (),
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Read a table by the columns of its format; what it has not of them is left out.
+
+    Args:
+        table: The table.
+        layout: Its format.
+        request: What is wanted.
+        constants: Names of columns of which the last value counts.
+        more: Further fields of the RawLog.
+
+    Raises:
+        LogError: If it has no clock or no positions.
+    """
+    spec = parse_columns(layout.columns)
+    if spec.named:
+        spec = replace(spec, items=tuple(known_items(table, layout, spec)))
+    picks, names = picks_of(table, spec), table.names or ()
+    # Of the vendors' signals libfranka's residual alone is turned.
+    signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
+    places = tuple(names.index(name) for name in constants if name in names)
+    picks = replace(picks, signals=tuple(signals), constants=places)
+    return picked(table, picks, request, clock_name=layout.clock, **more)
+
+
+def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
+    """The items of a layout of which a table has all columns, a joint each."""
+    names = table.names or ()
+    for item in spec.items:
+        cells: tuple[Cell, ...] = ()
+        with suppress(LogError):
+            cells = named_cells(table, item)
+        if item.signal == "t" and cells:
+            table_clock(table, cells[0].column)
+        wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
+        if len(cells) == wanted if wanted else len(cells) > 1:
+            yield item
+        elif item.signal in {"t", "q"}:
+            raise LogError(
+                f"{table.path}: no {item.pattern} among its {len(names)} columns. {layout.remedy}"
+            )
 
 
 def states_positions(request: ReadChoice) -> bool:
@@ -220,18 +269,17 @@ def is_headed(file: LogFile) -> bool:
     return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
 
 
-HEADED = Reader(
-    name="table",
-    recognises=is_headed,
-    read=lambda file, request: from_table(TextTable(file), request),
-    general=True,
-)
+def recognises(file: LogFile, layout: LogFormat) -> bool:
+    """Whether a text is a table with a header, or one without."""
+    if layout.name == "table":
+        return is_headed(file)
+    return bool(file.lines) and TextTable(file).names is None
 
-HEADERLESS = Reader(
-    name="headerless",
-    recognises=lambda file: bool(file.lines) and TextTable(file).names is None,
-    read=lambda file, request: from_table(TextTable(file), request),
-    general=True,
-)
 
-NPY = Reader(name="npy", recognises=lambda file: file.head.startswith(b"\x93NUMPY"), read=read_npy)
+def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
+    """Read a table of text by its layout, --columns or aliases, or an .npy file."""
+    if layout.name == "npy":
+        return read_npy(file, request)
+    if layout.columns:
+        return read_layout(TextTable(file), layout, request)
+    return from_table(TextTable(file), request)

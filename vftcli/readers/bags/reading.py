@@ -19,6 +19,7 @@ from vftcli.readers.bags.container import (
 from vftcli.readers.bags.decode import Decoder
 from vftcli.readers.bags.documents import Documents, read_documents
 from vftcli.readers.bags.topics import aligned
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, open_log
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Where, fact, warning
@@ -26,7 +27,12 @@ from vftcli.signals.remarks import Where, fact, warning
 METADATA_BYTES = 1024 * 1024
 
 
-def read_bag(file: LogFile, request: ReadChoice) -> RawLog:
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder holds files of a ROS 2 bag."""
+    return bool(storage_files(file))
+
+
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read any container of messages."""
     ingest = Ingest(path=file.path, size=_size(file))
     if request.blocks and ingest.size > WHOLE_BYTES:
