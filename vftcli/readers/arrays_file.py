@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.columns import parse_columns
 from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked
 from vftcli.readers.parts import episode_of
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
@@ -23,20 +22,15 @@ SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 
 def npz_arrays(file: LogFile) -> dict[str, Column]:
     """The arrays of an .npz file by name, unpacked within bounds."""
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
     arrays = {}
     try:
         with zipfile.ZipFile(BytesIO(file.content)) as bundle:
             total = sum(member.file_size for member in bundle.infolist())
-            if total > limit:
-                raise LogError(
-                    f"{file.path}: unpacks to {total >> 20} MiB, more than {limit >> 20} MiB. Save "
-                    "the arrays you need with np.savez."
-                )
+            check_unpacked(file.path, total, len(file.content))
             for member in bundle.infolist():
                 if member.filename.endswith(".npy"):
                     with bundle.open(member) as stream:
-                        content = stream.read(limit + 1)
+                        content = stream.read(total + 1)
                     member_head = LogFile(path=file.path, head=content)
                     check_npy_header(member_head, len(content))  # before it is believed
                     arrays[member.filename.removesuffix(".npy")] = numpy_array(file.path, content)
@@ -54,7 +48,7 @@ def read_arrays(
     """Read named arrays as panda-py's log, by --columns, or by alias."""
     shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
     table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)
-    if request.columns is not None and parse_columns(request.columns).named:
+    if request.spec.named:
         return from_table(table, request)
     if request.columns is not None:
         raise LogError(

@@ -5,10 +5,9 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from vftcli.readers.formats import LogFormat
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked
 from vftcli.readers.parquet import ColumnarTable, HeldColumns, episodes_of, read_columns
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
-from vftcli.signals.errors import LogError
 
 FILE_MAGIC = b"ARROW1\0\0"  #: How a file begins; a stream has no such mark.
 NUMBER = struct.Struct("<q")  #: A whole number in a message.
@@ -25,12 +24,7 @@ class ArrowTable(ColumnarTable):
         content = pa.py_buffer(file.content)
         self._content = content.slice(len(FILE_MAGIC) if file.head.startswith(FILE_MAGIC) else 0)
         batches = tuple(claims(self._content))
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
-        if sum(size for _, size in batches) > limit:
-            raise LogError(
-                f"{file.path}: unpacks to more than {limit >> 20} MiB, more than a log of this "
-                "size can hold. It is damaged or made to fill memory."
-            )
+        check_unpacked(file.path, sum(size for _, size in batches), self._size)
         schema = pa.ipc.open_stream(self._content).schema
         return self._held_of(schema, sum(rows for rows, _ in batches), schema.metadata)
 

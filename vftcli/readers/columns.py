@@ -70,8 +70,8 @@ class ColumnSpec:
     `segment` is the number of the recording that is wanted of a file that holds several.
     """
 
-    items: tuple[Item, ...]
-    named: bool
+    items: tuple[Item, ...] = ()
+    named: bool = False
     segment: int | None = None
 
     def item(self, signal: str) -> Item | None:

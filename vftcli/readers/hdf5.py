@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.hdf5_chunks import check_chunks
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked, unpacked_limit
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column, listed
 from vftcli.signals.errors import LogError
@@ -86,14 +86,10 @@ class Hdf5Table:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
         names, datasets = list(self._datasets), list(self._datasets.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * stored)
-        if 8 * sum(datasets[c].size for c in columns) > limit:
-            raise LogError(
-                f"{self.path}: {listed([names[c] for c in columns])} unpack to more than "
-                f"{limit >> 20} MiB, more than the {stored} bytes that are stored of them can hold."
-            )
+        what = f"{self.path}: {listed([names[c] for c in columns])}"
+        check_unpacked(what, 8 * sum(datasets[c].size for c in columns), stored)
         for c in columns:
-            check_chunks(f"{self.path}: {names[c]}", datasets[c], limit)
+            check_chunks(f"{self.path}: {names[c]}", datasets[c], unpacked_limit(stored))
 
     def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
         """One dataset. (T,) or (T, k)"""

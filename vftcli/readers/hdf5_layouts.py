@@ -18,7 +18,7 @@ from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.picking import rate_words
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
+from vftcli.readers.tables import ArrayTable, described, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact
 
@@ -55,7 +55,7 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     names = table.names or ()
     if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
         return read_any(table, request)
-    if stated := states_positions(request):
+    if stated := request.spec.item("q") is not None:
         refuse_arm(table.path, request)
     told = "left: columns 0-5, right: columns 7-12"
     arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, told)
@@ -75,7 +75,7 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
     refuse_arm(table.path, request)
-    if states_positions(request):
+    if request.spec.item("q"):
         return from_table(table, request)
     names = list(table.names or ())
     signals = {"q[rad]": "joint_positions", "dq": "joint_velocities", "tau": DROID_TORQUE}
@@ -110,7 +110,7 @@ def robot_of(folder: Path) -> str | None:
 def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """Any other file: by --columns, or by alias among the datasets of one group."""
     refuse_arm(table.path, request)
-    if states_positions(request):
+    if request.spec.item("q"):
         return from_table(table, request)
     if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names or ())]) > 1:
         raise UnknownFormatError(

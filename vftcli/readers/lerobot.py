@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import ALIASES
-from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.columns import SIGNALS
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, open_log
 from vftcli.readers.table import listed
-from vftcli.readers.tables import described, states_positions
+from vftcli.readers.tables import described
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
@@ -85,7 +85,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     path = data_file(file.path, episode)
     table = rows_of(open_log(path), episode)
     names: tuple[str, ...] = ()
-    if states_positions(request):
+    if request.spec.item("q"):
         refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
     else:
@@ -112,7 +112,7 @@ def columns_of(
     there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     side = ""
-    taken = request.columns is not None and parse_columns(request.columns).item("wrench")
+    taken = request.spec.item("wrench")
     remarks: tuple[Remark, ...] = () if taken else wrenches_left(table, features)
     if len(sides) > 1:
         side, said = arm_of(path, request, sides)

@@ -12,10 +12,10 @@ from vftcli.readers.aliases import CLOCKS
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.hdf5 import opened, table_of
 from vftcli.readers.hdf5_layouts import level_of
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked, unpacked_limit
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, from_table, states_positions
+from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -35,7 +35,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     variables = variables_of_v73(file) if file.head.startswith(V73) else variables_of_v5(file)
     if not variables:
         raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")
-    level = "" if states_positions(request) else level_of(file.path, list(variables), ".")
+    level = "" if request.spec.item("q") else level_of(file.path, list(variables), ".")
     columns = {
         name.removeprefix(level): array
         for name, array in variables.items()
@@ -86,7 +86,6 @@ def variables_of_v5(file: LogFile) -> dict[str, Column]:
     check_size(file)
     from scipy.io import loadmat, whosmat
 
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
     stream: Any = BytesIO(file.content)
     try:
         with warnings.catch_warnings():
@@ -96,11 +95,7 @@ def variables_of_v5(file: LogFile) -> dict[str, Column]:
             claimed = sum(
                 8 * int(np.prod(shape, dtype=object)) for _, shape, k in there if k in NUMBERS
             )
-            if claimed > limit:
-                raise LogError(
-                    f"{file.path}: its variables claim {claimed >> 20} MiB, more than a file of "
-                    "this size can hold. It is damaged or made to fill memory."
-                )
+            check_unpacked(file.path, claimed, len(file.content))
             loaded = loadmat(stream, variable_names=wanted, simplify_cells=True)
     except (
         ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OSError, zlib.error,
@@ -126,7 +121,7 @@ def check_size(file: LogFile) -> None:
     """Check what the packed variables of a file unpack to, before any is kept."""
     content, place, total = file.content, HEADER, 0
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(content))
+    limit = unpacked_limit(len(content))
     while place + TAG <= len(content):
         kind = int.from_bytes(content[place : place + 4], order)
         size = int.from_bytes(content[place + 4 : place + TAG], order)
@@ -134,11 +129,7 @@ def check_size(file: LogFile) -> None:
         if len(packed) < size:
             raise LogError(f"{file.path}: the MATLAB file is cut within a variable.")
         total += unpacked_size(packed, limit) if kind == COMPRESSED else size
-        if total > limit:
-            raise LogError(
-                f"{file.path}: unpacks to more than {limit >> 20} MiB, more than a log this small "
-                "can hold. It is damaged or made to fill memory."
-            )
+        check_unpacked(file.path, total, len(content))
         place += TAG + size
 
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.formats import LogFormat
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked
 from vftcli.readers.parts import episode_of
 from vftcli.readers.reader import InOnePieceError, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
@@ -170,13 +170,8 @@ class ColumnarTable(ABC):
         The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
         whole process.
         """
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
         width = sum(self.lists.get(column, 1) for column in columns)
-        if 8 * width * self._held.rows > limit:
-            raise LogError(
-                f"{self.path}: its columns unpack to more than {limit >> 20} MiB, more than a log "
-                "of this size can hold. It is damaged or made to fill memory."
-            )
+        check_unpacked(self.path, 8 * width * self._held.rows, self._size)
 
     def episodes(self) -> Column:
         """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""

@@ -9,6 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Self
 
+from vftcli.readers.columns import ColumnSpec, parse_columns
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array, Indices
@@ -217,6 +218,11 @@ class ReadChoice:
             all_episodes=episode == "all",
             arm=arm,
         )
+
+    @property
+    def spec(self) -> ColumnSpec:
+        """What ``--columns`` says, of nothing where there is no such text."""
+        return parse_columns(self.columns) if self.columns is not None else ColumnSpec()
 
     @property
     def whole(self) -> "ReadChoice":

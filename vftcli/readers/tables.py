@@ -39,12 +39,10 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     Raises:
         LogError: If the columns cannot be told.
     """
-    spec = parse_columns(request.columns) if request.columns is not None else None
-    if spec is not None:
-        more["segment"] = spec.segment
-    items = spec.items if spec is not None else ()
-    stated = spec is not None and (item := spec.item("q")) is not None and item.unit is not None
-    if spec is not None and items and (table.names is None or not spec.named):
+    spec = request.spec
+    more["segment"] = spec.segment
+    stated = (item := spec.item("q")) is not None and item.unit is not None
+    if spec.items and (table.names is None or not spec.named):
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
     if table.names is None and table.width == 1:
         raise LogError(
@@ -53,7 +51,7 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         )
     if table.names is None:
         return read_by_values(table, request, **more)
-    picks, joints = picks_by_alias(table, items)
+    picks, joints = picks_by_alias(table, spec.items)
     return picked(
         table,
         picks,
@@ -113,25 +111,17 @@ def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[I
             )
 
 
-def states_positions(request: ReadChoice) -> bool:
-    """Whether a --columns text says which columns the positions are."""
-    return request.columns is not None and parse_columns(request.columns).item("q") is not None
-
-
 def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table whose columns are known, but for what a --columns text says of them."""
-    known = parse_columns(usual)
-    stated = parse_columns(request.columns) if request.columns is not None else None
-    if stated is not None and stated.items and not stated.named:
+    stated = request.spec
+    if stated.items and not stated.named:
         return from_table(table, request, **more)
-    items = {item.signal: item for item in known.items}
-    if stated is not None and stated.item("q") is not None:
+    items = {item.signal: item for item in parse_columns(usual).items}
+    if stated.item("q") is not None:
         items = {signal: item for signal, item in items.items() if signal == "t"}
-    for item in stated.items if stated is not None else ():
+    for item in stated.items:
         items[item.signal] = restated(table, item, items.get(item.signal))
-    spec = ColumnSpec(
-        items=tuple(items.values()), named=True, segment=stated.segment if stated else None
-    )
+    spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
     return picked(table, picks_of(table, spec), request, **more)

@@ -11,7 +11,6 @@ import numpy as np
 from vftcli.readers.bags.container import Batch, Channel, Ingest
 from vftcli.readers.bags.decode import Stream
 from vftcli.readers.bags.json_messages import message_streams
-from vftcli.readers.columns import parse_columns
 from vftcli.readers.joints import laid_along
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
@@ -59,8 +58,7 @@ class Documents:
 
     def streams(self, request: ReadChoice) -> list[Stream]:
         """The channels that hold ROS messages, unless --columns speaks of other fields."""
-        items = parse_columns(request.columns).items if request.columns is not None else ()
-        fields = {(item.pattern or "").rpartition(".")[2] for item in items}
+        fields = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
         if not fields <= {"", "position", "velocity", "effort"}:
             return []
         found = (
