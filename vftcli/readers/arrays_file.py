@@ -10,8 +10,7 @@ import numpy as np
 
 from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.opening import check_unpacked
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array, read_layout
 from vftcli.signals.errors import LogError, NoLogError
@@ -94,8 +93,11 @@ def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) 
     if skills := skills_of(log):
         log = skills[numbers.index(number)]
         if "time_since_skill_started" in log:
-            raw = _read_frankapy(file, log, request)
-            return replace(raw, part=part, remarks=(*remarks, *raw.remarks))
+            arrays = arrays_of_lists(file, {"time": log["time_since_skill_started"], **log})
+            usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
+            items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
+            request = replace(request, columns=request.columns or ",".join(items))
+            log = {name: arrays[name] for name in usual if name in arrays}
     elif len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
         log = inner
     raw = read_arrays(file, arrays_of_lists(file, log), remarks, request)
@@ -113,22 +115,6 @@ def skills_of(log: Any) -> list[dict[Any, Any]]:  # noqa: ANN401 - whatever the 
 def episodes_of_skills(log: Any) -> tuple[int, ...]:  # noqa: ANN401 - whatever the file holds
     """The numbers of a log's episodes: its skills counted from 0, 0 alone for any other log."""
     return tuple(range(len(skills_of(log)))) or (0,)
-
-
-def _read_frankapy(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    """Read frankapy's trajectory: times in seconds, positions, no torque."""
-    arrays = arrays_of_lists(file, log)
-    if "time_since_skill_started" in arrays:
-        arrays["time"] = arrays["time_since_skill_started"]
-    kept: dict[str, Column] = {
-        name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays
-    }
-    columns = request.columns or ",".join(
-        f"{signal}={name}"
-        for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
-        if name in kept
-    )
-    return read_arrays(file, kept, (), replace(request, columns=columns))
 
 
 def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:

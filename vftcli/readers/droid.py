@@ -7,8 +7,7 @@ from pathlib import Path
 
 from vftcli.readers import hdf5_layouts
 from vftcli.readers.formats import LogFormat
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, open_log
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of, open_log
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 

@@ -8,17 +8,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.hdf5 import Hdf5Table, natural, opened, table_of
-from vftcli.readers.parts import arm_of, episode_of, refuse_arm
 from vftcli.readers.picking import rate_words
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice
-from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, described, from_table
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, arm_of, episode_of, refuse_arm
+from vftcli.readers.table import listed
+from vftcli.readers.tables import described, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact
 
@@ -27,9 +24,13 @@ ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
 
 DROID_STATE = "observation/robot_state/"
+#: What DROID's controller commands, without gravity; what it measures includes it.
+DROID_COMPUTED = "joint_torques_computed"
 DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
-#: What DROID measures, gravity included, and what its controller commands, without gravity.
-DROID_TORQUE, DROID_COMPUTED = "motor_torques_measured", "joint_torques_computed"
+DROID_USUAL = (
+    f"t={DROID_TIME}seconds|{DROID_TIME}nanos,q[rad]={DROID_STATE}joint_positions,"
+    f"dq={DROID_STATE}joint_velocities,tau={DROID_STATE}motor_torques_measured"
+)
 #: Where projects that record no torque keep their positions → the project.
 TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
@@ -61,15 +62,20 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, told)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
-    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span}"
-    usual += f",dq=observations/qvel{span}" if "observations/qvel" in names else ""
-    usual += f",current[mA]={DYNAMIXEL}{span}" if DYNAMIXEL in names else ""
+    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
+    usual += f",current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
-    raw = described(table, usual, request, remarks=remarks)
+    raw = described(table, recorded(usual, names), request, remarks=remarks)
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
     own = raw.clock == rate_words(ALOHA_RATE)
     return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
+
+
+def recorded(usual: str, names: Sequence[str]) -> str:
+    """The items of a text of which a file has the columns; its clock and positions always."""
+    items = [(item, item.partition("=")[2].partition("[")[0]) for item in usual.split(",")]
+    return ",".join(item for item, name in items if name in names or re.match(r"[tq]\b", item))
 
 
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
@@ -77,20 +83,11 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     refuse_arm(table.path, request)
     if request.spec.item("q"):
         return from_table(table, request)
-    names = list(table.names or ())
-    signals = {"q[rad]": "joint_positions", "dq": "joint_velocities", "tau": DROID_TORQUE}
-    there = {s: DROID_STATE + name for s, name in signals.items() if DROID_STATE + name in names}
-    times = [DROID_TIME + name for name in ("seconds", "nanos")]
-    if not set(times) <= set(names):
-        raise LogError(f"{table.path}: a DROID log without {' and '.join(times)}, its clock.")
-    wanted = [names.index(name) for name in (*there.values(), *times)]
-    loaded = table.load(wanted, None)
-    columns: dict[str, Column] = {names[k]: column for k, column in loaded.items()}
-    seconds, nanos = (columns.pop(name).astype(np.int64) for name in times)
-    columns["robot_timestamp"] = seconds * 1_000_000_000 + nanos
-    usual = ",".join(["t[ns]=robot_timestamp", *(f"{s}={name}" for s, name in there.items())])
+    names = table.names or ()
     remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
-    raw = described(ArrayTable(path=table.path, columns=columns), usual, request, remarks=remarks)
+    clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
+    usual = recorded(DROID_USUAL, names)
+    raw = described(table, usual, request, remarks=remarks, clock_name=clock)
     return replace(raw, robot_hint=robot_of(Path(table.path).parent))
 
 

@@ -13,8 +13,7 @@ from vftcli.readers.arrays_file import (
     read_dictionary,
 )
 from vftcli.readers.formats import LogFormat
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError

@@ -15,8 +15,16 @@ from vftcli.readers.columns import SIGNALS
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
-from vftcli.readers.parts import arm_of, episode_of, refuse_arm
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, open_log
+from vftcli.readers.reader import (
+    ARMS,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    arm_of,
+    episode_of,
+    open_log,
+    refuse_arm,
+)
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described
 from vftcli.signals.errors import LogError

@@ -3,7 +3,7 @@
 import math
 import mmap
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +14,9 @@ from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.derivation import is_fast, with_velocity
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.remarks import Remark, caution, warning
 from vftcli.signals.wrench import WrenchFrame
 
 
@@ -267,3 +267,46 @@ def open_log(path: Path) -> LogFile:
         return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
     head, wrapping = head_of(path)
     return LogFile(path=path, head=head, wrapping=wrapping)
+
+
+def episode_of(
+    path: Path | str, request: ReadChoice, numbers: Sequence[int]
+) -> tuple[int, str, tuple[Remark, ...]]:
+    """The episode that is read of those a file holds: the one asked for, else the first, and said.
+
+    Returns:
+        Its number, its name as a part ("" for the only one), and what is to be said of it.
+    """
+    number, count = request.episode, len(numbers)
+    if number is not None and number not in numbers:
+        there = f"{count} episodes, {numbers[0]} to {numbers[-1]}"
+        there = f"1 episode, {numbers[0]}" if count == 1 else there
+        raise LogError(f"{path}: no episode {number}; it holds {there} (--episode K|all).")
+    taken = numbers[0] if number is None else number
+    said = number is None and count > 1
+    code = "episode-taken" if taken == 0 else "episode-taken-first"
+    remarks = (caution(code, episode=taken, episodes=count),) if said else ()
+    return taken, f"episode {taken}" if count > 1 else "", remarks
+
+
+def arm_of(
+    path: Path | str, request: ReadChoice, arms: Sequence[str], told: str = ""
+) -> tuple[str, tuple[Remark, ...]]:
+    """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
+    if request.arm is not None and request.arm not in arms:
+        raise LogError(f"{path}: holds the {arms[0]} arm alone; leave --arm out.")
+    if request.arm is not None or len(arms) == 1:
+        return request.arm or arms[0], ()
+    if not request.examining:
+        where = f" ({told})" if told else ""
+        raise LogError(
+            f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
+        )
+    taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
+    return arms[0], (taken,)
+
+
+def refuse_arm(path: Path | str, request: ReadChoice) -> None:
+    """Refuse ``--arm`` for a log of one arm."""
+    if request.arm is not None:
+        raise LogError(f"{path}: a log of one arm; leave --arm out.")

@@ -8,19 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
 from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
-from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import (
     InOnePieceError,
     LogFile,
     RawLog,
     ReadChoice,
     open_log,
+    refuse_arm,
 )
-from vftcli.readers.rows import without_unknown_rows
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.parsing import did_you_mean
