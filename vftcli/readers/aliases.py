@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -298,7 +298,12 @@ def _clock(table: Table) -> Pick | None:
     A message's own stamp goes before the time at which a recorder took it.
     """
     names = [name.lower() for name in table.names or ()]
-    pairs: list[tuple[int, ...]] = [*_second_pairs(names)]
+    pairs: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
+    for column, name in enumerate(names):
+        if match := NANOSECONDS.fullmatch(name):
+            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
+            there = [k for k, other in enumerate(names) if other in wanted]
+            pairs += [(there[0], column)] if len(there) == 1 else []
     in_pair = {column for pair in pairs for column in pair}
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
     single: list[tuple[int, ...]] = [
@@ -311,22 +316,12 @@ def _clock(table: Table) -> Pick | None:
     own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
     found = own or found
     if len(found) > 1:
-        there = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
+        clocks = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
         raise LogError(
-            f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
+            f"{table.path}: {clocks} could each be the clock. Say which with --columns, as in "
             f"t={'|'.join((table.names or ())[c] for c in found[0])},q=…"
         )
     return Pick(signal="t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
-
-
-def _second_pairs(names: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """The columns of whole seconds and of the nanoseconds within them, as ROS writes its stamps."""
-    for column, name in enumerate(names):
-        if match := NANOSECONDS.fullmatch(name):
-            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
-            there = [k for k, other in enumerate(names) if other in wanted]
-            if len(there) == 1:
-                yield there[0], column
 
 
 def table_clock(table: Table, column: int) -> Cell:

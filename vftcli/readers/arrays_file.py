@@ -93,7 +93,7 @@ def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) 
     if skills := skills_of(log):
         log = skills[numbers.index(number)]
         if "time_since_skill_started" in log:
-            arrays = arrays_of_lists(file, {"time": log["time_since_skill_started"], **log})
+            arrays = arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
             usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
             items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
             request = replace(request, columns=request.columns or ",".join(items))

@@ -6,7 +6,7 @@ from typing import Any
 
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.opening import check_unpacked
-from vftcli.readers.parquet import ColumnarTable, HeldColumns, episodes_of, read_columns
+from vftcli.readers.parquet import ColumnarTable, episodes_of, read_columns
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 
 FILE_MAGIC = b"ARROW1\0\0"  #: How a file begins; a stream has no such mark.
@@ -18,15 +18,14 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 class ArrowTable(ColumnarTable):
     """An Arrow file or stream; a file is a stream behind its magic, its index is not needed."""
 
-    def _opened(self, file: LogFile) -> HeldColumns:
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
         import pyarrow as pa
 
         content = pa.py_buffer(file.content)
         self._content = content.slice(len(FILE_MAGIC) if file.head.startswith(FILE_MAGIC) else 0)
         batches = tuple(claims(self._content))
         check_unpacked(file.path, sum(size for _, size in batches), self._size)
-        schema = pa.ipc.open_stream(self._content).schema
-        return self._held_of(schema, sum(rows for rows, _ in batches), schema.metadata)
+        return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         for batch in self._stream([column]):

@@ -97,7 +97,10 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
     else:
-        usual, names, side, more = columns_of(file.path, table, features_of(info), request)
+        told = info.get("features")
+        told = told.items() if isinstance(told, dict) else ()
+        features = {name: each.get("names") for name, each in told if isinstance(each, dict)}
+        usual, names, side, more = columns_of(file.path, table, features, request)
         remarks = (*remarks, *more)
     raw = described(table, usual, request, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
@@ -121,7 +124,12 @@ def columns_of(
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     side = ""
     taken = request.spec.item("wrench")
-    remarks: tuple[Remark, ...] = () if taken else wrenches_left(table, features)
+    # Nothing tells a sensor's wrench from an estimate.
+    observed = [name for name in table.names or () if name.startswith("observation.")]
+    left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
+    remarks: tuple[Remark, ...] = ()
+    if left and not taken:
+        remarks = (fact("wrench-left-out", features=listed(left)),)
     if len(sides) > 1:
         side, said = arm_of(path, request, sides)
         remarks = (*remarks, *said)
@@ -144,13 +152,6 @@ def columns_of(
         if found
     ]
     return ",".join(["t=timestamp", *items]), names, side, remarks
-
-
-def wrenches_left(table: ParquetTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
-    """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
-    observed = [name for name in table.names or () if name.startswith("observation.")]
-    found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
-    return (fact("wrench-left-out", features=listed(found)),) if found else ()
 
 
 def in_order(
@@ -183,20 +184,15 @@ def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element
     good = isinstance(labels, list) and len(labels) == (width or 1)
     for k in range(width or 1):
         label = str(labels[k]) if good else ""
-        signal, joint = measured_by(label) or (of_feature, label)
+        signal, joint = of_feature, label
+        if match := COUNTED.fullmatch(label):
+            signal, joint = STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
+        elif match := NAMED.fullmatch(label):
+            signal, joint = STEMS[match["stem"]], match["joint"]
         pose = joint.lower().rpartition("_")[2].rpartition(".")[2] in CARTESIAN
         if signal and not pose and not NO_JOINT.search(joint):
             side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
-
-
-def measured_by(label: str) -> tuple[str, str] | None:
-    """The signal and the joint that an element's name tells, None for one that tells no signal."""
-    if match := COUNTED.fullmatch(label):
-        return STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
-    if match := NAMED.fullmatch(label):
-        return STEMS[match["stem"]], match["joint"]
-    return None
 
 
 def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
@@ -230,13 +226,6 @@ def text_of(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
-
-
-def features_of(info: dict[str, Any]) -> dict[str, Any]:
-    """Feature → the names of its elements, as info.json tells them."""
-    features = info.get("features")
-    there = features.items() if isinstance(features, dict) else ()
-    return {name: told.get("names") for name, told in there if isinstance(told, dict)}
 
 
 def episodes_told(folder: Path) -> list[Episode]:

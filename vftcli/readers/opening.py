@@ -61,20 +61,17 @@ def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
         raise LogError(f"{path}: the file is empty; nothing was recorded into it.")
     for magic, wrapping in MAGICS.items():
         if head.startswith(magic):
-            return _unwrapped_head(path, wrapping), wrapping
+            found = b""
+            for piece in Unpacker(path, wrapping).pieces():
+                found += piece
+                if len(found) >= HEAD_BYTES:
+                    break
+            if not found:
+                raise LogError(
+                    f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged."
+                )
+            return found[:HEAD_BYTES], wrapping
     return head, None
-
-
-def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
-    """As much of a wrapped file as recognition looks at."""
-    found = b""
-    for piece in Unpacker(path, wrapping).pieces():
-        found += piece
-        if len(found) >= HEAD_BYTES:
-            break
-    if not found:
-        raise LogError(f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged.")
-    return found[:HEAD_BYTES]
 
 
 def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:

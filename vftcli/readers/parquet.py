@@ -11,7 +11,7 @@ from dataclasses import replace
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -41,15 +41,6 @@ def guarded(path: Path) -> Iterator[None]:
         raise LogError(f"{path}: a damaged Parquet or Arrow file ({reason})") from None
 
 
-class HeldColumns(NamedTuple):
-    """What a table says that it holds."""
-
-    names: tuple[str, ...]  #: Of its columns.
-    lists: tuple[bool, ...]  #: Whether each is a column of lists.
-    rows: int  #: Their number.
-    told: bytes | str  #: What `vftcli convert` wrote beside the columns, as JSON; "{}" for nothing.
-
-
 class ColumnarTable(ABC):
     """A file of columns; only those asked for are decoded, and nothing is ever mended.
 
@@ -65,15 +56,16 @@ class ColumnarTable(ABC):
         self._rows: Any = None
         self._size = len(file.content)
         with guarded(self.path):
-            held = self._opened(file)
-            if held.rows == 0:
+            schema, self.rows = self._opened(file)
+            self._told = (schema.metadata or {}).get(b"vftcli", b"{}")
+            self._lists = [k for k, kind in enumerate(schema.types) if is_list(kind)]
+            if self.rows == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
-        self.names: tuple[str, ...] | None = held.names
-        self._held = held
+        self.names: tuple[str, ...] = tuple(schema.names)
 
     @abstractmethod
-    def _opened(self, file: LogFile) -> HeldColumns:
-        """Open the file; what it says it holds."""
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
+        """Open the file; its schema, and how many rows it says it has."""
 
     @abstractmethod
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - a list
@@ -83,20 +75,15 @@ class ColumnarTable(ABC):
     def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         """Some columns of all rows, as a table."""
 
-    def _held_of(self, schema: Any, rows: int, metadata: Any) -> HeldColumns:  # noqa: ANN401
-        """What a schema and the metadata beside it say."""
-        lists = tuple(is_list(kind) for kind in schema.types)
-        return HeldColumns(tuple(schema.names), lists, rows, (metadata or {}).get(b"vftcli", b"{}"))
-
     @property
     def width(self) -> int:
         """Number of columns."""
-        return len(self._held.names)
+        return len(self.names)
 
     def told(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
         try:
-            told = json.loads(self._held.told)
+            told = json.loads(self._told)
         except (ValueError, RecursionError):
             return {}
         good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
@@ -106,8 +93,7 @@ class ColumnarTable(ABC):
     def lists(self) -> Mapping[int, int]:
         """Columns of lists and their length in the first row."""
         with guarded(self.path):
-            found = [k for k, is_list in enumerate(self._held.lists) if is_list]
-            return {k: len(self._first_list(k) or ()) for k in found}
+            return {k: len(self._first_list(k) or ()) for k in self._lists}
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Decode some columns."""
@@ -128,7 +114,7 @@ class ColumnarTable(ABC):
 
         if column in self.lists:
             return self._matrix(values, column)
-        kind, name = values.type, self._held.names[column]
+        kind, name = values.type, self.names[column]
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
             unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
             values = values.cast(unit).cast(pa.int64())
@@ -143,7 +129,7 @@ class ColumnarTable(ABC):
 
     def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
         """A column of lists of one length. (T, k)"""
-        length, name = self.lists[column], self._held.names[column]
+        length, name = self.lists[column], self.names[column]
         values = values.combine_chunks()
         if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
             values = values.chunk(0) if values.num_chunks else values
@@ -157,7 +143,7 @@ class ColumnarTable(ABC):
 
     def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
         """The names of some columns, each of one column only."""
-        names = self._held.names
+        names = self.names
         # Decoders hand over both under one name.
         if any(names.count(names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
@@ -170,11 +156,11 @@ class ColumnarTable(ABC):
         whole process.
         """
         width = sum(self.lists.get(column, 1) for column in columns)
-        check_unpacked(self.path, 8 * width * self._held.rows, self._size)
+        check_unpacked(self.path, 8 * width * self.rows, self._size)
 
     def episodes(self) -> Column:
         """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
-        if self.names is None or EPISODE not in self.names:
+        if EPISODE not in self.names:
             return np.empty(0)
         column = self.names.index(EPISODE)
         numbers = self.load([column], None)[column]
@@ -244,29 +230,23 @@ def episodes_of(numbers: Column) -> tuple[int, ...]:
 class ParquetTable(ColumnarTable):
     """A Parquet file."""
 
-    def _opened(self, file: LogFile) -> HeldColumns:
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
         import pyarrow.parquet as pq
 
         source = file.direct or BytesIO(file.content)
         self._direct = file.direct
         self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
-        about = self._file.metadata
-        return self._held_of(self._file.schema_arrow, int(about.num_rows), about.metadata)
+        return self._file.schema_arrow, int(self._file.metadata.num_rows)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
-        name = self._held.names[column]
+        name = self.names[column]
         batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
         first = next(iter(batches), None)
         return first.column(name)[0].as_py() if first is not None and first.num_rows else None
 
     def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
-        names = self._held.names
+        names = self.names
         return self._file.read(columns=[names[c] for c in columns], use_threads=False)
-
-    @property
-    def rows(self) -> int:
-        """How many rows it has."""
-        return self._held.rows
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Decode some columns as `load` does, some thousand rows at a time."""

@@ -248,22 +248,18 @@ def check_npy_header(file: LogFile, size: int) -> None:
         )
 
 
-def is_headed(file: LogFile) -> bool:
-    """Whether a text file starts with a line of column names, and then one of mostly numbers."""
-    if not file.lines or (table := TextTable(file)).names is None:
+def recognises(file: LogFile, layout: LogFormat) -> bool:
+    """Whether a text is a table without a header, or a line of names above mostly numbers."""
+    if not file.lines:
         return False
+    table = TextTable(file)
+    if layout.name == "headerless" or table.names is None:
+        return layout.name == "headerless" and table.names is None
     if len(table.sample) < 2:
         return table.width > 1
     cells = table.cells(table.sample[1])
     numbers = [as_number(cell, decimal_comma=table.decimal_comma) for cell in cells]
     return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
-
-
-def recognises(file: LogFile, layout: LogFormat) -> bool:
-    """Whether a text is a table with a header, or one without."""
-    if layout.name == "table":
-        return is_headed(file)
-    return bool(file.lines) and TextTable(file).names is None
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:

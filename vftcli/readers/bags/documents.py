@@ -120,10 +120,6 @@ MAX_DEPTH = 8
 MAX_VALUES = 4096
 
 
-class DocumentError(ValueError):
-    """A message is not the document it claims to be."""
-
-
 class Documents:
     """Documents of all channels, flattened as they come in."""
 
@@ -143,11 +139,11 @@ class Documents:
         for offset, length, time in zip(batch.offsets, batch.lengths, batch.times, strict=True):
             message = batch.buffer[offset : offset + length].tobytes()
             try:
-                rows.append(flattened(_document(message, json_like=json_like)))
-            except DocumentError as error:
+                rows.append(flattened(message, json_like=json_like))
+            except (ValueError, RecursionError) as error:
                 raise LogError(
                     f"{self.ingest.path}: message {len(rows) + 1} of {channel.topic} is damaged "
-                    f"({error})"
+                    f"({str(error)[:60]})"
                 ) from None
             times.append(int(time))
         return True
@@ -163,18 +159,6 @@ class Documents:
             for stream in message_streams(channel, rows, self.times[channel])
         )
         return list(found)
-
-
-def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
-    """A message in JSON, or of JointStates."""
-    if len(message) > MAX_BYTES:
-        raise DocumentError("longer than any message of joints")
-    if not json_like:
-        return joint_states(message)
-    try:
-        return json.loads(message)
-    except (ValueError, RecursionError) as error:
-        raise DocumentError(str(error)[:60]) from None
 
 
 def joint_states(message: bytes) -> dict[str, Any]:
@@ -215,7 +199,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
             _varint(message, position) if kind == 2 else ({1: 8, 5: 4}.get(kind, -1), position)
         )
         if size < 0 or position + size > len(message):
-            raise DocumentError("a field ends outside its message")
+            raise ValueError("a field ends outside its message")
         raw = message[position : position + size]
         position += size
         yield key >> 3, raw if kind == 2 else struct.unpack("<d" if kind == 1 else "<f", raw)[0]
@@ -226,7 +210,7 @@ def _varint(message: bytes, position: int) -> tuple[int, int]:
     value = shift = 0
     while True:
         if position >= len(message) or shift > 63:
-            raise DocumentError("a number ends outside its message")
+            raise ValueError("a number ends outside its message")
         byte = message[position]
         value |= (byte & 127) << shift
         position, shift = position + 1, shift + 7
@@ -234,10 +218,13 @@ def _varint(message: bytes, position: int) -> tuple[int, int]:
             return value, position
 
 
-def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
+def flattened(message: bytes, *, json_like: bool) -> dict[str, Any]:
     """A document as dotted paths; joints given one object each become lists by field."""
+    if len(message) > MAX_BYTES:
+        raise ValueError("longer than any message of joints")
+    document = json.loads(message) if json_like else joint_states(message)
     if not isinstance(document, dict):
-        raise DocumentError("not an object")
+        raise ValueError("not an object")  # noqa: TRY004 - damage, as what json finds
     flat: dict[str, Any] = {}
     _flatten(document, "", flat, 0)
     return flat
@@ -246,7 +233,7 @@ def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
 def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
     """Put the values below a path into the flat document."""
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
-        raise DocumentError("nested or long beyond any message of joints")
+        raise ValueError("nested or long beyond any message of joints")
     if isinstance(value, dict):
         for key, inner in value.items():
             _flatten(inner, f"{path}.{key}" if path else str(key), flat, depth + 1)
@@ -256,7 +243,7 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
             if len(found) == len(value):
                 flat[key] = found
     elif isinstance(value, list) and len(value) > MAX_VALUES:
-        raise DocumentError("nested or long beyond any message of joints")
+        raise ValueError("nested or long beyond any message of joints")
     elif isinstance(value, list | int | float | str | bool):
         flat[path] = value
 

@@ -39,20 +39,7 @@ def bag_blocks(
     request: ReadChoice,
     count: Callable[[int], None],
 ) -> Iterator[RawLog]:
-    """The log of a bag, block by block."""
-    try:
-        yield from _blocks(batches, ingest, request, count)
-    except LogError:
-        raise InOnePieceError from None  # what is wrong is told by the whole
-
-
-def _blocks(
-    batches: Iterable[Batch],
-    ingest: Ingest,
-    request: ReadChoice,
-    count: Callable[[int], None],
-) -> Iterator[RawLog]:
-    """The blocks of a bag with nothing wrong."""
+    """The log of a bag, block by block; one with something wrong is read whole, and said."""
     decoder, documents, waiting = Decoder(ingest), Documents(ingest), Waiting(ingest.path, request)
     messages, row = 0, 1
     wanted = request.wants("wrench")  # else topics that hold nothing but one are left out
@@ -63,18 +50,21 @@ def _blocks(
             raise InOnePieceError
         return replace(raw, first_row=row, remarks=(*ingest.remarks, *raw.remarks))
 
-    for batch in batches:
-        messages += len(batch.offsets)
-        if documents.take(batch):
-            raise InOnePieceError
-        decoder.take(batch)
-        found = [s for s in decoder.taken() if wanted or s.channel.type != WRENCH]
-        if (streams := waiting.add(found, decoder.others)) is not None:
-            raw = block(streams)
-            yield raw
-            row += len(raw.stamps)
-    count(messages)
-    yield block(list(waiting.streams.values()))
+    try:
+        for batch in batches:
+            messages += len(batch.offsets)
+            if documents.take(batch):
+                raise InOnePieceError
+            decoder.take(batch)
+            found = [s for s in decoder.taken() if wanted or s.channel.type != WRENCH]
+            if (streams := waiting.add(found, decoder.others)) is not None:
+                raw = block(streams)
+                yield raw
+                row += len(raw.stamps)
+        count(messages)
+        yield block(list(waiting.streams.values()))
+    except LogError:
+        raise InOnePieceError from None  # what is wrong is told by the whole
 
 
 Key = tuple[object, ...]  #: What tells streams apart.
