@@ -98,7 +98,7 @@ class Hdf5Table:
         self._datasets = dict(datasets)
 
     @property
-    def names(self) -> tuple[str, ...] | None:
+    def names(self) -> tuple[str, ...]:
         """The datasets' paths."""
         return tuple(self._datasets)
 

@@ -53,7 +53,7 @@ class Layout(NamedTuple):
 
 def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
-    names = table.names or ()
+    names = table.names
     if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
         return read_any(table, request)
     if stated := request.spec.item("q") is not None:
@@ -83,7 +83,7 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     refuse_arm(table.path, request)
     if request.spec.item("q"):
         return from_table(table, request)
-    names = table.names or ()
+    names = table.names
     remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
     usual = recorded(DROID_USUAL, names)
@@ -109,12 +109,12 @@ def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     refuse_arm(table.path, request)
     if request.spec.item("q"):
         return from_table(table, request)
-    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names or ())]) > 1:
+    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names)]) > 1:
         raise UnknownFormatError(
             f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
             "--columns, as in t=…,q=PATH/OF/POSITIONS."
         )
-    names = table.names or ()
+    names = table.names
     for path, project in TORQUELESS.items():
         if any(f"/{name}".endswith(f"/{path}") for name in names):
             raise LogError(
@@ -153,7 +153,7 @@ ANY = Layout("HDF5", "", read_any)
 
 def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
     """How a file is laid out, and the groups of its episodes; as any other where two ways fit."""
-    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names or ()))]
+    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names))]
     return found[0] if len(found) == 1 else (ANY, ("",))
 
 
@@ -193,6 +193,6 @@ def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
         table = table_of(file.path, content)
         layout, groups = layout_of(table)
         anchor = (stated.pattern if stated is not None else None) or layout.anchor
-        anchor = anchor or level_of(file.path, table.names or (), "/")
+        anchor = anchor or level_of(file.path, table.names, "/")
     below = anchor[: anchor.rfind("/") + 1]
     return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))

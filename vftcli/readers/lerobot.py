@@ -120,12 +120,12 @@ def columns_of(
     Returns:
         The --columns text, the joints' names or none, the arm of two or "", what is to be said.
     """
-    there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
+    there = [e for name in table.names for e in elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     side = ""
     taken = request.spec.item("wrench")
     # Nothing tells a sensor's wrench from an estimate.
-    observed = [name for name in table.names or () if name.startswith("observation.")]
+    observed = [name for name in table.names if name.startswith("observation.")]
     left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
     remarks: tuple[Remark, ...] = ()
     if left and not taken:
@@ -139,7 +139,7 @@ def columns_of(
     by_signal = {s: [e for e in there if e.signal == s] for s in MEASURED}
     if not by_signal["q"]:
         raise LogError(
-            f"{path}: no joint positions among {listed(list(table.names or ()))}. Name the columns "
+            f"{path}: no joint positions among {listed(list(table.names))}. Name the columns "
             "with --columns, as in 'q[rad]=observation.state[0:7]'."
         )
     names = tuple(element.joint for element in by_signal["q"])
@@ -173,7 +173,7 @@ def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
-    column = (table.names or ()).index(name)
+    column = table.names.index(name)
     width = table.lists.get(column)
     last = [part for part in name.lower().split(".") if part not in {"observation", *ARMS}]
     of_feature = next(
@@ -198,9 +198,9 @@ def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element
 def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
-    if not good or FRAME not in (table.names or ()) or raw.clock != "column timestamp":
+    if not good or FRAME not in table.names or raw.clock != "column timestamp":
         return raw
-    column = (table.names or ()).index(FRAME)
+    column = table.names.index(FRAME)
     frames = table.load([column], column)[column]
     exact = frames.ndim == 1 and np.all(np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK)
     if frames.dtype.kind != "i" or not exact:
@@ -259,7 +259,7 @@ def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...])
 def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     """The episodes of a table of version 3."""
     table = ParquetTable(open_log(path))
-    names = list(table.names or ())
+    names = list(table.names)
     if missing := [name for name in EPISODES_TABLE if name not in names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
     loaded = table.load([names.index(name) for name in EPISODES_TABLE], None)
@@ -307,7 +307,7 @@ def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     if not numbers.size:
         return table
     rows = np.flatnonzero(numbers == episode.number)
-    names = list(table.names or ())
+    names = list(table.names)
     differs = episode.length is not None and len(rows) != episode.length
     if "index" in names and episode.start is not None and not differs:
         index = names.index("index")

@@ -71,9 +71,9 @@ def variables_of_v73(file: LogFile) -> dict[str, Column]:
     """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
-        kept = [k for k, name in enumerate(table.names or ()) if not name.startswith("#")]
+        kept = [k for k, name in enumerate(table.names) if not name.startswith("#")]
         table.check_size(kept)
-        names = [(table.names or ())[k].replace("/", ".") for k in kept]
+        names = [table.names[k].replace("/", ".") for k in kept]
         # MATLAB writes column by column, which HDF5 reads as rows.
         return {
             name: table.load([k], k if name.rpartition(".")[2].lower() in CLOCKS else None)[k].T

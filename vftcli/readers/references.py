@@ -77,7 +77,7 @@ def as_given(table: Table, picks: Picks) -> Picks:
 
 def found(table: Table) -> Picks:
     """Find the clock, the torques and the wrench by their names."""
-    if table.names is None:
+    if not table.names:
         raise LogError(
             f"{table.path}: a table without a header. Say what its {table.width} columns are with "
             "--reference-columns, as in t,tau_ext:6."

@@ -36,7 +36,7 @@ class EchoTable(TextTable):
         return count if count and values >= count and values % count == 0 else 0
 
     @cached_property
-    def names(self) -> tuple[str, ...] | None:
+    def names(self) -> tuple[str, ...]:
         """The columns' names, as rostopic would print them."""
         fields = ("name", "position", "velocity", "effort")
         count, width = self.joints, self.width
@@ -52,7 +52,7 @@ class EchoTable(TextTable):
 
 def joint_names(table: TextTable) -> tuple[str, ...]:
     """The joints' names that the rows hold, in the order of the columns."""
-    names = table.names or ()
+    names = table.names
     columns = [k for k, name in enumerate(names) if name.removeprefix("field.")[:4] == "name"]
     found = [table.words(column) for column in columns]
     for words in found:

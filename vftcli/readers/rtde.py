@@ -35,7 +35,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     """Read a table of RTDE names."""
     table = BinaryTable(file) if layout.name == "ur-binary" else TextTable(file)
     raw = read_layout(table, FORMATS["ur-csv"], request, PAYLOAD)
-    raw = replace(raw, wrench_frame=force_frame(table.names or (), raw.stamps * raw.tick))
+    raw = replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
     return raw.told_payload(raw.constants)
 
 
@@ -64,7 +64,7 @@ class BinaryTable:
         self.path = file.path
         self.lists: dict[int, int] = {}
         names, types, start = binary_header(file)
-        self.names: tuple[str, ...] | None = names
+        self.names = names
         self.width = len(names)
         fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
         self._record = np.dtype(fields)

@@ -42,14 +42,14 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     spec = request.spec
     more["segment"] = spec.segment
     stated = (item := spec.item("q")) is not None and item.unit is not None
-    if spec.items and (table.names is None or not spec.named):
+    if spec.items and (not table.names or not spec.named):
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
-    if table.names is None and table.width == 1:
+    if not table.names and table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
             "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
         )
-    if table.names is None:
+    if not table.names:
         return read_by_values(table, request, **more)
     picks, joints = picks_by_alias(table, spec.items)
     return picked(
@@ -85,7 +85,7 @@ def read_layout(
     spec = parse_columns(layout.columns)
     if spec.named:
         spec = replace(spec, items=tuple(known_items(table, layout, spec)))
-    picks, names = picks_of(table, spec), table.names or ()
+    picks, names = picks_of(table, spec), table.names
     # Of the vendors' signals libfranka's residual alone is turned.
     signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
     places = tuple(names.index(name) for name in constants if name in names)
@@ -95,7 +95,7 @@ def read_layout(
 
 def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
     """The items of a layout of which a table has all columns, a joint each."""
-    names = table.names or ()
+    names = table.names
     for item in spec.items:
         cells: tuple[Cell, ...] = ()
         with suppress(LogError):
@@ -175,9 +175,9 @@ class ArrayTable:
         self.lists = {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
     @property
-    def names(self) -> tuple[str, ...] | None:
-        """The columns' names, or None if the file has none."""
-        return tuple(self.columns) if self.headed else None
+    def names(self) -> tuple[str, ...]:
+        """The columns' names, none if the file has none."""
+        return tuple(self.columns) if self.headed else ()
 
     @property
     def width(self) -> int:
@@ -253,8 +253,8 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
     if not file.lines:
         return False
     table = TextTable(file)
-    if layout.name == "headerless" or table.names is None:
-        return layout.name == "headerless" and table.names is None
+    if layout.name == "headerless" or not table.names:
+        return layout.name == "headerless" and not table.names
     if len(table.sample) < 2:
         return table.width > 1
     cells = table.cells(table.sample[1])
