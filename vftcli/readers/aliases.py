@@ -101,8 +101,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *(pick.signal for pick in told.values())}
     signals = [p for p in signals if len(p.cells) == (joints or len(p.cells)) or p.signal in also]
-    names_there = table.names
-    origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
+    origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
     picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
     q = next(pick.cells for pick in signals if pick.signal == "q")
