@@ -159,9 +159,9 @@ def short_scenario(folder: Path) -> str:
 
 
 def edited_header(folder: Path) -> list[Any]:
-    """A conversion of a log of an old libfranka with one name changed."""
-    path = libfranka_csv(folder / "log.csv", old=True)
-    path.write_text(path.read_text("utf-8").replace("dq[0]", "speed[0]", 1), encoding="utf-8")
+    """A conversion of a log of libfranka with one name changed."""
+    path = libfranka_csv(folder / "log.csv")
+    path.write_text(path.read_text("utf-8").replace("state.q[3]", "state.x[3]"), encoding="utf-8")
     return ["convert", path, "-o", "out.csv"]
 
 

@@ -53,6 +53,7 @@ from seed_logs import ur_binary
 from test_remedies import Command, free_log, printed
 
 import vftcli
+from vftcli.readers import FORMATS
 
 PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("cli", "readers", "robots", "signals", "batch", "doctor")
@@ -132,9 +133,12 @@ ROWS = [
         "kfo-zoh"], "--observer", "kfo-fe"),
     Row("could each be the positions", arrays({"a/q": (99, 6), "b/q": (99, 6), "a/t": (99,)}),
         "--columns", "t=a/t,q=a/q"),
-    Row("laid out as", arrays({"obs/robot0_joint_pos": (99, 7), "qp_arm": (99, 7), "time": (99,),
-                               "qv_arm": (99, 7)}), "--columns", "t=time,q=qp_arm,dq=qv_arm"),
-    Row("no timestamp among", without_clock, "--format --columns"),
+    Row("Say what is what with", arrays({"observations/qpos": (99, 7), "time": (99,),
+        "observation/robot_state/joint_positions": (99, 7)}), "--columns",
+        "t=time,q=observations/qpos"),
+    Row("which hold no torque", arrays({"obs/robot0_joint_pos": (99, 7), "obs/tau": (99, 7)}),
+        "--columns", "t@20Hz,q=obs/robot0_joint_pos,tau=obs/tau"),
+    Row("Add timestamp and actual_q", without_clock, "--columns"),
     Row("must count its", converted(same, "--columns", PLAIN, header=False), "--columns", COUNTED),
     Row("--columns describes", converted(same, "--columns", "t,q:6,dq:6", header=False),
         "--columns", "t,q:6,dq:6,_:6"),
@@ -155,7 +159,8 @@ ROWS = [
         "--reference-columns", "t,tau_ext:6"),
     Row("the reference torques cannot be told", judged(PULL), "--reference-columns",
         "t=t,tau_ext=pull{i}"),
-    Row("The header was edited", edited_header, "--format --columns", "q=q[{i}],t[ms]=duration"),
+    Row("The header was edited", edited_header, "--format --columns",
+        "t[ms]=time,q=" + "|".join(f"state.{'x' if j == 3 else 'q'}[{j}]" for j in range(7))),
     Row("--columns does not apply to", lambda f: [
         "convert", ur_binary(f / "log.bin"), "-o", "out.csv", "--columns", PLAIN], "--columns",
         LEFT_OUT),
@@ -318,6 +323,7 @@ WITHOUT_ROW = {
         "is given twice. Skip the other", "--columns: no q; a log needs",
         "must be one whole number, from 1", "--columns: cannot understand", "--columns: no signal",
         ": _ only skips", "it must cover at least one", "a table without a clock is given as",
+        "only _:* covers", "give it once",
         "--columns: … has no unit", "has no field", "is neither a number, as in 0, nor all",
         "--columns turns the sign of the clock", "names a column of … twice",
         "is no address, as tcp", "--tip …: ", "--reference-columns names no tau_ext",
@@ -349,7 +355,7 @@ WITHOUT_ROW = {
 @cache
 def texts() -> dict[str, str]:
     """Every text of a raise that names an option or a command; a value in it is `…`."""
-    found = {}
+    found = {f"formats: {name}": form.remedy for name, form in FORMATS.items() if form.remedy}
     for room in ROOMS:
         for path in sorted((PACKAGE / room).rglob("*.py")):
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):

@@ -43,8 +43,8 @@ if TYPE_CHECKING:
     from vftcli.observers.choice import ObserverChoice
     from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
     from vftcli.readers import read
-    from vftcli.readers.assembly import assemble
     from vftcli.readers.reader import ReadChoice
+    from vftcli.readers.reading import assemble
     from vftcli.refinement.choice import RefinementChoice
     from vftcli.repetition.choice import FreeChoice
     from vftcli.repetition.two_cycle import two_cycle_difference
@@ -83,7 +83,7 @@ HOMES = {
     "ZeroChoice": "virtual_sensor.choice",
     "analyse": "pipeline",
     "analyse_log": "pipeline",
-    "assemble": "readers.assembly",
+    "assemble": "readers.reading",
     "contacts": "contacts",
     "dynamics_terms": "robots.terms",
     "evaluate": "evaluation",

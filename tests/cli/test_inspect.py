@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
-from vftcli.readers import READERS
+from vftcli.readers import FORMATS
 from vftcli.signals.errors import VftError
 
 KEYS = {"format", "joints", "samples", "duration_s", "rate_hz", "max_gap_s", "duplicates",
@@ -79,8 +79,8 @@ def test_inspect_of_what_is_no_log(tmp_path: Path) -> None:
 def test_formats_lists_every_reader() -> None:
     code, out = run("formats")
     assert code == 0
-    assert all(name in out for name in READERS)
-    assert [row["name"] for row in json.loads(run("formats", "--json")[1])] == list(READERS)
+    assert all(name in out for name in FORMATS)
+    assert [row["name"] for row in json.loads(run("formats", "--json")[1])] == list(FORMATS)
     assert "record:" in run("formats", "mcap")[1]
     assert "no format 'nonsense'" in run("formats", "nonsense")[1]
 

@@ -66,9 +66,8 @@ def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> No
 @pytest.mark.parametrize(
     "words",
     [
-        ("inspect", "log.parquet"),
-        ("compare", "log.parquet", "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
-        ("contacts", "report/estimates.parquet"),
+        ("inspect", FIXTURE),
+        ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
         ("tune", FIXTURE, "--robot", "ur5", "-o", "gains.toml"),
         ("identify", FIXTURE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
         ("bench", "--rounds", "1", "--samples", "1200"),
@@ -105,10 +104,12 @@ def test_the_others_say_what_is_missing(words: tuple[str, ...], line: str) -> No
     assert not Path("x.csv").exists()
 
 
-def test_an_arrow_file_is_named_with_the_remedy(tmp_path: Path) -> None:
-    (tmp_path / "log.feather").write_bytes(b"ARROW1\0\0" + bytes(64))
-    done = launched("inspect", tmp_path / "log.feather")
+@pytest.mark.parametrize("start", [b"ARROW1\0\0", b"PAR1"])
+def test_a_parquet_or_arrow_file_is_named_with_the_remedy(start: bytes, tmp_path: Path) -> None:
+    (tmp_path / "log").write_bytes(start + bytes(64))
+    done = launched("inspect", tmp_path / "log")
     assert done.returncode == 1
     assert done.stderr.endswith(
-        ": an Arrow file needs pyarrow, which is not installed here: pip install pyarrow\n"
+        ": a Parquet or Arrow file needs pyarrow, which is not installed here: "
+        "pip install pyarrow\n"
     )

@@ -26,7 +26,7 @@ FAMILIES = {
     "ur-binary": "records", "npy": "npy", "npz": "npz", "pickle": "pickle", "parquet": "parquet",
     "arrow": "arrow", "arrow-stream": "arrow", "json": "json", "json-skills": "json",
     "json-lines": "lines", "mat": "mat", "mat-struct": "mat", "hdf5": "hdf5", "aloha": "hdf5",
-    "robomimic": "hdf5", "mat-73": "hdf5", "rosbag1": "bag",
+    "mat-73": "hdf5", "rosbag1": "bag",
     "rosbag1-lz4": "bag", "db3": "folder", "mcap": "mcap", "mcap-json": "mcap",
 }  # fmt: skip
 """Seed of the reader tests → the mutator that knows its structure."""

@@ -123,24 +123,11 @@ def aloha(path: Path) -> Path:
     return hdf5(path, layout, **{"/": {"sim": False}})
 
 
-def robomimic(path: Path, demos: tuple[int, ...] = (0, 2, 10)) -> Path:
-    """robomimic's episodes, each with its own positions."""
-    log = motion(7)
-    layout = {}
-    for demo in demos:
-        layout[f"data/demo_{demo}/obs/robot0_joint_pos"] = log["q"] + 0.01 * demo
-        layout[f"data/demo_{demo}/obs/robot0_joint_vel"] = log["dq"]
-        layout[f"data/demo_{demo}/actions"] = np.zeros((len(log["t"]), 7))
-    told = {"env_kwargs": {"control_freq": 20, "robots": ["Panda"]}}
-    return hdf5(path, layout, data={"env_args": json.dumps(told)})
-
-
-def roboset(path: Path, trials: int = 2) -> Path:
-    """RoboHive's trials."""
-    log = motion(7)
-    parts = {"time": log["t"], "qp_arm": log["q"], "qv_arm": log["dq"]}
-    layout = {f"Trial{k}/data/{name}": a for k in range(trials) for name, a in parts.items()}
-    return hdf5(path, layout)
+def aloha_set(path: Path, episodes: tuple[int, ...] = (0, 2, 10)) -> Path:
+    """Episodes in one file as ALOHA lays out one, each with its own positions."""
+    q = motion()["q"]
+    arms = {k: np.hstack([q, np.zeros((len(q), 8))]) + 0.01 * k for k in episodes}
+    return hdf5(path, {f"data/demo_{k}/observations/qpos": arm for k, arm in arms.items()})
 
 
 def droid(folder: Path, rows: int = 60, serial: str = "panda-295341") -> Path:
@@ -172,9 +159,8 @@ SEEDS: dict[str, tuple[Callable[[Path], Path], str | None]] = {
     "mat-73": (matlab_73, None),
     "hdf5": (lambda path: hdf5(path, {n: motion()[n] for n in ("t", "q", "dq", "current")}), None),
     "aloha": (aloha, None),
-    "robomimic": (robomimic, None),
 }
 """Name → how a log of that kind is made, and its --columns."""
 
-NEED_H5PY = {"mat-73", "hdf5", "aloha", "robomimic"}
+NEED_H5PY = {"mat-73", "hdf5", "aloha"}
 """Those that h5py writes and reads."""

@@ -139,11 +139,23 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
         ("t,q:6;dq:6", "cannot understand"),
         ("t@0Hz,q:6", "t@125Hz"),
         ("segment=x,q:6", "whole number"),
+        ("t,q:*", "only _:"),
+        ("t,_:*,q:6,_:*", "give it once"),
     ],
 )
 def test_what_cannot_be_understood_is_said(text: str, told: str) -> None:
     with pytest.raises(LogError, match=told):
         parse_columns(text)
+
+
+@pytest.mark.parametrize("skipped", ["t,q:6,dq:6,_:6", "t,q:6,dq:6,_:*", "t,q:6,_:*,current:6"])
+def test_columns_that_are_skipped(tmp_path: Path, skipped: str) -> None:
+    recording, log = read(headerless_csv(tmp_path / "x"), columns=skipped), motion()
+    for name in ("q", "dq", "current"):
+        values = getattr(recording, name)
+        assert (values is None) == (name not in skipped)
+        if values is not None:
+            np.testing.assert_allclose(values, log[name], atol=5e-7)  # six decimals are written
 
 
 @pytest.mark.parametrize(

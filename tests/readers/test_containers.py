@@ -23,7 +23,7 @@ from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 FORMATS = {
     "arrow": "arrow", "arrow-stream": "arrow", "json": "json", "json-skills": "json",
     "json-lines": "json", "mat": "mat", "mat-struct": "mat", "mat-73": "mat", "hdf5": "hdf5",
-    "aloha": "hdf5", "robomimic": "hdf5",
+    "aloha": "hdf5",
 }  # fmt: skip
 
 
@@ -215,25 +215,32 @@ class TestHdf5:
         turned = read(path, columns="-current", arm="left")
         np.testing.assert_allclose(turned.current, -motion()["current"], rtol=1e-15)
 
-    def test_robomimic_is_read_by_episode(self, tmp_path: Path) -> None:
-        path = seeds.robomimic(tmp_path / "x")
+    def test_a_file_of_several_is_read_by_episode(self, tmp_path: Path) -> None:
+        path = seeds.aloha_set(tmp_path / "x")
         assert list(episode_numbers(path, ReadChoice())) == [0, 2, 10]
-        first, last = read(path), read(path, episode=10)
-        assert (first.source.label, last.source.label) == ("x episode 0", "x episode 10")
-        assert first.robot_hint == "panda"
+        first, last = read(path, arm="left"), read(path, episode=10, arm="left")
+        labels = first.source.label, last.source.label
+        assert labels == ("x episode 0 left arm", "x episode 10 left arm")
         np.testing.assert_allclose(last.q - first.q, 0.1, atol=1e-15)
-        assert (first.t[1], first.torque) == (0.05, None)
         assert [r.code for r in first.source.remarks] == ["episode-taken", "episode-place"]
         assert str(first.source.remarks[0]) == "episode 0 of 3: --episode K|all"
 
     def test_an_episode_beyond_the_last_is_refused_with_their_number(self, tmp_path: Path) -> None:
         with pytest.raises(LogError, match="no episode 3; it holds 3 episodes, 0 to 10"):
-            read(seeds.robomimic(tmp_path / "x"), episode=3)
+            read(seeds.aloha_set(tmp_path / "x"), episode=3)
 
-    def test_roboset_has_a_clock(self, tmp_path: Path) -> None:
-        recording = read(seeds.roboset(tmp_path / "x"), episode=1)
-        np.testing.assert_array_equal(recording.t, motion()["t"])
-        np.testing.assert_array_equal(recording.dq, motion(7)["dq"])
+    @pytest.mark.parametrize(
+        ("project", "place"),
+        [("robomimic", "data/demo_0/obs/robot0_joint_pos"), ("roboset", "Trial0/data/qp_arm")],
+    )
+    def test_projects_that_record_no_torque_are_refused_by_name(
+        self, project: str, place: str, tmp_path: Path
+    ) -> None:
+        path = seeds.hdf5(tmp_path / "x", {place: motion(7)["q"]})
+        with pytest.raises(LogError, match=f"laid out as {project}'s, which hold no torque"):
+            read(path)
+        named = read(path, columns=f"t@20Hz,q={place}")
+        np.testing.assert_array_equal(named.q, motion(7)["q"])
 
     def test_droid_takes_the_robots_clock_and_the_measured_torque(self, tmp_path: Path) -> None:
         path = seeds.droid(tmp_path / "a")
@@ -267,9 +274,9 @@ class TestHdf5:
 
     def test_two_layouts_in_one_file_are_refused(self, tmp_path: Path) -> None:
         q = motion(7)["q"]
-        path = seeds.hdf5(tmp_path / "x", {"qp_arm": q, "qv_arm": q, "time": motion()["t"],
-                                           "data/demo_0/obs/robot0_joint_pos": q})  # fmt: skip
-        with pytest.raises(UnknownFormatError, match="as robomimic and as roboset"):
+        places = "observations/qpos", "observation/robot_state/joint_positions"
+        path = seeds.hdf5(tmp_path / "x", dict.fromkeys(places, q))
+        with pytest.raises(UnknownFormatError, match="as ALOHA and as DROID"):
             read(path)
 
     def test_an_unknown_file_tells_its_datasets(self, tmp_path: Path) -> None:

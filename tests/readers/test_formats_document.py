@@ -1,10 +1,10 @@
-"""docs/formats.md says of every format what READERS says, and of every signal its aliases."""
+"""docs/formats.md says of every format what FORMATS says, and of every signal its aliases."""
 
 from pathlib import Path
 
 import pytest
 
-from vftcli.readers import READERS
+from vftcli.readers import FORMATS
 from vftcli.readers.aliases import ALIASES, CLOCKS
 from vftcli.readers.columns import SIGNALS
 
@@ -16,11 +16,10 @@ def rows() -> dict[str, str]:
     return {line.split("`")[1]: line for line in lines}
 
 
-@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("name", FORMATS)
 def test_every_format_has_its_row(name: str) -> None:
-    reader = READERS[name]
     cells = [cell.strip() for cell in rows()[name].strip("|").split(" | ")]
-    texts = [reader.words[key] for key in ("title", "recording", "takes", "pitfalls")]
+    texts = [getattr(FORMATS[name], key) for key in ("title", "recording", "takes", "pitfalls")]
     assert cells[1:] == [text.replace("|", "\\|") for text in texts]
 
 

@@ -66,7 +66,7 @@ def test_a_chunk_that_claims_too_much_is_refused(tmp_path: Path) -> None:
     place = content.index(b"size=") + 5
     content[place : place + 4] = struct.pack("<I", 2**32 - 1)
     path.write_bytes(content)
-    with pytest.raises(LogError, match="claim to unpack to more than"):
+    with pytest.raises(LogError, match="unpacks to more than 128 MiB"):
         read(path)
 
 
@@ -126,7 +126,7 @@ BOMBS: dict[str, tuple[Callable[[Path], Path], str]] = {
     "laughs": (pickled_laughs, "more numbers than a file of its size"),
     "texts": (pickled_texts, "more numbers than a file of its size"),
     "itself": (pickled_itself, "a list that holds itself"),
-    "zeros": (parquet_of_zeros, "unpack to more than 128 MiB"),
+    "zeros": (parquet_of_zeros, "unpacks to more than 128 MiB"),
 }
 """Name → a file that once filled the memory or never ended, and what is said of it."""
 

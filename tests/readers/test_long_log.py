@@ -23,7 +23,7 @@ def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
         ("picking.WHOLE_ROWS", 0),
         ("parquet.BLOCK_ROWS", 7),
         ("delimited.BLOCK_BYTES", 3000),
-        ("bags.blocks.BLOCK_MESSAGES", 50),
+        ("bags.reading.BLOCK_MESSAGES", 50),
     ):
         module, _, constant = name.rpartition(".")
         monkeypatch.setattr(importlib.import_module(f"vftcli.readers.{module}"), constant, value)

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.readers.parts import arm_of, episode_of, refuse_arm
-from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reader import ReadChoice, arm_of, episode_of, refuse_arm
 from vftcli.signals.errors import LogError, ParameterError
 
 PATH = Path("log")

@@ -1,12 +1,14 @@
 """Text tables: aliases, line ends, cut rows, garbage, clocks, and what is refused."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 from seed_logs import ROWS, motion, table_csv, ur_csv
 
-from vftcli.readers import READERS, read, recognise
+from vftcli.readers import FORMATS, read, recognise
 from vftcli.signals.errors import ClockError, LogError, UnknownFormatError
 
 
@@ -291,11 +293,23 @@ def test_the_source_tells_the_digest(tmp_path: Path) -> None:
     assert read(path).source.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def test_every_reader_is_described() -> None:
-    for name, reader in READERS.items():
-        assert reader.name == name
-        assert set(reader.words) == {"title", "recording", "takes", "pitfalls"}
-        assert all(len(text) > 5 for text in reader.words.values())
+def test_every_format_is_described() -> None:
+    for name, form in FORMATS.items():
+        assert form.name == name
+        assert all(len(t) > 5 for t in (form.title, form.recording, form.takes, form.pitfalls))
+
+
+def test_a_text_loads_no_reader_of_another_container(tmp_path: Path) -> None:
+    script = (
+        "import sys; from vftcli.readers import read; read(sys.argv[1]); "
+        "heavy = 'h5py', 'mcap', 'pyarrow', 'rosbags', 'scipy'; "
+        "ours = (f'vftcli.readers.{name}' for name in "
+        "('arrow', 'bags', 'hdf5', 'lerobot', 'matlab', 'parquet', 'pickles')); "
+        "sys.exit(str({*heavy, *ours} & set(sys.modules)))"
+    )
+    words = [sys.executable, "-c", script, str(table_csv(tmp_path / "x"))]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.stderr.strip() == "set()"
 
 
 def test_recognition_asks_the_content_not_the_name(tmp_path: Path) -> None:

@@ -14,11 +14,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from vftcli.analysis import Analysis
-    from vftcli.outputs.log.choice import OutputChoice
     from vftcli.pipeline import AnalysisChoice
-    from vftcli.readers.library import Library
-    from vftcli.readers.reader import ReadChoice
-    from vftcli.signals.background import Background
     from vftcli.signals.recording import Recording
 
 
@@ -45,31 +41,33 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
     """
+    from vftcli.batch.kinds import for_estimates
+    from vftcli.cli.console import command_line, say_left_out
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.log.estimates import estimate_files
+    from vftcli.readers.estimates import refuse_estimates
+    from vftcli.readers.library import Library
+    from vftcli.readers.table import JacobianError
+    from vftcli.signals.names import EXAMINED
     from vftcli.signals.packages import check_installed
 
     written = also.choice(csv=csv, rrd=rrd or show)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
-    # From here on the log is being read: what follows loads all that will use it.
-    library, chosen, reading = begin_reading(log, analysis, written)
-
-    from vftcli.batch.kinds import for_estimates
-    from vftcli.cli.console import command_line, say_left_out
-    from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files
-    from vftcli.readers.table import JacobianError
-    from vftcli.robots import PROFILES, load_robot
-    from vftcli.signals.background import load
-
+    # Of a large log only the columns that are looked at are read; outputs show the others too.
+    causal = analysis.observers.causal or analysis.contacts.no_contacts
+    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
+    if analysis.reading.columns is None:
+        refuse_estimates(log)
+    library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    # What needs no complete log comes in blocks, so that memory does not grow with it.
+    in_blocks = causal and set(written.extras) <= {"csv"} and not chosen.interval
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
-    if choice.robot.name in PROFILES:
-        load_robot(choice.robot.name)  # it is kept
-    load("vftcli.outputs.short_screen", "numpy.ma", "numpy.fft", "pyarrow")
     try:
         made, record = write_estimates(
-            reading.result(),
-            lambda: library.open(log, replace(chosen, blocks=False)),
+            library.open(log, replace(chosen, blocks=in_blocks)),
+            lambda: library.open(log, chosen),
             choice,
             output,
             {"command": command_line(), "choice": written, "force": force},
@@ -88,35 +86,6 @@ def estimate(
         from vftcli.cli.opening import open_made
 
         open_made(output)
-
-
-def begin_reading(
-    log: Path, analysis: opt.AnalysisOptions, written: "OutputChoice"
-) -> "tuple[Library, ReadChoice, Background[Recording]]":
-    """Begin to read a log beside everything else: where from, how, and the recording to come."""
-    from vftcli.readers.ahead import Ahead
-    from vftcli.readers.estimates import refuse_estimates
-    from vftcli.signals.background import Background
-    from vftcli.signals.names import EXAMINED
-
-    # Of a large log only the columns that are looked at are read; outputs show the others too.
-    causal = analysis.observers.causal or analysis.contacts.no_contacts
-    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
-    if analysis.reading.columns is None:
-        refuse_estimates(log)
-    recognised = analysis.reading.columns is None and analysis.reading.format is None
-    ahead = Ahead.of(log, signals) if recognised else None
-
-    # It is being parsed before NumPy is there.
-    from vftcli.readers.library import Library
-
-    library = Library([log])
-    chosen = replace(analysis.reading.choice(), signals=signals, ahead=ahead)
-    # What needs no complete log comes in blocks, so that memory does not grow with it.
-    chosen = replace(
-        chosen, blocks=causal and set(written.extras) <= {"csv"} and not chosen.interval
-    )
-    return library, chosen, Background(lambda: library.open(log, chosen))
 
 
 def write_estimates(

@@ -85,24 +85,25 @@ def list_formats(
     Example: vftcli formats
     """
     from vftcli.cli.console import say_json
-    from vftcli.readers import READERS
+    from vftcli.readers import FORMATS
     from vftcli.signals.errors import UnknownFormatError
     from vftcli.signals.parsing import did_you_mean
 
-    if name is not None and name not in READERS:
-        near = did_you_mean(name, READERS)
-        raise UnknownFormatError(f"no format {name!r}; there is {', '.join(READERS)}.{near}")
-    shown = [READERS[name]] if name else list(READERS.values())
+    if name is not None and name not in FORMATS:
+        near = did_you_mean(name, FORMATS)
+        raise UnknownFormatError(f"no format {name!r}; there is {', '.join(FORMATS)}.{near}")
+    shown = [FORMATS[name]] if name else list(FORMATS.values())
     if json:
-        say_json([{"name": r.name, **r.words, "columns": r.columns} for r in shown])
+        words = ("name", "title", "recording", "takes", "pitfalls")
+        say_json([{w: getattr(f, w) for w in words} | {"columns": f.takes_columns} for f in shown])
         return
-    for reader in shown:
+    for form in shown:
         if name is None:
-            typer.echo(f"{reader.name:<18} {reader.words['title']}")
+            typer.echo(f"{form.name:<18} {form.title}")
             continue
-        typer.echo(f"{reader.name}: {reader.words['title']}")
-        typer.echo(f"  record:   {reader.words['recording']}")
-        typer.echo(f"  taken:    {reader.words['takes']}")
-        typer.echo(f"  pitfalls: {reader.words['pitfalls']}")
+        typer.echo(f"{form.name}: {form.title}")
+        typer.echo(f"  record:   {form.recording}")
+        typer.echo(f"  taken:    {form.takes}")
+        typer.echo(f"  pitfalls: {form.pitfalls}")
     if name is None:
         typer.echo("\nvftcli formats NAME tells how to record one; gzip and zstd are taken off.")

@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.joints import effort_of, kinematic_order
-from vftcli.readers.rtde_names import JOINT_COLUMNS
 from vftcli.readers.table import (
     Cell,
     Pick,
@@ -102,8 +101,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *(pick.signal for pick in told.values())}
     signals = [p for p in signals if len(p.cells) == (joints or len(p.cells)) or p.signal in also]
-    names_there = table.names or ()
-    origin = names_there.index(OWN_STAMPS) if names_there.count(OWN_STAMPS) == 1 else None
+    origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
     picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
     q = next(pick.cells for pick in signals if pick.signal == "q")
@@ -141,7 +139,7 @@ def missing_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]
         fitting = [p for p in picks if p is not None and len(p.cells) == joints]
         fitting = [pick for pick in fitting if taken.isdisjoint(pick.cells)]
         if len(fitting) == 1:
-            columns = (table.names or ())[fitting[0].cells[0].column]
+            columns = table.names[fitting[0].cells[0].column]
             told = fact("signal-by-name", signal=fitting[0].signal, column=columns)
             found.append(replace(fitting[0], remark=told))
     return found
@@ -162,7 +160,7 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
         found = _clock(table) if signal == "t" else None
         found = _pick_of(table, signal, groups) if signal in ALIASES else found
         if signal == "wrench":
-            controllers = groups.get(JOINT_COLUMNS[signal].lower())
+            controllers = groups.get("actual_tcp_force")  # UR's
             own = None if controllers is None else vendor_pick(signal, signal, controllers.cells)
             found = _wrench(table) or own
         if found is None:
@@ -170,7 +168,7 @@ def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
         pick = pick_of(item, found.cells)
         return replace(pick, factor=pick.factor * found.factor)
     group = groups.get(item.pattern.lower())
-    if group is not None and item.pattern not in (table.names or ()):
+    if group is not None and item.pattern not in table.names:
         return pick_of(item, filled_cells(table, item.pattern, group))
     return pick_of(item, named_cells(table, item))
 
@@ -181,7 +179,7 @@ def grouped(table: Table) -> dict[str, Group]:
     twice: dict[str, str] = {}
     by_joint = joint_columns(table)
     in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
-    for column, name in enumerate(table.names or ()):
+    for column, name in enumerate(table.names):
         if column in in_joints:
             continue
         if column in table.lists:
@@ -215,7 +213,7 @@ def joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     Names are only taken apart so where two signals have the same joints, and are no axes.
     """
     found: dict[str, dict[str, Cell]] = {}
-    for column, name in enumerate(table.names or ()):
+    for column, name in enumerate(table.names):
         match = next((m for p in SIGNAL_OF_JOINT if (m := p.fullmatch(name))), None)
         if match is None or column in table.lists:
             continue
@@ -281,13 +279,13 @@ def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
 
 def _wrench(table: Table) -> Pick | None:
     """The six columns of a wrench, or its column of lists; None where one of them is missing."""
-    there = enumerate(table.names or ())
+    there = enumerate(table.names)
     names = ["" if column in table.lists else name.lower() for column, name in there]
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):
             return Pick(signal="wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
-    rows = [c for c, n in enumerate(table.names or ()) if n.lower() == "wrench"]
+    rows = [c for c, n in enumerate(table.names) if n.lower() == "wrench"]
     if len(rows) == 1 and table.lists.get(rows[0]) == 6:
         return Pick(signal="wrench", cells=tuple(Cell(rows[0], k) for k in range(6)))
     return None
@@ -298,8 +296,13 @@ def _clock(table: Table) -> Pick | None:
 
     A message's own stamp goes before the time at which a recorder took it.
     """
-    names = [name.lower() for name in table.names or ()]
-    pairs: list[tuple[int, ...]] = [*_second_pairs(names)]
+    names = [name.lower() for name in table.names]
+    pairs: list[tuple[int, ...]] = []  # whole seconds and nanoseconds, as ROS writes its stamps
+    for column, name in enumerate(names):
+        if match := NANOSECONDS.fullmatch(name):
+            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
+            there = [k for k, other in enumerate(names) if other in wanted]
+            pairs += [(there[0], column)] if len(there) == 1 else []
     in_pair = {column for pair in pairs for column in pair}
     bare = [re.sub(r"[_ ]?[\[(]?(?<=[_\[( ])(s|ms|us|ns)[\])]?$", "", name) for name in names]
     single: list[tuple[int, ...]] = [
@@ -312,22 +315,12 @@ def _clock(table: Table) -> Pick | None:
     own = [columns for columns in found if HEADER_STAMP.match(names[columns[0]])]
     found = own or found
     if len(found) > 1:
-        there = listed(["|".join((table.names or ())[c] for c in columns) for columns in found])
+        clocks = listed(["|".join(table.names[c] for c in columns) for columns in found])
         raise LogError(
-            f"{table.path}: {there} could each be the clock. Say which with --columns, as in "
-            f"t={'|'.join((table.names or ())[c] for c in found[0])},q=…"
+            f"{table.path}: {clocks} could each be the clock. Say which with --columns, as in "
+            f"t={'|'.join(table.names[c] for c in found[0])},q=…"
         )
     return Pick(signal="t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
-
-
-def _second_pairs(names: Sequence[str]) -> Iterator[tuple[int, int]]:
-    """The columns of whole seconds and of the nanoseconds within them, as ROS writes its stamps."""
-    for column, name in enumerate(names):
-        if match := NANOSECONDS.fullmatch(name):
-            wanted = {match["stem"] + word for word in ("sec", "secs", "second", "seconds", "s")}
-            there = [k for k, other in enumerate(names) if other in wanted]
-            if len(there) == 1:
-                yield there[0], column
 
 
 def table_clock(table: Table, column: int) -> Cell:
@@ -335,7 +328,7 @@ def table_clock(table: Table, column: int) -> Cell:
     length = table.lists.get(column, 1)
     if length != 1:
         raise LogError(
-            f"{table.path}: the clock {(table.names or ())[column]!r} holds {length} numbers a "
+            f"{table.path}: the clock {table.names[column]!r} holds {length} numbers a "
             "row, but a sample has one time. Name another column with --columns, as in t=…,q=…"
         )
     return Cell(column, 0 if column in table.lists else None)

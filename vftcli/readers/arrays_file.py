@@ -8,37 +8,28 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.columns import parse_columns
-from vftcli.readers.libfranka import read_array_fields
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.formats import FORMATS, LogFormat
+from vftcli.readers.opening import check_unpacked
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import Column
-from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array
+from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array, read_layout
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
-#: The fields of libfranka's state that are taken from panda-py's get_log().
-PANDA_PY = ("q", "dq", "tau_J", "tau_ext_hat_filtered", "O_F_ext_hat_K")
 
 
 def npz_arrays(file: LogFile) -> dict[str, Column]:
     """The arrays of an .npz file by name, unpacked within bounds."""
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
     arrays = {}
     try:
         with zipfile.ZipFile(BytesIO(file.content)) as bundle:
             total = sum(member.file_size for member in bundle.infolist())
-            if total > limit:
-                raise LogError(
-                    f"{file.path}: unpacks to {total >> 20} MiB, more than {limit >> 20} MiB. Save "
-                    "the arrays you need with np.savez."
-                )
+            check_unpacked(file.path, total, len(file.content))
             for member in bundle.infolist():
                 if member.filename.endswith(".npy"):
                     with bundle.open(member) as stream:
-                        content = stream.read(limit + 1)
+                        content = stream.read(total + 1)
                     member_head = LogFile(path=file.path, head=content)
                     check_npy_header(member_head, len(content))  # before it is believed
                     arrays[member.filename.removesuffix(".npy")] = numpy_array(file.path, content)
@@ -56,7 +47,7 @@ def read_arrays(
     """Read named arrays as panda-py's log, by --columns, or by alias."""
     shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
     table = ArrayTable(path=file.path, columns=shaped, remarks=remarks)
-    if request.columns is not None and parse_columns(request.columns).named:
+    if request.spec.named:
         return from_table(table, request)
     if request.columns is not None:
         raise LogError(
@@ -64,7 +55,7 @@ def read_arrays(
             "name them, as in t[ms]=time,q=q,tau=tau_J."
         )
     if {"q", "time"} <= set(shaped) and {"tau_J", "O_T_EE", "dq"} & set(shaped):
-        return read_array_fields(table, PANDA_PY, request)
+        return read_layout(table, FORMATS["npz"], request)
     return from_table(table, request)
 
 
@@ -102,8 +93,11 @@ def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) 
     if skills := skills_of(log):
         log = skills[numbers.index(number)]
         if "time_since_skill_started" in log:
-            raw = _read_frankapy(file, log, request)
-            return replace(raw, part=part, remarks=(*remarks, *raw.remarks))
+            arrays = arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
+            usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
+            items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
+            request = replace(request, columns=request.columns or ",".join(items))
+            log = {name: arrays[name] for name in usual if name in arrays}
     elif len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
         log = inner
     raw = read_arrays(file, arrays_of_lists(file, log), remarks, request)
@@ -123,24 +117,6 @@ def episodes_of_skills(log: Any) -> tuple[int, ...]:  # noqa: ANN401 - whatever 
     return tuple(range(len(skills_of(log)))) or (0,)
 
 
-def _read_frankapy(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    """Read frankapy's trajectory: times in seconds, positions, no torque."""
-    arrays = arrays_of_lists(file, log)
-    if "time_since_skill_started" in arrays:
-        arrays["time"] = arrays["time_since_skill_started"]
-    kept: dict[str, Column] = {
-        name: arrays[name] for name in ("time", "q", "dq", "tau_J") if name in arrays
-    }
-    columns = request.columns or ",".join(
-        f"{signal}={name}"
-        for signal, name in (("t[s]", "time"), ("q[rad]", "q"), ("dq", "dq"), ("tau", "tau_J"))
-        if name in kept
-    )
-    return read_arrays(file, kept, (), replace(request, columns=columns))
-
-
-NPZ = Reader(
-    name="npz",
-    recognises=lambda file: file.head.startswith(b"PK\x03\x04") and b".npy" in file.head[:4096],
-    read=lambda file, request: read_arrays(file, npz_arrays(file), (), request),
-)
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read an .npz file."""
+    return read_arrays(file, npz_arrays(file), (), request)

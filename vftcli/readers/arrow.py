@@ -4,41 +4,28 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from vftcli.readers.columnar import HeldColumns, episodes_of, read_columns
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.pyarrow_table import PyarrowTable
-from vftcli.readers.reader import LogFile, Reader
-from vftcli.signals.errors import LogError
-from vftcli.signals.packages import needed
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.opening import check_unpacked
+from vftcli.readers.parquet import ColumnarTable, episodes_of, read_columns
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 
-FILE_MAGIC, STREAM_MAGIC = b"ARROW1\0\0", b"\xff\xff\xff\xff"
-
-LONGEST_HEAD = 1 << 24  #: Bytes that the first message of a stream, its schema, may take.
+FILE_MAGIC = b"ARROW1\0\0"  #: How a file begins; a stream has no such mark.
 NUMBER = struct.Struct("<q")  #: A whole number in a message.
 #: Places of fields in Arrow's Message, RecordBatch and DictionaryBatch (format/Message.fbs).
 MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 0, 2, 3, 1
 
 
-class ArrowTable(PyarrowTable):
+class ArrowTable(ColumnarTable):
     """An Arrow file or stream; a file is a stream behind its magic, its index is not needed."""
 
-    def __init__(self, file: LogFile) -> None:
-        needed("pyarrow", f"{file.path}: an Arrow file", error=LogError)
-        super().__init__(file)
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
+        import pyarrow as pa
 
-    def _opened(self, file: LogFile) -> HeldColumns:
-        pa = needed("pyarrow", "an Arrow file")
         content = pa.py_buffer(file.content)
         self._content = content.slice(len(FILE_MAGIC) if file.head.startswith(FILE_MAGIC) else 0)
         batches = tuple(claims(self._content))
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self._size)
-        if sum(size for _, size in batches) > limit:
-            raise LogError(
-                f"{file.path}: unpacks to more than {limit >> 20} MiB, more than a log of this "
-                "size can hold. It is damaged or made to fill memory."
-            )
-        schema = pa.ipc.open_stream(self._content).schema
-        return self._held_of(schema, sum(rows for rows, _ in batches), schema.metadata)
+        check_unpacked(file.path, sum(size for _, size in batches), self._size)
+        return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         for batch in self._stream([column]):
@@ -54,7 +41,7 @@ class ArrowTable(PyarrowTable):
 
     def _stream(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
         """The batches, of some columns."""
-        pa = needed("pyarrow", "an Arrow file")
+        import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
         return pa.ipc.open_stream(self._content, options=options)
@@ -62,7 +49,7 @@ class ArrowTable(PyarrowTable):
 
 def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
     """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
-    pa = needed("pyarrow", "an Arrow file")
+    import pyarrow as pa
 
     reader = pa.ipc.MessageReader.open_stream(content)
     while True:
@@ -145,16 +132,11 @@ class Flat:
             yield self._at("<q", at), self._at("<q", at + 8)
 
 
-def is_arrow(head: bytes) -> bool:
-    """Whether a file starts as an Arrow file, or as a stream: a mark and its schema's length."""
-    if head.startswith(FILE_MAGIC):
-        return True
-    return head.startswith(STREAM_MAGIC) and 0 < int.from_bytes(head[4:8], "little") < LONGEST_HEAD
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read an Arrow file or stream."""
+    return read_columns(ArrowTable(file), request)
 
 
-ARROW = Reader(
-    name="arrow",
-    recognises=lambda file: is_arrow(file.head),
-    read=lambda file, request: read_columns(ArrowTable(file), request),
-    episodes=lambda file: episodes_of(ArrowTable(file).episodes()),
-)
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of its episodes."""
+    return episodes_of(ArrowTable(file).episodes())

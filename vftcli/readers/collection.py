@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import lerobot
-from vftcli.readers.bags.formats import ROS2
-from vftcli.readers.droid import DROID, TRAJECTORY
+from vftcli.readers.droid import TRAJECTORY
 from vftcli.readers.estimates import stored_observers
-from vftcli.readers.json_file import JSON
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.library import absolute
 from vftcli.readers.opening import files_of
-from vftcli.readers.reader import LogFile, ReadChoice, Reader, open_log
+from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.readers.reading import read_chosen, recognise
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 
@@ -70,17 +69,17 @@ class LogCollection:
         except (LogError, OSError):
             yield LogEntry(path, self._choice.episode, (path,))
 
-    def _episodes(self, path: Path, reader: Reader) -> Iterator[LogEntry]:
+    def _episodes(self, path: Path, reader: LogFormat) -> Iterator[LogEntry]:
         """An entry an episode; one alone where there is one, or one is chosen."""
         chosen, files = self._choice.episode, tuple(files_of(path))
-        if reader is lerobot.LEROBOT:
+        if reader.name == "lerobot":
             meta = tuple(files_of(path / "meta"))
             for episode in lerobot.episodes_told(path):
                 if chosen in {None, episode.number}:
                     own = lerobot.data_file(path, episode)
                     yield LogEntry(path, episode.number, (*meta, own))
             return
-        numbers = reader.episodes(open_log(path)) if reader.episodes is not None else ()
+        numbers = reader.numbers(open_log(path))
         if chosen is not None or len(numbers) < 2:
             yield LogEntry(path, chosen, files)
             return
@@ -98,8 +97,8 @@ class LogCollection:
             reader = recognise(folder, self._choice)
             # Recorders write metadata.yaml beside the pieces of one recording: without it what
             # reads as a bag is a folder of several.
-            several_bags = reader is ROS2 and not (folder / METADATA).is_file()
-            if reader is not DROID and not several_bags:
+            several_bags = reader.name == "rosbag2" and not (folder / METADATA).is_file()
+            if reader.name != "droid" and not several_bags:
                 yield from self._episodes(folder, reader)
                 return
         except LogError:
@@ -128,7 +127,7 @@ class LogCollection:
             return False
         except (LogError, OSError):
             return True
-        if reader is JSON and path.stat().st_size < DESCRIPTION:
+        if reader.name == "json" and path.stat().st_size < DESCRIPTION:
             try:
                 read_chosen(path, self._choice)
             except NoLogError:

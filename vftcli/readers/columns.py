@@ -46,7 +46,7 @@ KINDS = {
 
 ITEM = re.compile(
     r"(?P<minus>-)?(?P<name>tau\+g|[A-Za-z_]+)(?:\[(?P<unit>[^\]]*)\])?"
-    r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d{1,9})|=(?P<pattern>.+))?"
+    r"(?:@(?P<rate>[0-9.eE+]+)(?:Hz)?|:(?P<count>\d{1,9}|\*)|=(?P<pattern>.+))?"
 )
 
 
@@ -57,7 +57,7 @@ class Item:
     signal: str  #: A key of SIGNALS, `t`, or `_`.
     factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
     unit: str | None = None  #: The unit as written, or None.
-    count: int = 1  #: Columns in a row that it covers, in a headerless table.
+    count: int = 1  #: Columns in a row that it covers, in a headerless table; 0 for all others.
     #: The column names it means, in a headed table; None for those found without it.
     pattern: str | None = None
     rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
@@ -70,8 +70,8 @@ class ColumnSpec:
     `segment` is the number of the recording that is wanted of a file that holds several.
     """
 
-    items: tuple[Item, ...]
-    named: bool
+    items: tuple[Item, ...] = ()
+    named: bool = False
     segment: int | None = None
 
     def item(self, signal: str) -> Item | None:
@@ -80,7 +80,7 @@ class ColumnSpec:
 
     @property
     def width(self) -> int:
-        """Number of columns that a counting text describes."""
+        """Number of columns that a counting text describes, those of ``_:*`` left out."""
         return sum(item.count for item in self.items if item.rate is None)
 
 
@@ -105,6 +105,8 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     for name in names:
         if names.count(name) > 1:
             raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
+    if sum(item.count == 0 for item in items) > 1:
+        raise LogError("--columns: _:* covers all columns that are left; give it once.")
     if log and items and "q" not in names and not named:
         raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
     return ColumnSpec(items=items, named=named, segment=segment)
@@ -143,6 +145,10 @@ def _parse_item(part: str) -> Item:
         raise LogError(f"--columns: {part!r}: _ only skips, as in _:13.")
     factor = unit_factor(name, match["unit"]) * (-1.0 if match["minus"] else 1.0)
     rate = _rate(part, name, match["rate"])
+    if match["count"] == "*":
+        if name != "_":
+            raise LogError(f"--columns: {part!r}: only _:* covers all columns that are left.")
+        return Item(signal=name, count=0)
     count = int(match["count"] or (6 if name == "wrench" and match["pattern"] is None else 1))
     if count == 0 or count > 10_000 or (name == "t" and count != 1):
         raise LogError(f"--columns: {part!r} covers {count} columns; it must cover at least one.")

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.ahead import TextParse
 from vftcli.readers.reader import InOnePieceError, LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
@@ -111,12 +110,12 @@ class TextTable:
         return line.split() if self.separator == " " else split_cells(line, self.separator)
 
     @cached_property
-    def names(self) -> tuple[str, ...] | None:
-        """The header's names, or None if the first line holds numbers only."""
+    def names(self) -> tuple[str, ...]:
+        """The header's names, none if the first line holds numbers only."""
         cells = self.cells(self.sample[0])
         numbers = [as_number(cell, decimal_comma=self.decimal_comma) for cell in cells]
         if all(n is not None for n, cell in zip(numbers, cells, strict=True) if cell):
-            return None
+            return ()
         return tuple(cells)
 
     @cached_property
@@ -191,17 +190,19 @@ class TextTable:
 
     def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
         """The rows by polars, every wanted column with its type."""
-        whole = isinstance(source, Path)
-        parse = TextParse(
+        import polars as pl
+
+        return pl.read_csv(
+            source,
+            has_header=False,
+            skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
             separator=self.separator,
-            width=self.width,
-            kinds=kinds,
-            skip=self._lines_before_rows if whole else 0,
-            quoted=any('"' in line for line in self.sample),
+            columns=sorted(kinds),
+            schema={str(c): kinds.get(c, pl.String) for c in range(self.width)},
+            quote_char='"' if any('"' in line for line in self.sample) else None,
             decimal_comma=self.decimal_comma,
+            glob=False,
         )
-        found = self.file.ahead.frame(parse) if whole and self.file.ahead is not None else None
-        return parse.frame(source) if found is None else found
 
     @property
     def _lines_before_rows(self) -> int:
@@ -211,7 +212,7 @@ class TextTable:
             text = decoded(line).removeprefix("\ufeff").strip()
             # The header is a row of its own, unless it stood in a comment.
             if text and not text.startswith("#"):
-                return number + (self.names is not None and not self._header_is_comment)
+                return number + (bool(self.names) and not self._header_is_comment)
         return 0
 
     @property
@@ -219,7 +220,7 @@ class TextTable:
         """Whether the names stand in a comment above the rows, as np.savetxt writes them."""
         lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
         first = next((line for line in lines if not line.startswith("#")), "")
-        return self.names is not None and self.cells(first) != list(self.names)
+        return bool(self.names) and self.cells(first) != list(self.names)
 
     def _text(self) -> Any:  # noqa: ANN401 - a path or bytes
         """The table as it can be parsed at once: the path, or bytes where something must go."""
@@ -258,7 +259,7 @@ class TextTable:
         while is_comment(decoded(text[:64])):
             text = text.partition(b"\n")[2].lstrip(b"\n ")
         text = re.sub(rb"\n\s*\n", b"\n", text)
-        if self.names is not None and not self._header_is_comment:
+        if self.names and not self._header_is_comment:
             text = text.partition(b"\n")[2]
         return text
 
@@ -287,7 +288,7 @@ class TextTable:
         if ended:
             return False
         above = [self.cells(decoded(row)) for row in rows[-COMPARED_ROWS - 1 : -1]]
-        ends = {cells[-1] for cells in above[self.names is not None and len(rows) <= 2 :] if cells}
+        ends = {cells[-1] for cells in above[bool(self.names) and len(rows) <= 2 :] if cells}
         decimals = {len(end.partition(".")[2]) for end in ends}
         # Loggers print one number of decimals: fewer than above means digits are lost.
         if "." in last[-1] or "," in last[-1]:
@@ -298,7 +299,7 @@ class TextTable:
         """Type of the clock's column: long whole numbers must not pass through float64."""
         import polars as pl
 
-        row = self.sample[1] if self.names is not None and len(self.sample) > 1 else self.sample[0]
+        row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
         cells = self.cells(row)
         text = cells[clock] if clock < len(cells) else ""
         # float64 holds nanoseconds since 1970 only to 256 ns.

@@ -5,9 +5,9 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from vftcli.readers.hdf5_layouts import read_hdf5
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers import hdf5_layouts
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of, open_log
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -26,10 +26,10 @@ def trajectories(folder: Path) -> Iterator[Path | None]:
         yield Path(place) / TRAJECTORY if TRAJECTORY in names else None
 
 
-def is_droid(file: LogFile) -> bool:
+def recognises(file: LogFile, _: LogFormat) -> bool:
     """Whether a folder holds DROID's episodes, at any depth."""
     is_lerobot = (file.path / "meta" / "info.json").is_file()
-    if not file.is_folder or "metadata.yaml" in file.entries or is_lerobot:
+    if "metadata.yaml" in file.entries or is_lerobot:
         return False
     looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
     return any(path is not None for _, path in looked_at)
@@ -43,12 +43,12 @@ def episodes_below(file: LogFile) -> list[Path]:
     return found
 
 
-def read_release(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read one episode of a release."""
     paths = episodes_below(file)
     number, part, remarks = episode_of(file.path, request, range(len(paths)))
     path = paths[number]
-    raw = read_hdf5(open_log(path), replace(request, episode=None))
+    raw = hdf5_layouts.read(open_log(path), replace(request, episode=None))
     place = fact("episode-place", place=str(path.parent.relative_to(file.path)))
     return replace(
         raw,
@@ -58,9 +58,6 @@ def read_release(file: LogFile, request: ReadChoice) -> RawLog:
     )
 
 
-DROID = Reader(
-    name="droid",
-    recognises=is_droid,
-    read=read_release,
-    episodes=lambda file: range(len(episodes_below(file))),
-)
+def episodes_in(file: LogFile) -> range:
+    """The numbers of its episodes, counted from 0."""
+    return range(len(episodes_below(file)))

@@ -1,6 +1,7 @@
 """HDF5 files as tables: their datasets of numbers by path, read within bounds by h5py."""
 
 import re
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
@@ -9,24 +10,60 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.hdf5_chunks import check_chunks
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked, unpacked_limit
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column, listed
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import Remark
 
-MAGIC = b"\x89HDF\r\n\x1a\n"
+#: Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders.
+DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
+DEFLATE_RATIO = 1032  #: The most that deflate unpacks a byte to (zlib, algorithm.txt).
+
+
+def check_chunks(told: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 - h5py
+    """Check that no chunk unpacks to more than a log's may."""
+    if dataset.chunks is None:
+        return
+    size = dataset.dtype.itemsize
+    for length in dataset.chunks:
+        size *= length
+    if size > limit:
+        raise LogError(f"{told}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
+    settings = dataset.id.get_create_plist()
+    filters = [settings.get_filter(k)[0] for k in range(settings.get_nfilters())]
+    # Each unpacks what the next has unpacked: two of a kind are a thousandfold of a thousandfold.
+    if set(filters) - {DEFLATE, SHUFFLE, FLETCHER32, LZF} or len(set(filters)) < len(filters):
+        raise LogError(
+            f"{told}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
+            "and lzf are read, once each; repack it: h5repack -f GZIP=4 OLD NEW"
+        )
+    if DEFLATE in filters and DEFLATE_RATIO * dataset.id.get_storage_size() > limit:
+        inflate_suspects(told, dataset, size, limit)
+
+
+def inflate_suspects(told: str, dataset: Any, size: int, limit: int) -> None:  # noqa: ANN401
+    """Inflate chunks that could unpack to more than `limit`, no further than to their `size`."""
+    suspects: list[tuple[int, ...]] = []
+
+    def look(chunk: Any) -> None:  # noqa: ANN401 - h5py
+        if DEFLATE_RATIO * chunk.size > limit:
+            suspects.append(chunk.chunk_offset)
+
+    dataset.id.chunk_iter(look)
+    for offset in suspects:
+        _, packed = dataset.id.read_direct_chunk(offset)
+        try:
+            unpacked = zlib.decompressobj().decompress(packed, size + 1)
+        except zlib.error:
+            continue  # no more than this was unpacked; HDF5 says where it breaks off
+        if len(unpacked) > size:
+            raise LogError(f"{told}: a chunk unpacks to more than the {size} bytes that it holds.")
+
 
 #: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
 MOST_OBJECTS, DEEPEST = 100_000, 32
-
-
-def is_hdf5(head: bytes) -> bool:
-    """Whether a file is HDF5: from its start, or behind a user block of 512 bytes or more."""
-    places = [0, *(512 << k for k in range(7))]
-    return any(head[place : place + len(MAGIC)] == MAGIC for place in places)
 
 
 @contextmanager
@@ -61,7 +98,7 @@ class Hdf5Table:
         self._datasets = dict(datasets)
 
     @property
-    def names(self) -> tuple[str, ...] | None:
+    def names(self) -> tuple[str, ...]:
         """The datasets' paths."""
         return tuple(self._datasets)
 
@@ -94,14 +131,10 @@ class Hdf5Table:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
         names, datasets = list(self._datasets), list(self._datasets.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * stored)
-        if 8 * sum(datasets[c].size for c in columns) > limit:
-            raise LogError(
-                f"{self.path}: {listed([names[c] for c in columns])} unpack to more than "
-                f"{limit >> 20} MiB, more than the {stored} bytes that are stored of them can hold."
-            )
+        what = f"{self.path}: {listed([names[c] for c in columns])}"
+        check_unpacked(what, 8 * sum(datasets[c].size for c in columns), stored)
         for c in columns:
-            check_chunks(f"{self.path}: {names[c]}", datasets[c], limit)
+            check_chunks(f"{self.path}: {names[c]}", datasets[c], unpacked_limit(stored))
 
     def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
         """One dataset. (T,) or (T, k)"""

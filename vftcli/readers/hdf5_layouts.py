@@ -1,4 +1,4 @@
-"""HDF5 logs: the layouts of ALOHA, robomimic, roboset and DROID, and any other by its paths."""
+"""HDF5 logs: the layouts of ALOHA and DROID, and any other by its paths."""
 
 import json
 import re
@@ -6,32 +6,33 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import NamedTuple
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.hdf5 import Hdf5Table, is_hdf5, natural, opened, table_of
-from vftcli.readers.parts import arm_of, episode_of, refuse_arm
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.hdf5 import Hdf5Table, natural, opened, table_of
 from vftcli.readers.picking import rate_words
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, described, from_table, states_positions
+from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, arm_of, episode_of, refuse_arm
+from vftcli.readers.table import listed
+from vftcli.readers.tables import described, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.remarks import fact
 
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
-FASTEST = 1e6  #: Highest rate that is believed. [Hz]
 
 DROID_STATE = "observation/robot_state/"
+#: What DROID's controller commands, without gravity; what it measures includes it.
+DROID_COMPUTED = "joint_torques_computed"
 DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
-#: What DROID measures, gravity included, and what its controller commands, without gravity.
-DROID_TORQUE, DROID_COMPUTED = "motor_torques_measured", "joint_torques_computed"
-#: robosuite's name of a robot in lower case → profile.
-ROBOSUITE = {"panda": "panda", "ur5e": "ur5e"}
+DROID_USUAL = (
+    f"t={DROID_TIME}seconds|{DROID_TIME}nanos,q[rad]={DROID_STATE}joint_positions,"
+    f"dq={DROID_STATE}joint_velocities,tau={DROID_STATE}motor_torques_measured"
+)
+#: Where projects that record no torque keep their positions → the project.
+TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
 FRANKA = ("panda", "fr3")
 TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
@@ -42,94 +43,51 @@ class Layout(NamedTuple):
 
     name: str  #: The project.
     anchor: str  #: Path of the positions, below the group of an episode.
-    beside: tuple[str, ...]  #: Further paths that make it this layout.
-    #: Reads one episode of an open file: its table, the file's attributes, the request.
-    read: Callable[[Hdf5Table, Any, ReadChoice], RawLog]
+    read: Callable[[Hdf5Table, ReadChoice], RawLog]  #: Reads one episode of an open file.
 
     def groups(self, names: Sequence[str]) -> tuple[str, ...]:
         """The groups of its episodes, in their order; none where the file is laid out otherwise."""
-        there = set(names)
         ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
-        found = [e for e in ends if (not e or e.endswith("/"))]
-        found = [e for e in found if all(e + name in there for name in self.beside)]
-        return tuple(sorted(found, key=natural))
+        return tuple(sorted((e for e in ends if not e or e.endswith("/")), key=natural))
 
 
-def read_aloha(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
-    names = table.names or ()
+    names = table.names
     if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
-        return read_any(table, None, request)
-    if stated := states_positions(request):
+        return read_any(table, request)
+    if stated := request.spec.item("q") is not None:
         refuse_arm(table.path, request)
     told = "left: columns 0-5, right: columns 7-12"
     arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, told)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
-    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span}"
-    usual += f",dq=observations/qvel{span}" if "observations/qvel" in names else ""
-    usual += f",current[mA]={DYNAMIXEL}{span}" if DYNAMIXEL in names else ""
+    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
+    usual += f",current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
-    raw = described(table, usual, request, remarks=remarks)
+    raw = described(table, recorded(usual, names), request, remarks=remarks)
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
     own = raw.clock == rate_words(ALOHA_RATE)
     return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
 
 
-def read_robomimic(table: Hdf5Table, group: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401
-    """robomimic: positions and velocities, the rate and the robot in env_args, no torque."""
-    refuse_arm(table.path, request)
-    told = environment(group)
-    rate, robots = told.get("control_freq"), told.get("robots")
-    usual = "q[rad]=obs/robot0_joint_pos"
-    usual += ",dq=obs/robot0_joint_vel" if "obs/robot0_joint_vel" in (table.names or ()) else ""
-    good = isinstance(rate, int | float) and 0 < rate < FASTEST
-    usual = f"t@{rate:.9g}Hz,{usual}" if good else usual
-    robot = robots[0] if isinstance(robots, list) and robots else robots
-    raw = described(table, usual, request, robot_hint=ROBOSUITE.get(str(robot).lower()))
-    own = good and raw.clock == rate_words(float(f"{rate:.9g}"))
-    return replace(raw, clock=f"none: {rate:g} Hz, env_args' control_freq") if own else raw
+def recorded(usual: str, names: Sequence[str]) -> str:
+    """The items of a text of which a file has the columns; its clock and positions always."""
+    items = [(item, item.partition("=")[2].partition("[")[0]) for item in usual.split(",")]
+    return ",".join(item for item, name in items if name in names or re.match(r"[tq]\b", item))
 
 
-def environment(group: Any) -> dict[str, Any]:  # noqa: ANN401 - h5py
-    """env_kwargs of the env_args beside an episode of robomimic, {} where there are none."""
-    text = group.parent.attrs.get("env_args", "{}")
-    if not isinstance(text, str | bytes) or len(text) > TOLD_LIMIT:
-        return {}
-    try:
-        told = json.loads(text)
-        told = told.get("env_kwargs", {})
-    except (ValueError, RecursionError, AttributeError):
-        return {}
-    return told if isinstance(told, dict) else {}
-
-
-def read_roboset(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
-    """Roboset of RoboHive: positions, velocities and a clock of its own."""
-    refuse_arm(table.path, request)
-    return described(table, "t=time,q[rad]=qp_arm,dq=qv_arm", request)
-
-
-def read_droid(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
     refuse_arm(table.path, request)
-    if states_positions(request):
+    if request.spec.item("q"):
         return from_table(table, request)
-    names = list(table.names or ())
-    signals = {"q[rad]": "joint_positions", "dq": "joint_velocities", "tau": DROID_TORQUE}
-    there = {s: DROID_STATE + name for s, name in signals.items() if DROID_STATE + name in names}
-    times = [DROID_TIME + name for name in ("seconds", "nanos")]
-    if not set(times) <= set(names):
-        raise LogError(f"{table.path}: a DROID log without {' and '.join(times)}, its clock.")
-    wanted = [names.index(name) for name in (*there.values(), *times)]
-    loaded = table.load(wanted, None)
-    columns: dict[str, Column] = {names[k]: column for k, column in loaded.items()}
-    seconds, nanos = (columns.pop(name).astype(np.int64) for name in times)
-    columns["robot_timestamp"] = seconds * 1_000_000_000 + nanos
-    usual = ",".join(["t[ns]=robot_timestamp", *(f"{s}={name}" for s, name in there.items())])
+    names = table.names
     remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
-    raw = described(ArrayTable(path=table.path, columns=columns), usual, request, remarks=remarks)
+    clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
+    usual = recorded(DROID_USUAL, names)
+    raw = described(table, usual, request, remarks=remarks, clock_name=clock)
     return replace(raw, robot_hint=robot_of(Path(table.path).parent))
 
 
@@ -146,17 +104,24 @@ def robot_of(folder: Path) -> str | None:
     return None
 
 
-def read_any(table: Hdf5Table, _: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401 - h5py
+def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """Any other file: by --columns, or by alias among the datasets of one group."""
     refuse_arm(table.path, request)
-    if states_positions(request):
+    if request.spec.item("q"):
         return from_table(table, request)
-    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names or ())]) > 1:
+    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names)]) > 1:
         raise UnknownFormatError(
             f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
             "--columns, as in t=…,q=PATH/OF/POSITIONS."
         )
-    names = table.names or ()
+    names = table.names
+    for path, project in TORQUELESS.items():
+        if any(f"/{name}".endswith(f"/{path}") for name in names):
+            raise LogError(
+                f"{table.path}: laid out as {project}'s, which hold no torque, so no force can be "
+                "estimated. Where you added torques, name all with --columns, as in "
+                "t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
+            )
     # The datasets of the one group that has positions by name, and those at the top.
     top = [name for name in names if "/" not in name]
     return from_table(table.within(level_of(table.path, names, "/"), top), request)
@@ -179,18 +144,16 @@ def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
 
 #: The layouts that are known.
 LAYOUTS = (
-    Layout("ALOHA", ALOHA, (), read_aloha),
-    Layout("robomimic", "obs/robot0_joint_pos", (), read_robomimic),
-    Layout("roboset", "qp_arm", ("qv_arm", "time"), read_roboset),
-    Layout("DROID", f"{DROID_STATE}joint_positions", (), read_droid),
+    Layout("ALOHA", ALOHA, read_aloha),
+    Layout("DROID", f"{DROID_STATE}joint_positions", read_droid),
 )
 
-ANY = Layout("HDF5", "", (), read_any)
+ANY = Layout("HDF5", "", read_any)
 
 
 def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
     """How a file is laid out, and the groups of its episodes; as any other where two ways fit."""
-    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names or ()))]
+    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names))]
     return found[0] if len(found) == 1 else (ANY, ("",))
 
 
@@ -202,7 +165,7 @@ def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
     return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
 
 
-def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat | None = None) -> RawLog:
     """Read an HDF5 log, or one episode of it."""
     with opened(file) as content:
         table = table_of(file.path, content)
@@ -212,7 +175,7 @@ def read_hdf5(file: LogFile, request: ReadChoice) -> RawLog:
         group = groups[numbers.index(number)]
         if part:
             remarks = (*remarks, fact("episode-place", place=group.rstrip("/")))
-        raw = layout.read(table.within(group), content[group or "/"], request)
+        raw = layout.read(table.within(group), request)
         parts = " ".join(word for word in (part, raw.part) if word)
         return replace(raw, part=parts, remarks=(*remarks, *raw.remarks))
 
@@ -230,15 +193,6 @@ def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
         table = table_of(file.path, content)
         layout, groups = layout_of(table)
         anchor = (stated.pattern if stated is not None else None) or layout.anchor
-        anchor = anchor or level_of(file.path, table.names or (), "/")
+        anchor = anchor or level_of(file.path, table.names, "/")
     below = anchor[: anchor.rfind("/") + 1]
     return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))
-
-
-HDF5 = Reader(
-    name="hdf5",
-    recognises=lambda file: is_hdf5(file.head) and not file.head.startswith(b"MATLAB"),
-    read=read_hdf5,
-    episodes=episodes_in,
-    arms=True,
-)

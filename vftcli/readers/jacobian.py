@@ -68,7 +68,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
 
 def jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
     """The cells of jacobian_R_C row by row, and the number of joints."""
-    names = found.table.names or ()
+    names = found.table.names
     places = {
         (int(match[2]), int(match[3])): Cell(column)
         for column, name in enumerate(names)

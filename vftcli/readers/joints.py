@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 
-from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.columns import SIGNALS
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -66,7 +66,7 @@ def effort_of(names: Sequence[str]) -> str:
 
 def laid_along(raw: RawLog, names: Sequence[str], request: ReadChoice) -> RawLog:
     """A log of JointState messages with its joints base to tip, its effort by their names."""
-    stated = parse_columns(request.columns).items if request.columns is not None else ()
+    stated = request.spec.items
     if any("|" in (item.pattern or "") for item in stated):
         return raw
     width = raw.signals["q"].shape[1]

@@ -12,8 +12,8 @@ from vftcli.readers.arrays_file import (
     read_arrays,
     read_dictionary,
 )
-from vftcli.readers.parts import episode_of
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError
@@ -30,7 +30,7 @@ CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
 Objects = list[dict[str, Any]]
 
 
-def read_json(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read a JSON log, of whichever of the shapes."""
     if is_lines(file):
         episode_of(file.path, request, (0,))
@@ -162,19 +162,6 @@ def parsed(file: LogFile) -> Any:  # noqa: ANN401 - of JSON
         raise LogError(f"{file.path}: looks like JSON and is not ({reason}).") from None
 
 
-def is_json(file: LogFile) -> bool:
-    """Whether a text begins as JSON does; libfranka's states have a reader of their own."""
-    first = b"".join(file.first_line.split())[:12]
-    if not first and file.lines:
-        return False
-    opening = first[:1] == b"{" and (first[1:2] in {b'"', b"}", b""})
-    listing = first[:1] == b"[" and (first[1:2] in {b"{", b"["} or first[1:2] == b"")
-    return (opening or listing) and not first.startswith(b'{"O_T_EE"')
-
-
 def episodes_in(file: LogFile) -> Sequence[int]:
     """The numbers of the skills in frankapy's log, 0 alone elsewhere."""
     return (0,) if is_lines(file) else episodes_of_skills(parsed(file))
-
-
-JSON = Reader(name="json", recognises=is_json, read=read_json, describes=True, episodes=episodes_in)

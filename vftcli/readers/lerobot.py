@@ -11,14 +11,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.readers.aliases import ALIASES
-from vftcli.readers.columnar import EPISODE, ColumnarTable, episodes_of
-from vftcli.readers.columns import SIGNALS, parse_columns
+from vftcli.readers.columns import SIGNALS
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.joints import kinematic_order
-from vftcli.readers.parquet import parquet_table
-from vftcli.readers.parts import arm_of, episode_of, refuse_arm
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, Reader, open_log
+from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
+from vftcli.readers.reader import (
+    ARMS,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    arm_of,
+    episode_of,
+    open_log,
+    refuse_arm,
+)
 from vftcli.readers.table import listed
-from vftcli.readers.tables import described, states_positions
+from vftcli.readers.tables import described
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
@@ -76,7 +84,7 @@ class Element(NamedTuple):
     side: str  #: left, right, or "" for neither.
 
 
-def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read an episode of a dataset."""
     info = info_of(file.path)
     episodes = episodes_told(file.path)
@@ -85,11 +93,14 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
     path = data_file(file.path, episode)
     table = rows_of(open_log(path), episode)
     names: tuple[str, ...] = ()
-    if states_positions(request):
+    if request.spec.item("q"):
         refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
     else:
-        usual, names, side, more = columns_of(file.path, table, features_of(info), request)
+        told = info.get("features")
+        told = told.items() if isinstance(told, dict) else ()
+        features = {name: each.get("names") for name, each in told if isinstance(each, dict)}
+        usual, names, side, more = columns_of(file.path, table, features, request)
         remarks = (*remarks, *more)
     raw = described(table, usual, request, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
@@ -102,18 +113,23 @@ def read_lerobot(file: LogFile, request: ReadChoice) -> RawLog:
 
 
 def columns_of(
-    path: Path, table: ColumnarTable, features: Mapping[str, Any], request: ReadChoice
+    path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
 ) -> tuple[str, tuple[str, ...], str, tuple[Any, ...]]:
     """Which columns hold which signals of which arm, by the names of features and their elements.
 
     Returns:
         The --columns text, the joints' names or none, the arm of two or "", what is to be said.
     """
-    there = [e for name in table.names or () for e in elements_of(name, table, features.get(name))]
+    there = [e for name in table.names for e in elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     side = ""
-    taken = request.columns is not None and parse_columns(request.columns).item("wrench")
-    remarks: tuple[Remark, ...] = () if taken else wrenches_left(table, features)
+    taken = request.spec.item("wrench")
+    # Nothing tells a sensor's wrench from an estimate.
+    observed = [name for name in table.names if name.startswith("observation.")]
+    left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
+    remarks: tuple[Remark, ...] = ()
+    if left and not taken:
+        remarks = (fact("wrench-left-out", features=listed(left)),)
     if len(sides) > 1:
         side, said = arm_of(path, request, sides)
         remarks = (*remarks, *said)
@@ -123,7 +139,7 @@ def columns_of(
     by_signal = {s: [e for e in there if e.signal == s] for s in MEASURED}
     if not by_signal["q"]:
         raise LogError(
-            f"{path}: no joint positions among {listed(list(table.names or ()))}. Name the columns "
+            f"{path}: no joint positions among {listed(list(table.names))}. Name the columns "
             "with --columns, as in 'q[rad]=observation.state[0:7]'."
         )
     names = tuple(element.joint for element in by_signal["q"])
@@ -136,13 +152,6 @@ def columns_of(
         if found
     ]
     return ",".join(["t=timestamp", *items]), names, side, remarks
-
-
-def wrenches_left(table: ColumnarTable, features: Mapping[str, Any]) -> tuple[Remark, ...]:
-    """A remark on a wrench that is not taken: nothing tells a sensor's from an estimate."""
-    observed = [name for name in table.names or () if name.startswith("observation.")]
-    found = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
-    return (fact("wrench-left-out", features=listed(found)),) if found else ()
 
 
 def in_order(
@@ -160,11 +169,11 @@ def in_order(
     return [by_joint[name] for name in names]
 
 
-def elements_of(name: str, table: ColumnarTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
-    column = (table.names or ()).index(name)
+    column = table.names.index(name)
     width = table.lists.get(column)
     last = [part for part in name.lower().split(".") if part not in {"observation", *ARMS}]
     of_feature = next(
@@ -175,28 +184,23 @@ def elements_of(name: str, table: ColumnarTable, labels: Any) -> Iterable[Elemen
     good = isinstance(labels, list) and len(labels) == (width or 1)
     for k in range(width or 1):
         label = str(labels[k]) if good else ""
-        signal, joint = measured_by(label) or (of_feature, label)
+        signal, joint = of_feature, label
+        if match := COUNTED.fullmatch(label):
+            signal, joint = STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
+        elif match := NAMED.fullmatch(label):
+            signal, joint = STEMS[match["stem"]], match["joint"]
         pose = joint.lower().rpartition("_")[2].rpartition(".")[2] in CARTESIAN
         if signal and not pose and not NO_JOINT.search(joint):
             side = SIDE.search(label.replace("_", ".")) or SIDE.search(name)
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
 
 
-def measured_by(label: str) -> tuple[str, str] | None:
-    """The signal and the joint that an element's name tells, None for one that tells no signal."""
-    if match := COUNTED.fullmatch(label):
-        return STEMS[match["stem"]], f"{match['joint']}_{match['number']}"
-    if match := NAMED.fullmatch(label):
-        return STEMS[match["stem"]], match["joint"]
-    return None
-
-
-def by_frames(raw: RawLog, table: ColumnarTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
-    if not good or FRAME not in (table.names or ()) or raw.clock != "column timestamp":
+    if not good or FRAME not in table.names or raw.clock != "column timestamp":
         return raw
-    column = (table.names or ()).index(FRAME)
+    column = table.names.index(FRAME)
     frames = table.load([column], column)[column]
     exact = frames.ndim == 1 and np.all(np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK)
     if frames.dtype.kind != "i" or not exact:
@@ -224,13 +228,6 @@ def text_of(path: Path) -> str:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
-def features_of(info: dict[str, Any]) -> dict[str, Any]:
-    """Feature → the names of its elements, as info.json tells them."""
-    features = info.get("features")
-    there = features.items() if isinstance(features, dict) else ()
-    return {name: told.get("names") for name, told in there if isinstance(told, dict)}
-
-
 def episodes_told(folder: Path) -> list[Episode]:
     """The episodes of a dataset, rising."""
     tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
@@ -241,7 +238,7 @@ def episodes_told(folder: Path) -> list[Episode]:
         found = remembered_episodes(folder, states)
     else:
         files = sorted((folder / "data").rglob("*.parquet"))
-        each = (episodes_of(parquet_table(open_log(path)).episodes()) for path in files)
+        each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
         found = [Episode(number) for numbers in each for number in numbers]
     if not found:
         raise LogError(f"{folder}: a LeRobot dataset without data/**/*.parquet.")
@@ -261,8 +258,8 @@ def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...])
 
 def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     """The episodes of a table of version 3."""
-    table = parquet_table(open_log(path))
-    names = list(table.names or ())
+    table = ParquetTable(open_log(path))
+    names = list(table.names)
     if missing := [name for name in EPISODES_TABLE if name not in names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
     loaded = table.load([names.index(name) for name in EPISODES_TABLE], None)
@@ -298,19 +295,19 @@ def data_file(folder: Path, episode: Episode) -> Path:
     files = sorted((folder / "data").rglob("*.parquet"))
     own = [path for path in files if path.name == f"episode_{episode.number:06d}.parquet"]
     for path in own or files:
-        if own or episode.number in episodes_of(parquet_table(open_log(path)).episodes()):
+        if own or episode.number in episodes_of(ParquetTable(open_log(path)).episodes()):
             return path
     raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
 
 
-def rows_of(file: LogFile, episode: Episode) -> ColumnarTable:
+def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     """The rows of an episode in its data file, checked against the table of episodes."""
-    table = parquet_table(file)
+    table = ParquetTable(file)
     numbers = table.episodes()
     if not numbers.size:
         return table
     rows = np.flatnonzero(numbers == episode.number)
-    names = list(table.names or ())
+    names = list(table.names)
     differs = episode.length is not None and len(rows) != episode.length
     if "index" in names and episode.start is not None and not differs:
         index = names.index("index")
@@ -325,10 +322,11 @@ def rows_of(file: LogFile, episode: Episode) -> ColumnarTable:
     return table
 
 
-LEROBOT = Reader(
-    name="lerobot",
-    recognises=lambda file: "meta" in file.entries and (file.path / "meta" / "info.json").is_file(),
-    read=read_lerobot,
-    episodes=lambda file: [episode.number for episode in episodes_told(file.path)],
-    arms=True,
-)
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder is a dataset."""
+    return "meta" in file.entries and (file.path / "meta" / "info.json").is_file()
+
+
+def episodes_in(file: LogFile) -> list[int]:
+    """The numbers of its episodes."""
+    return [episode.number for episode in episodes_told(file.path)]

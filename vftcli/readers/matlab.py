@@ -9,16 +9,17 @@ from typing import Any, Literal
 import numpy as np
 
 from vftcli.readers.aliases import CLOCKS
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.hdf5 import opened, table_of
 from vftcli.readers.hdf5_layouts import level_of
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.opening import check_unpacked, unpacked_limit
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, from_table, states_positions
+from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
-V5, V73 = b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file"
+V73 = b"MATLAB 7.3 MAT-file"  #: How a file of HDF5 begins.
 
 HEADER, TAG = 128, 8  #: Bytes before the first variable, and of the tag before each.
 COMPRESSED = 15  #: Type of a variable that is packed.
@@ -29,12 +30,12 @@ NUMBERS = {
 }  # fmt: skip
 
 
-def read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read a .mat file; signals of joints × samples are turned, and said."""
     variables = variables_of_v73(file) if file.head.startswith(V73) else variables_of_v5(file)
     if not variables:
         raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")
-    level = "" if states_positions(request) else level_of(file.path, list(variables), ".")
+    level = "" if request.spec.item("q") else level_of(file.path, list(variables), ".")
     columns = {
         name.removeprefix(level): array
         for name, array in variables.items()
@@ -70,9 +71,9 @@ def variables_of_v73(file: LogFile) -> dict[str, Column]:
     """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
-        kept = [k for k, name in enumerate(table.names or ()) if not name.startswith("#")]
+        kept = [k for k, name in enumerate(table.names) if not name.startswith("#")]
         table.check_size(kept)
-        names = [(table.names or ())[k].replace("/", ".") for k in kept]
+        names = [table.names[k].replace("/", ".") for k in kept]
         # MATLAB writes column by column, which HDF5 reads as rows.
         return {
             name: table.load([k], k if name.rpartition(".")[2].lower() in CLOCKS else None)[k].T
@@ -85,7 +86,6 @@ def variables_of_v5(file: LogFile) -> dict[str, Column]:
     check_size(file)
     from scipy.io import loadmat, whosmat
 
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(file.content))
     stream: Any = BytesIO(file.content)
     try:
         with warnings.catch_warnings():
@@ -95,11 +95,7 @@ def variables_of_v5(file: LogFile) -> dict[str, Column]:
             claimed = sum(
                 8 * int(np.prod(shape, dtype=object)) for _, shape, k in there if k in NUMBERS
             )
-            if claimed > limit:
-                raise LogError(
-                    f"{file.path}: its variables claim {claimed >> 20} MiB, more than a file of "
-                    "this size can hold. It is damaged or made to fill memory."
-                )
+            check_unpacked(file.path, claimed, len(file.content))
             loaded = loadmat(stream, variable_names=wanted, simplify_cells=True)
     except (
         ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OSError, zlib.error,
@@ -125,7 +121,7 @@ def check_size(file: LogFile) -> None:
     """Check what the packed variables of a file unpack to, before any is kept."""
     content, place, total = file.content, HEADER, 0
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
-    limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * len(content))
+    limit = unpacked_limit(len(content))
     while place + TAG <= len(content):
         kind = int.from_bytes(content[place : place + 4], order)
         size = int.from_bytes(content[place + 4 : place + TAG], order)
@@ -133,11 +129,7 @@ def check_size(file: LogFile) -> None:
         if len(packed) < size:
             raise LogError(f"{file.path}: the MATLAB file is cut within a variable.")
         total += unpacked_size(packed, limit) if kind == COMPRESSED else size
-        if total > limit:
-            raise LogError(
-                f"{file.path}: unpacks to more than {limit >> 20} MiB, more than a log this small "
-                "can hold. It is damaged or made to fill memory."
-            )
+        check_unpacked(file.path, total, len(content))
         place += TAG + size
 
 
@@ -151,10 +143,3 @@ def unpacked_size(packed: memoryview, limit: int) -> int:
             break  # told when it is read
         rest = unpacker.unconsumed_tail
     return total
-
-
-MATLAB = Reader(
-    name="mat",
-    recognises=lambda file: file.head.startswith((V5, V73)),
-    read=read_matlab,
-)

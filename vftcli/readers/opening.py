@@ -23,6 +23,21 @@ UNPACKED_LIMIT = 128 * 1024 * 1024
 #: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
 UNPACKED_RATIO = 50
 
+
+def unpacked_limit(size: int) -> int:
+    """Bytes that a file of a size, or a part of it, may unpack to."""
+    return max(UNPACKED_LIMIT, UNPACKED_RATIO * size)
+
+
+def check_unpacked(what: object, claimed: int, size: int) -> None:
+    """Raise a LogError if a file of a size claims to unpack to more than a log of it can."""
+    if not 0 <= claimed <= unpacked_limit(size):
+        raise LogError(
+            f"{what}: unpacks to more than {unpacked_limit(size) >> 20} MiB, more than a log of "
+            "this size can hold. It is damaged or made to fill memory."
+        )
+
+
 #: A log of no more rows is read in one piece: there is memory for all that is done with it.
 WHOLE_ROWS = 100_000
 
@@ -46,20 +61,17 @@ def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
         raise LogError(f"{path}: the file is empty; nothing was recorded into it.")
     for magic, wrapping in MAGICS.items():
         if head.startswith(magic):
-            return _unwrapped_head(path, wrapping), wrapping
+            found = b""
+            for piece in Unpacker(path, wrapping).pieces():
+                found += piece
+                if len(found) >= HEAD_BYTES:
+                    break
+            if not found:
+                raise LogError(
+                    f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged."
+                )
+            return found[:HEAD_BYTES], wrapping
     return head, None
-
-
-def _unwrapped_head(path: Path, wrapping: Wrapping) -> bytes:
-    """As much of a wrapped file as recognition looks at."""
-    found = b""
-    for piece in Unpacker(path, wrapping).pieces():
-        found += piece
-        if len(found) >= HEAD_BYTES:
-            break
-    if not found:
-        raise LogError(f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged.")
-    return found[:HEAD_BYTES]
 
 
 def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:
@@ -88,7 +100,7 @@ class Unpacker:
     def __init__(self, path: Path, wrapping: Wrapping) -> None:
         self.path = path
         self.wrapping = wrapping
-        self.limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * path.stat().st_size)
+        self.limit = unpacked_limit(path.stat().st_size)
         self.ended = False
 
     def pieces(self) -> Iterator[bytes]:

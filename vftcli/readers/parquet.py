@@ -1,63 +1,263 @@
-"""Parquet tables: pyarrow decodes them, and polars where it is not installed."""
+"""Columns of Arrow's kind, flat or of lists as LeRobot writes them; Parquet files, by pyarrow.
 
-from collections.abc import Iterator, Sequence
+On a damaged page of some, polars would end the whole process.
+"""
+
+import json
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from functools import cached_property
 from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.columnar import ColumnarTable, HeldColumns, episodes_of, read_columns
-from vftcli.readers.pyarrow_table import PyarrowTable
-from vftcli.readers.reader import InOnePieceError, LogFile, Reader
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.opening import check_unpacked
+from vftcli.readers.reader import InOnePieceError, LogFile, RawLog, ReadChoice, episode_of
 from vftcli.readers.table import Column
+from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
-from vftcli.signals.packages import installed, needed
+from vftcli.signals.packages import needed
+from vftcli.signals.remarks import Remark
+from vftcli.signals.wrench import WrenchFrame
 
+EPISODE = "episode_index"
 #: Rows that are decoded at a time of a long table, and bytes of a column that are read for them.
 BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
 
 
-def parquet_table(file: LogFile) -> ColumnarTable:
-    """A Parquet file as a table."""
-    return PyarrowParquet(file) if installed("pyarrow") else PolarsParquet(file)
+@contextmanager
+def guarded(path: Path) -> Iterator[None]:
+    """Turn the errors of pyarrow, beside Python's own, into a LogError that names the file."""
+    arrow = needed("pyarrow", f"{path}: a Parquet or Arrow file", error=LogError).ArrowException
+    try:
+        yield
+    except (OSError, ValueError, KeyError, MemoryError, OverflowError, arrow) as error:
+        reason = str(error).split("\n")[0][:120]
+        raise LogError(f"{path}: a damaged Parquet or Arrow file ({reason})") from None
 
 
-class PyarrowParquet(PyarrowTable):
-    """A Parquet file, decoded by pyarrow."""
+class ColumnarTable(ABC):
+    """A file of columns; only those asked for are decoded, and nothing is ever mended.
 
-    def _opened(self, file: LogFile) -> HeldColumns:
-        pq = needed("pyarrow.parquet", "a Parquet file")
+    Attributes:
+        path: The file.
+        names: Column names.
+    """
+
+    remarks: tuple[Remark, ...] = ()
+
+    def __init__(self, file: LogFile) -> None:
+        self.path: Path = file.path
+        self._rows: Any = None
+        self._size = len(file.content)
+        with guarded(self.path):
+            schema, self.rows = self._opened(file)
+            self._told = (schema.metadata or {}).get(b"vftcli", b"{}")
+            self._lists = [k for k, kind in enumerate(schema.types) if is_list(kind)]
+            if self.rows == 0:
+                raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
+        self.names: tuple[str, ...] = tuple(schema.names)
+
+    @abstractmethod
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
+        """Open the file; its schema, and how many rows it says it has."""
+
+    @abstractmethod
+    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - a list
+        """The value in the first row of a column of lists, None for none."""
+
+    @abstractmethod
+    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
+        """Some columns of all rows, as a table."""
+
+    @property
+    def width(self) -> int:
+        """Number of columns."""
+        return len(self.names)
+
+    def told(self) -> dict[str, Any]:
+        """What vftcli convert wrote beside the columns; nothing for files of other programs."""
+        try:
+            told = json.loads(self._told)
+        except (ValueError, RecursionError):
+            return {}
+        good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
+        return told if good else {}
+
+    @cached_property
+    def lists(self) -> Mapping[int, int]:
+        """Columns of lists and their length in the first row."""
+        with guarded(self.path):
+            return {k: len(self._first_list(k) or ()) for k in self._lists}
+
+    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+        """Decode some columns."""
+        self._names_of(columns)
+        self._check_size(columns)
+        with guarded(self.path):
+            # One after the other: of a long log all of them have no room in two forms.
+            return {c: self._column(self._kept(c), c, clock) for c in sorted(columns)}
+
+    def _kept(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+        """One column's rows, those that are kept."""
+        values = self._decoded([column]).column(0)
+        return values if self._rows is None else values.take(self._rows)
+
+    def _column(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
+        """A column as numbers; whole stamps stay whole, times become nanoseconds."""
+        import pyarrow as pa
+
+        if column in self.lists:
+            return self._matrix(values, column)
+        kind, name = values.type, self.names[column]
+        if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
+            unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
+            values = values.cast(unit).cast(pa.int64())
+        elif pa.types.is_boolean(kind):
+            values = values.cast(pa.uint8())
+        elif not is_number(kind):
+            raise LogError(f"{self.path}: column {name} holds {kind}, not numbers.")
+        whole = column == clock and pa.types.is_integer(values.type) and not values.null_count
+        target = np.int64 if whole else np.float64
+        # Not copied where nothing is to be changed: what is picked of it is copied once more.
+        return plain(values).astype(target, copy=False)
+
+    def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
+        """A column of lists of one length. (T, k)"""
+        length, name = self.lists[column], self.names[column]
+        values = values.combine_chunks()
+        if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
+            values = values.chunk(0) if values.num_chunks else values
+        flat = values.flatten()
+        even = np.all(np.asarray(values.value_lengths()) == length) if len(values) else True
+        if values.null_count or not even or len(flat) != length * len(values):
+            raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
+        if not is_number(flat.type):
+            raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
+        return plain(flat).astype(np.float64).reshape(len(values), length)
+
+    def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
+        """The names of some columns, each of one column only."""
+        names = self.names
+        # Decoders hand over both under one name.
+        if any(names.count(names[c]) > 1 for c in columns):
+            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
+        return {c: names[c] for c in columns}
+
+    def _check_size(self, columns: Sequence[int]) -> None:
+        """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
+
+        The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
+        whole process.
+        """
+        width = sum(self.lists.get(column, 1) for column in columns)
+        check_unpacked(self.path, 8 * width * self.rows, self._size)
+
+    def episodes(self) -> Column:
+        """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
+        if EPISODE not in self.names:
+            return np.empty(0)
+        column = self.names.index(EPISODE)
+        numbers = self.load([column], None)[column]
+        if numbers.ndim != 1 or not np.isfinite(numbers).all():
+            raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
+        return numbers
+
+    def keep(self, rows: Any) -> None:  # noqa: ANN401 - numbers of rows
+        """Keep some rows only, all for None."""
+        self._rows = rows
+
+
+def plain(values: Any) -> Column:  # noqa: ANN401 - pyarrow
+    """Numbers as an array, NaN where there is none.
+
+    Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half a second.
+    """
+    if hasattr(values, "chunks"):
+        values = values.combine_chunks()
+    if hasattr(values, "chunks") and values.num_chunks == 1:
+        values = values.chunk(0)
+    if values.null_count or hasattr(values, "chunks") or values.type.bit_width < 8:
+        return np.asarray(values.to_numpy(zero_copy_only=False))
+    return np.from_dlpack(values)
+
+
+def is_list(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
+    """Whether a column holds lists."""
+    import pyarrow as pa
+
+    tests = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
+    return any(test(kind) for test in tests)
+
+
+def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
+    """Whether a column holds numbers."""
+    import pyarrow as pa
+
+    return bool(pa.types.is_integer(kind) or pa.types.is_floating(kind))
+
+
+def read_columns(table: ColumnarTable, request: ReadChoice) -> RawLog:
+    """Read a table: ours, a user's, or one episode of a LeRobot file."""
+    part, numbers = "", table.episodes()
+    remarks: tuple[Remark, ...] = ()
+    if numbers.size or request.episode is not None:
+        number, part, remarks = episode_of(table.path, request, episodes_of(numbers))
+        table.keep(np.flatnonzero(numbers == number) if part else None)
+    raw = from_table(table, request)
+    told = table.told()
+    names = tuple(str(name) for name in told.get("joint_names") or ())
+    return replace(
+        raw,
+        wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(told.get("wrench_frame")),
+        joint_names=raw.joint_names or names,
+        robot_hint=raw.robot_hint or told.get("robot"),
+        part=part,
+        remarks=(*remarks, *raw.remarks),
+    )
+
+
+def episodes_of(numbers: Column) -> tuple[int, ...]:
+    """The numbers of a table's episodes, rising; one, 0, of a table that counts none."""
+    return tuple(int(number) for number in np.unique(numbers)) or (0,)
+
+
+class ParquetTable(ColumnarTable):
+    """A Parquet file."""
+
+    def _opened(self, file: LogFile) -> tuple[Any, int]:
+        import pyarrow.parquet as pq
+
         source = file.direct or BytesIO(file.content)
         self._direct = file.direct
         self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
-        about = self._file.metadata
-        return self._held_of(self._file.schema_arrow, int(about.num_rows), about.metadata)
+        return self._file.schema_arrow, int(self._file.metadata.num_rows)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
-        name = self._held.names[column]
+        name = self.names[column]
         batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
         first = next(iter(batches), None)
         return first.column(name)[0].as_py() if first is not None and first.num_rows else None
 
     def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
-        names = self._held.names
+        names = self.names
         return self._file.read(columns=[names[c] for c in columns], use_threads=False)
-
-    @property
-    def rows(self) -> int:
-        """How many rows it has."""
-        return self._held.rows
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Decode some columns as `load` does, some thousand rows at a time."""
-        pa = needed("pyarrow", "a Parquet file")
-        pq = needed("pyarrow.parquet", "a Parquet file")
+        import pyarrow as pa
+        import pyarrow.parquet as pq
 
         if self._rows is not None or self._direct is None:
             raise InOnePieceError
         names = self._names_of(columns)
         self._check_size(columns)
-        with self._guarded():
+        with guarded(self.path):
             # Read ahead, or as a mapped file, all of it would lie in memory; so would groups that
             # are asked for together.
             file = pq.ParquetFile(
@@ -71,77 +271,11 @@ class PyarrowParquet(PyarrowTable):
                     yield {c: self._column(table.column(names[c]), c, clock) for c in columns}
 
 
-class PolarsParquet(ColumnarTable):
-    """A Parquet file, decoded by polars: a damaged one may show its words, or end the process."""
-
-    def _opened(self, file: LogFile) -> HeldColumns:
-        import polars as pl
-
-        self._content = file.content
-        schema = pl.read_parquet_schema(BytesIO(self._content))
-        lists = tuple(isinstance(kind, pl.List | pl.Array) for kind in schema.values())
-        told = pl.read_parquet_metadata(BytesIO(self._content)).get("vftcli", "{}")
-        rows = pl.scan_parquet(BytesIO(self._content)).select(pl.len()).collect().item()
-        return HeldColumns(tuple(schema), lists, rows, told)
-
-    def _errors(self) -> tuple[type[BaseException], ...]:
-        from polars.exceptions import PanicException, PolarsError
-
-        return PolarsError, PanicException
-
-    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - a list
-        import polars as pl
-
-        name = self._held.names[column]
-        return pl.scan_parquet(BytesIO(self._content)).select(name).head(1).collect().item()
-
-    def _numbers(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        import polars as pl
-
-        names = [self._held.names[c] for c in columns]
-        table = pl.read_parquet(BytesIO(self._content), columns=names)
-        if self._rows is not None:
-            table = table[self._rows]
-        each = zip(columns, names, strict=True)
-        return {c: self._column(table[name], c, c == clock) for c, name in each}
-
-    def _column(self, values: Any, column: int, is_clock: bool) -> Column:  # noqa: ANN401 - polars
-        """A column as numbers, (T,) or (T, k); times become nanoseconds."""
-        import polars as pl
-
-        if column in self.lists:
-            return self._matrix(values, self.lists[column])
-        if isinstance(values.dtype, pl.Datetime | pl.Duration):
-            values = values.dt.cast_time_unit("ns").to_physical()
-        elif values.dtype == pl.Boolean:
-            values = values.cast(pl.UInt8)
-        elif not is_number(values.dtype):
-            raise LogError(f"{self.path}: column {values.name} holds {values.dtype}, not numbers.")
-        whole = is_clock and values.dtype.is_integer() and not values.null_count()
-        return np.asarray(values.to_numpy()).astype(np.int64 if whole else np.float64)
-
-    def _matrix(self, values: Any, length: int) -> Column:  # noqa: ANN401 - polars
-        """A column of lists of one length. (T, k)"""
-        import polars as pl
-
-        lists = values.arr.to_list() if isinstance(values.dtype, pl.Array) else values
-        if lists.null_count() or (lists.list.len() != length).any():
-            raise LogError(f"{self.path}: the lists of {values.name} are not all {length} long.")
-        if not is_number(lists.dtype.inner):
-            raise LogError(f"{self.path}: the lists of {values.name} hold {lists.dtype.inner}.")
-        numbers = np.empty((len(lists), length))
-        numbers[:] = lists.list.to_array(length).to_numpy() if length else 0.0
-        return numbers
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read a Parquet file."""
+    return read_columns(ParquetTable(file), request)
 
 
-def is_number(kind: Any) -> bool:  # noqa: ANN401 - a type of polars
-    """Whether a column holds numbers."""
-    return bool(kind.is_integer() or kind.is_float())
-
-
-PARQUET = Reader(
-    name="parquet",
-    recognises=lambda file: file.head.startswith(b"PAR1"),
-    read=lambda file, request: read_columns(parquet_table(file), request),
-    episodes=lambda file: episodes_of(parquet_table(file).episodes()),
-)
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of its episodes."""
+    return episodes_of(ParquetTable(file).episodes())

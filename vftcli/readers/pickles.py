@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.arrays_file import episodes_of_skills, read_dictionary
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.formats import LogFormat
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.signals.errors import LogError
 
 #: Numbers that a pickle of any size may build; a larger one as many as it has bytes.
@@ -237,7 +238,7 @@ def _check_opcodes(content: bytes) -> None:
             raise Refused("a memo larger than the file")
 
 
-def read_pickle(file: LogFile, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read a pickled dictionary of arrays: panda-py's get_log() or frankapy's trajectory."""
     log = load_arrays_only(file)
     if not isinstance(log, dict):
@@ -248,11 +249,6 @@ def read_pickle(file: LogFile, request: ReadChoice) -> RawLog:
     return read_dictionary(file, log, request)
 
 
-PICKLE = Reader(
-    name="pickle",
-    recognises=lambda file: (
-        file.head[:1] == b"\x80" and file.head[1:2] in {b"\2", b"\3", b"\4", b"\5"}
-    ),
-    read=read_pickle,
-    episodes=lambda file: episodes_of_skills(load_arrays_only(file)),
-)
+def episodes_in(file: LogFile) -> tuple[int, ...]:
+    """The numbers of the skills in frankapy's log, 0 alone elsewhere."""
+    return episodes_of_skills(load_arrays_only(file))

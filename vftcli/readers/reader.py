@@ -3,21 +3,20 @@
 import math
 import mmap
 import re
-import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
-from vftcli.readers.ahead import Ahead
+from vftcli.readers.columns import ColumnSpec, parse_columns
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.derivation import is_fast, with_velocity
-from vftcli.signals.errors import ParameterError
+from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.remarks import Remark, caution, warning
 from vftcli.signals.wrench import WrenchFrame
 
 
@@ -30,8 +29,6 @@ class LogFile:
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
     wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
-    #: Its table that is being parsed already, or None.
-    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     @property
     def is_folder(self) -> bool:
@@ -159,7 +156,7 @@ class ReadChoice:
         ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
-    #: Name of a format in `vftcli.readers.READERS`, None to recognise it by its content.
+    #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: str | None = None
     columns: str | None = None  #: The text of ``--columns``, or None.
     #: The signals that are wanted; None for all. Others may be left unread.
@@ -181,8 +178,6 @@ class ReadChoice:
     blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
     #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
-    #: A log that is being parsed already, or None.
-    ahead: Ahead | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if self.arm is not None:
@@ -225,6 +220,11 @@ class ReadChoice:
         )
 
     @property
+    def spec(self) -> ColumnSpec:
+        """What ``--columns`` says, of nothing where there is no such text."""
+        return parse_columns(self.columns) if self.columns is not None else ColumnSpec()
+
+    @property
     def whole(self) -> "ReadChoice":
         """The same without its interval and episode: a free run is a log of its own, read whole."""
         return replace(self, interval=None, episode=None, all_episodes=False)
@@ -257,34 +257,6 @@ class ReadChoice:
         return self.signals is None or signal in self.signals or signal in {"t", "q"}
 
 
-@dataclass(frozen=True, kw_only=True)
-class Reader:
-    """One log format."""
-
-    name: str  #: Name for ``--format``, and of its words in `formats.toml`.
-    #: Whether a file's content is of this format.
-    recognises: Callable[[LogFile], bool] = field(repr=False)
-    read: Callable[[LogFile, ReadChoice], RawLog] = field(repr=False)  #: Reads it.
-    general: bool = False  #: Whether it takes any table, and is asked only if no other format fits.
-    columns: bool = True  #: Whether the columns may be described by ``--columns``.
-    describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
-    #: The numbers of a file's episodes, None for a format that holds one recording.
-    episodes: Callable[[LogFile], Sequence[int]] | None = field(default=None, repr=False)
-    arms: bool = False  #: Whether a log may be of two arms.
-
-    @property
-    def words(self) -> Mapping[str, str]:
-        """What a user reads of it: title, recording (how to), takes (which signals), pitfalls."""
-        return format_words()[self.name]
-
-
-@cache
-def format_words() -> dict[str, dict[str, str]]:
-    """The words of every format, by its name."""
-    text = (Path(__file__).parent / "formats.toml").read_text(encoding="utf-8")
-    return tomllib.loads(text)
-
-
 def open_log(path: Path) -> LogFile:
     """Open a path for recognition: unwrap the head of a file, list a folder.
 
@@ -295,3 +267,46 @@ def open_log(path: Path) -> LogFile:
         return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
     head, wrapping = head_of(path)
     return LogFile(path=path, head=head, wrapping=wrapping)
+
+
+def episode_of(
+    path: Path | str, request: ReadChoice, numbers: Sequence[int]
+) -> tuple[int, str, tuple[Remark, ...]]:
+    """The episode that is read of those a file holds: the one asked for, else the first, and said.
+
+    Returns:
+        Its number, its name as a part ("" for the only one), and what is to be said of it.
+    """
+    number, count = request.episode, len(numbers)
+    if number is not None and number not in numbers:
+        there = f"{count} episodes, {numbers[0]} to {numbers[-1]}"
+        there = f"1 episode, {numbers[0]}" if count == 1 else there
+        raise LogError(f"{path}: no episode {number}; it holds {there} (--episode K|all).")
+    taken = numbers[0] if number is None else number
+    said = number is None and count > 1
+    code = "episode-taken" if taken == 0 else "episode-taken-first"
+    remarks = (caution(code, episode=taken, episodes=count),) if said else ()
+    return taken, f"episode {taken}" if count > 1 else "", remarks
+
+
+def arm_of(
+    path: Path | str, request: ReadChoice, arms: Sequence[str], told: str = ""
+) -> tuple[str, tuple[Remark, ...]]:
+    """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
+    if request.arm is not None and request.arm not in arms:
+        raise LogError(f"{path}: holds the {arms[0]} arm alone; leave --arm out.")
+    if request.arm is not None or len(arms) == 1:
+        return request.arm or arms[0], ()
+    if not request.examining:
+        where = f" ({told})" if told else ""
+        raise LogError(
+            f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
+        )
+    taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
+    return arms[0], (taken,)
+
+
+def refuse_arm(path: Path | str, request: ReadChoice) -> None:
+    """Refuse ``--arm`` for a log of one arm."""
+    if request.arm is not None:
+        raise LogError(f"{path}: a log of one arm; leave --arm out.")

@@ -7,23 +7,29 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from vftcli.readers.cleaning import RestartError, cleaned
+from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
+from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
-from vftcli.readers.parts import refuse_arm
 from vftcli.readers.reader import (
     InOnePieceError,
     LogFile,
     RawLog,
     ReadChoice,
-    Reader,
     open_log,
+    refuse_arm,
 )
-from vftcli.readers.registry import READERS, TEXTS_OF_MAKERS
-from vftcli.readers.rows import without_unknown_rows
-from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
-from vftcli.signals.names import EFFORTS
+from vftcli.signals.arrays import number_array
+from vftcli.signals.errors import (
+    LogError,
+    MissingSignalError,
+    ParameterError,
+    ShapeError,
+    UnknownFormatError,
+)
+from vftcli.signals.names import EFFORTS, JOINT_SIGNALS
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
@@ -46,7 +52,7 @@ def read(
 
     Args:
         path: A file, a bag folder or a dataset's folder.
-        format: Name of a format in READERS.
+        format: Name of a format in FORMATS.
         columns: Which columns hold which signals, in the grammar of ``--columns``.
         signals: Fields of Recording that are wanted; others may be left unread. None for all.
         label: What to call it in tables; its file's name if "".
@@ -73,15 +79,14 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
             f"{path}: --episode all is for commands that take several logs (compare, report, "
             "contacts, thresholds, identify); name one: --episode K"
         )
-    ahead = choice.ahead if choice.ahead is not None and choice.ahead.path == path else None
-    file = replace(open_log(path), ahead=ahead)
+    file = open_log(path)
     reader = _reader(file, choice.format, choice.columns)
-    if choice.episode is not None and reader.episodes is None:
+    if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     if not reader.arms:
         refuse_arm(path, choice)
-    digest = Digest((path,)) if ahead is None else ahead.digest
-    if "polars" not in sys.modules and reader.episodes is None:
+    digest = Digest((path,))
+    if "polars" not in sys.modules and not reader.episodes:
         digest.start()  # its import takes longer than the hash and leaves a core idle
 
     def found(choice: ReadChoice = choice) -> RawLog:
@@ -109,16 +114,16 @@ def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
     """The numbers of the episodes that a file holds, rising."""
     file = open_log(Path(path))
     reader = _reader(file, choice.format, choice.columns)
-    if reader.episodes is None:
+    if not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
-    return reader.episodes(file)
+    return reader.numbers(file)
 
 
 def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
     """Whether a file holds several episodes."""
     file = open_log(Path(path))
     reader = _reader(file, choice.format, choice.columns)
-    return reader.episodes is not None and len(reader.episodes(file)) > 1
+    return len(reader.numbers(file)) > 1
 
 
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
@@ -137,42 +142,39 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
-def recognise(path: str | Path, choice: ReadChoice | None = None) -> Reader:
-    """Return the reader that a path's content calls for, or that is chosen."""
+def recognise(path: str | Path, choice: ReadChoice | None = None) -> LogFormat:
+    """The format that a path's content calls for, or that is chosen."""
     choice = choice or ReadChoice()
     return _reader(open_log(Path(path)), choice.format, choice.columns)
 
 
-def _reader(file: LogFile, name: str | None, columns: str | None) -> Reader:
-    """The reader that is named, or that the content calls for."""
-    if name is not None and name not in READERS:
+def _reader(file: LogFile, name: str | None, columns: str | None) -> LogFormat:
+    """The format that is named, or that the content calls for."""
+    if name is not None and name not in FORMATS:
         raise UnknownFormatError(
-            f"no format {name!r}; known formats: {', '.join(READERS)}.{did_you_mean(name, READERS)}"
+            f"no format {name!r}; known formats: {', '.join(FORMATS)}.{did_you_mean(name, FORMATS)}"
         )
-    reader = READERS[name] if name else _recognise(file)
+    reader = FORMATS[name] if name else _recognise(file)
     if columns is None:
         return reader
-    if not reader.columns:
-        takers = ", ".join(r.name for r in READERS.values() if r.columns)
+    if not reader.takes_columns:
+        takers = ", ".join(r.name for r in FORMATS.values() if r.takes_columns)
         raise LogError(
             f"{file.path}: --columns does not apply to {reader.name}, whose signals are known. "
             f"It applies to {takers}."
         )
     whole = reader.general or reader.describes or not file.lines
-    return reader if whole else READERS["table"]
+    return reader if whole else FORMATS["table"]
 
 
-def _recognise(file: LogFile) -> Reader:
-    """The one reader that knows the content; a general one only where no other does."""
-    for name in TEXTS_OF_MAKERS:
-        if (reader := READERS[name]).recognises(file):
-            return reader
+def _recognise(file: LogFile) -> LogFormat:
+    """The one format that knows the content; a general one only where no other does."""
     from vftcli.readers.unrecognised import description, known_kind
 
-    # A general reader would take nearly any text, also that of a vendor: it is asked last.
-    found = [r for r in READERS.values() if not r.general and r.recognises(file)]
+    # A general format would take nearly any text, also that of a vendor: it is asked last.
+    found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
-        found = [r for r in READERS.values() if r.general and r.recognises(file)]
+        found = [r for r in FORMATS.values() if r.general and r.recognises(file)]
     if len(found) == 1:
         return found[0]
     if not found:
@@ -180,3 +182,35 @@ def _recognise(file: LogFile) -> Reader:
     raise UnknownFormatError(
         f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
     )
+
+
+def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Recording:
+    """Make a Recording of arrays: repeated stamps are dropped and counted, gaps are reported.
+
+    Args:
+        t: Stamps, not decreasing. (T,) [s]
+        name: What to call the recording in tables.
+        signals: Fields of `Recording` by name, at least ``q``: (T, n) in SI units.
+
+    Raises:
+        ShapeError: If a signal is no array of numbers with a row for each stamp.
+        MissingSignalError: If there is no ``q``, or a name is not a signal of a Recording.
+        LogError: If a signal holds NaN or infinity.
+        ClockError: If the clock runs backwards.
+    """
+    known = (*JOINT_SIGNALS, "wrench")
+    if unknown := [key for key in signals if key not in known]:
+        raise MissingSignalError(f"no signal {unknown[0]!r}; a recording has {', '.join(known)}")
+    if "q" not in signals:
+        raise MissingSignalError(
+            "a recording needs joint positions: give q=… of shape (T, n) [rad]"
+        )
+    arrays = {key: np.array(number_array(value, key, name)) for key, value in signals.items()}
+    for key, value in arrays.items():
+        if value.ndim != 2 or len(value) != np.size(t):
+            told = f"{key} of {name} has shape {value.shape}"
+            raise ShapeError(f"{told}; expected ({np.size(t)}, n), a row for each stamp of t")
+    raw = RawLog(
+        stamps=np.array(number_array(t, "t", name)), tick=1.0, clock="as given", signals=arrays
+    )
+    return cleaned(raw, Path(name), "arrays")

@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.readers.aliases import _clock, _wrench, filled_cells, grouped
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.parquet import parquet_table
+from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.picking import picked
 from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.readers.table import Pick, Picks, Table, listed, picks_of
@@ -55,7 +55,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
 def opened(file: LogFile) -> Table:
     """The file as a table."""
     if file.head.startswith(b"PAR1"):
-        return parquet_table(file)
+        return ParquetTable(file)
     if not file.lines:
         raise LogError(
             f"{file.path}: not a text table or Parquet file; a reference is one of them."
@@ -77,7 +77,7 @@ def as_given(table: Table, picks: Picks) -> Picks:
 
 def found(table: Table) -> Picks:
     """Find the clock, the torques and the wrench by their names."""
-    if table.names is None:
+    if not table.names:
         raise LogError(
             f"{table.path}: a table without a header. Say what its {table.width} columns are with "
             "--reference-columns, as in t,tau_ext:6."

@@ -1,18 +1,16 @@
 """Tables that ROS tools print of JointState messages: bagpy, rostopic echo -p, ros2 topic echo."""
 
 import ast
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from vftcli.readers.delimited import TextTable, as_number, split_cells
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.joints import laid_along
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
 
-#: How the header of a table by bagpy's message_by_topic begins.
-MESSAGE_START = ("Time", "header.seq", "header.stamp.secs", "header.stamp.nsecs")
 STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
 
 
@@ -38,7 +36,7 @@ class EchoTable(TextTable):
         return count if count and values >= count and values % count == 0 else 0
 
     @cached_property
-    def names(self) -> tuple[str, ...] | None:
+    def names(self) -> tuple[str, ...]:
         """The columns' names, as rostopic would print them."""
         fields = ("name", "position", "velocity", "effort")
         count, width = self.joints, self.width
@@ -54,7 +52,7 @@ class EchoTable(TextTable):
 
 def joint_names(table: TextTable) -> tuple[str, ...]:
     """The joints' names that the rows hold, in the order of the columns."""
-    names = table.names or ()
+    names = table.names
     columns = [k for k, name in enumerate(names) if name.removeprefix("field.")[:4] == "name"]
     found = [table.words(column) for column in columns]
     for words in found:
@@ -80,50 +78,13 @@ def listed_names(table: TextTable, text: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def read_table(table: TextTable, request: ReadChoice) -> RawLog:
+def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     """Read a printed JointState topic, its joints in the order of their names."""
+    table = EchoTable(file) if layout.name == "ros2-echo" else TextTable(file)
     return laid_along(from_table(table, request), joint_names(table), request)
 
 
-def header_cells(file: LogFile) -> Sequence[str]:
-    """The cells of a text file's first line, none of another file."""
-    return split_cells(file.first_line.decode("utf-8", "replace"), ",") if file.lines else ()
-
-
-def is_bagpy(file: LogFile) -> bool:
-    """Whether a file is bagpy's table of a JointState topic."""
-    cells = header_cells(file)
-    return tuple(cells[:4]) == MESSAGE_START and "name" in cells and "position_0" in cells
-
-
-def is_rostopic(file: LogFile) -> bool:
-    """Whether a file was printed by ``rostopic echo -p`` of a JointState topic."""
-    cells = header_cells(file)
-    return cells[:1] == ["%time"] and "field.name0" in cells and "field.position0" in cells
-
-
-def is_echo(file: LogFile) -> bool:
+def recognises(file: LogFile, _: LogFormat) -> bool:
     """Whether a file was printed by ``ros2 topic echo --csv`` of a JointState topic."""
-    return len(header_cells(file)) > STAMP and EchoTable(file).joints > 0
-
-
-BAGPY = Reader(
-    name="bagpy",
-    recognises=is_bagpy,
-    read=lambda file, request: read_table(TextTable(file), request),
-    describes=True,
-)
-
-ROSTOPIC = Reader(
-    name="rostopic",
-    recognises=is_rostopic,
-    read=lambda file, request: read_table(TextTable(file), request),
-    describes=True,
-)
-
-ROS2_ECHO = Reader(
-    name="ros2-echo",
-    recognises=is_echo,
-    read=lambda file, request: read_table(EchoTable(file), request),
-    describes=True,
-)
+    cells = split_cells(file.first_line.decode("utf-8", "replace"), ",")
+    return len(cells) > STAMP and EchoTable(file).joints > 0

@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.picking import picked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.rtde_names import CLOCK, JOINT_COLUMNS, PAYLOAD
-from vftcli.readers.table import Cell, Pick, Picks, Table, checked
+from vftcli.readers.formats import FORMATS, LogFormat
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.tables import read_layout
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
-CLOCK_WORDS = "controller clock (timestamp, seconds since power-on)"
+#: The payload that the controller was told of; its last value counts.
+PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
 E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
@@ -31,33 +31,11 @@ BINARY_TYPES = {
 }
 
 
-def read_rtde(table: Table, request: ReadChoice) -> RawLog:
-    """Read a table of RTDE names: timestamp and positions are required, the rest is optional."""
-    names = table.names or ()
-    if CLOCK not in names:
-        raise LogError(
-            f"{table.path}: no timestamp among {len(names)} columns. Record it, or state the rate: "
-            "--format table --columns 't@125Hz,q=actual_q_{i},dq=actual_qd_{i},"
-            "current=actual_current_{i}'."
-        )
-    position = {name: column for column, name in reversed(list(enumerate(names)))}
-    signals = tuple(
-        Pick(signal=signal, cells=tuple(Cell(position[f"{name}_{j}"]) for j in range(6)))
-        for signal, name in JOINT_COLUMNS.items()
-        if all(f"{name}_{j}" in position for j in range(6))
-    )
-    picks = Picks(
-        signals=signals,
-        clock=Pick(signal="t", cells=(Cell(names.index(CLOCK)),), unit="s"),
-        constants=tuple(names.index(name) for name in PAYLOAD if name in names),
-    )
-    if not any(pick.signal == "q" for pick in signals):
-        raise LogError(
-            f"{table.path}: no actual_q_0 … actual_q_5 among its {len(names)} columns. Add "
-            "actual_q to the recipe and record again."
-        )
-    raw = picked(table, checked(table, picks), request, clock_name=CLOCK_WORDS)
-    raw = replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
+def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
+    """Read a table of RTDE names."""
+    table = BinaryTable(file) if layout.name == "ur-binary" else TextTable(file)
+    raw = read_layout(table, FORMATS["ur-csv"], request, PAYLOAD)
+    raw = replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
     return raw.told_payload(raw.constants)
 
 
@@ -86,7 +64,7 @@ class BinaryTable:
         self.path = file.path
         self.lists: dict[int, int] = {}
         names, types, start = binary_header(file)
-        self.names: tuple[str, ...] | None = names
+        self.names = names
         self.width = len(names)
         fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
         self._record = np.dtype(fields)
@@ -122,36 +100,3 @@ def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
     if unknown := set(types) - set(BINARY_TYPES):
         raise LogError(f"{file.path}: unknown column type {unknown.pop()!r} in the second line.")
     return names, types, len(first) + len(second) + 2
-
-
-def has_rtde_names(file: LogFile, separator: bytes) -> bool:
-    """Whether the header has RTDE names, so separated."""
-    names = {cell.strip() for cell in file.first_line.split(separator)}
-    return bool(names & {b"actual_q_0", b"target_q_0"})
-
-
-def is_binary(file: LogFile) -> bool:
-    """Whether the second line consists of RTDE type words."""
-    first, _, rest = file.head[: 1 << 17].partition(b"\n")
-    words = set(rest.partition(b"\n")[0].split())
-    return bool(words) and words <= set(BINARY_TYPES) and len(first) > 0
-
-
-OFFICIAL = Reader(
-    name="ur-csv",
-    recognises=lambda file: not is_binary(file) and has_rtde_names(file, b" "),
-    read=lambda file, request: read_rtde(TextTable(file), request),
-)
-
-BINARY = Reader(
-    name="ur-binary",
-    recognises=is_binary,
-    read=lambda file, request: read_rtde(BinaryTable(file), request),
-    columns=False,
-)
-
-UR_RTDE = Reader(
-    name="ur-rtde",
-    recognises=lambda file: has_rtde_names(file, b","),
-    read=lambda file, request: read_rtde(TextTable(file), request),
-)

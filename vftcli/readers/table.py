@@ -27,8 +27,8 @@ class Table(Protocol):
         """What messages call the table: the file, and in a bag the topic."""
 
     @property
-    def names(self) -> tuple[str, ...] | None:
-        """Column names, or None for a headerless table."""
+    def names(self) -> tuple[str, ...]:
+        """Column names, none for a headerless table."""
 
     @property
     def width(self) -> int:
@@ -106,7 +106,7 @@ def picks_of(
 ) -> Picks:
     """The columns that a --columns text means; `check` replaces the check for signals."""
     if spec.named:
-        if table.names is None:
+        if not table.names:
             raise LogError(
                 f"{table.path}: the table has no header, so --columns must count its "
                 f"{table.width} columns in file order, as in t,q:6,dq:6,current:6."
@@ -131,8 +131,9 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
             else [Cell(column)]
         )
     ]
-    if spec.width != len(cells):
-        missing = len(cells) - spec.width
+    missing = len(cells) - spec.width
+    rest = any(item.count == 0 for item in spec.items)
+    if missing < 0 or (missing and not rest):
         remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
         raise LogError(
             f"{table.path}: --columns describes {spec.width} columns, the table has "
@@ -142,8 +143,9 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     for item in spec.items:
         if item.rate is not None:
             continue
-        picks.append(pick_of(item, tuple(cells[start : start + item.count])))
-        start += item.count
+        count = item.count or missing
+        picks.append(pick_of(item, tuple(cells[start : start + count])))
+        start += count
     return picks
 
 
@@ -163,7 +165,7 @@ def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
 def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     """The cells that a pattern names, in the order of its indices."""
     pattern = item.pattern or ""
-    names = table.names or ()
+    names = table.names
     if "|" in pattern:
         return tuple(c for part in pattern.split("|") for c in _exact(table, item, part.strip()))
     if "{i}" not in pattern:
@@ -173,7 +175,7 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     )
     found = {
         int(match[1]): column
-        for column, name in enumerate(names)
+        for column, name in reversed(list(enumerate(names)))  # of two of one name the first
         if (match := template.fullmatch(name))
     }
     if not found:
@@ -191,7 +193,7 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
 
 def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
     """The cells of one column by its name, or of some elements of its lists: name[0:7], -name."""
-    names = table.names or ()
+    names = table.names
     if name not in names and name.startswith("-"):
         return tuple(cell._replace(turned=True) for cell in _exact(table, item, name[1:]))
     bare, elements = name, slice(None)
@@ -224,7 +226,7 @@ def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
 def missing_column(table: Table, signal: str, name: str) -> LogError:
     """The error for a column that is not there, listing what is."""
     return LogError(
-        f"{table.path}: no column {name!r} for {signal}; the table has {listed(table.names or ())}."
+        f"{table.path}: no column {name!r} for {signal}; the table has {listed(table.names)}."
     )
 
 
@@ -240,7 +242,7 @@ def checked(table: Table, picks: Picks) -> Picks:
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:
         there = listed(table.names) if table.names else f"{table.width} columns without names"
-        if any(JACOBIAN.match(name) for name in table.names or ()):
+        if any(JACOBIAN.match(name) for name in table.names):
             raise JacobianError(
                 f"{table.path}: no joint positions (q), but a vendor's estimate beside its "
                 "Jacobian: no observer can run on that. The vendor's wrench, pinv(Jᵀ) tau_ext, is "

@@ -2,7 +2,7 @@
 
 import math
 import tokenize
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -11,14 +11,15 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import picks_by_alias
+from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, table_clock
 from vftcli.readers.columns import ColumnSpec, Item, parse_columns
 from vftcli.readers.delimited import TextTable, as_number
+from vftcli.readers.formats import LogFormat
 from vftcli.readers.headless import guessed
 from vftcli.readers.joints import robot_of
 from vftcli.readers.picking import picked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, Reader
-from vftcli.readers.table import Column, Table, missing_column, picks_of
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.table import Cell, Column, Table, missing_column, named_cells, picks_of
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
@@ -38,21 +39,19 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     Raises:
         LogError: If the columns cannot be told.
     """
-    spec = parse_columns(request.columns) if request.columns is not None else None
-    if spec is not None:
-        more["segment"] = spec.segment
-    items = spec.items if spec is not None else ()
-    stated = spec is not None and (item := spec.item("q")) is not None and item.unit is not None
-    if spec is not None and items and (table.names is None or not spec.named):
+    spec = request.spec
+    more["segment"] = spec.segment
+    stated = (item := spec.item("q")) is not None and item.unit is not None
+    if spec.items and (not table.names or not spec.named):
         return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
-    if table.names is None and table.width == 1:
+    if not table.names and table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
             "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
         )
-    if table.names is None:
+    if not table.names:
         return read_by_values(table, request, **more)
-    picks, joints = picks_by_alias(table, items)
+    picks, joints = picks_by_alias(table, spec.items)
     return picked(
         table,
         picks,
@@ -64,25 +63,65 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
     )
 
 
-def states_positions(request: ReadChoice) -> bool:
-    """Whether a --columns text says which columns the positions are."""
-    return request.columns is not None and parse_columns(request.columns).item("q") is not None
+def read_layout(
+    table: Table,
+    layout: LogFormat,
+    request: ReadChoice,
+    constants: Sequence[str] = (),
+    **more: Any,  # noqa: ANN401
+) -> RawLog:
+    """Read a table by the columns of its format; what it has not of them is left out.
+
+    Args:
+        table: The table.
+        layout: Its format.
+        request: What is wanted.
+        constants: Names of columns of which the last value counts.
+        more: Further fields of the RawLog.
+
+    Raises:
+        LogError: If it has no clock or no positions.
+    """
+    spec = parse_columns(layout.columns)
+    if spec.named:
+        spec = replace(spec, items=tuple(known_items(table, layout, spec)))
+    picks, names = picks_of(table, spec), table.names
+    # Of the vendors' signals libfranka's residual alone is turned.
+    signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
+    places = tuple(names.index(name) for name in constants if name in names)
+    picks = replace(picks, signals=tuple(signals), constants=places)
+    return picked(table, picks, request, clock_name=layout.clock, **more)
+
+
+def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
+    """The items of a layout of which a table has all columns, a joint each."""
+    names = table.names
+    for item in spec.items:
+        cells: tuple[Cell, ...] = ()
+        with suppress(LogError):
+            cells = named_cells(table, item)
+        if item.signal == "t" and cells:
+            table_clock(table, cells[0].column)
+        wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
+        if len(cells) == wanted if wanted else len(cells) > 1:
+            yield item
+        elif item.signal in {"t", "q"}:
+            raise LogError(
+                f"{table.path}: no {item.pattern} among its {len(names)} columns. {layout.remedy}"
+            )
 
 
 def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
     """Read a table whose columns are known, but for what a --columns text says of them."""
-    known = parse_columns(usual)
-    stated = parse_columns(request.columns) if request.columns is not None else None
-    if stated is not None and stated.items and not stated.named:
+    stated = request.spec
+    if stated.items and not stated.named:
         return from_table(table, request, **more)
-    items = {item.signal: item for item in known.items}
-    if stated is not None and stated.item("q") is not None:
+    items = {item.signal: item for item in parse_columns(usual).items}
+    if stated.item("q") is not None:
         items = {signal: item for signal, item in items.items() if signal == "t"}
-    for item in stated.items if stated is not None else ():
+    for item in stated.items:
         items[item.signal] = restated(table, item, items.get(item.signal))
-    spec = ColumnSpec(
-        items=tuple(items.values()), named=True, segment=stated.segment if stated else None
-    )
+    spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
     return picked(table, picks_of(table, spec), request, **more)
@@ -136,9 +175,9 @@ class ArrayTable:
         self.lists = {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
     @property
-    def names(self) -> tuple[str, ...] | None:
-        """The columns' names, or None if the file has none."""
-        return tuple(self.columns) if self.headed else None
+    def names(self) -> tuple[str, ...]:
+        """The columns' names, none if the file has none."""
+        return tuple(self.columns) if self.headed else ()
 
     @property
     def width(self) -> int:
@@ -209,10 +248,13 @@ def check_npy_header(file: LogFile, size: int) -> None:
         )
 
 
-def is_headed(file: LogFile) -> bool:
-    """Whether a text file starts with a line of column names, and then one of mostly numbers."""
-    if not file.lines or (table := TextTable(file)).names is None:
+def recognises(file: LogFile, layout: LogFormat) -> bool:
+    """Whether a text is a table without a header, or a line of names above mostly numbers."""
+    if not file.lines:
         return False
+    table = TextTable(file)
+    if layout.name == "headerless" or not table.names:
+        return layout.name == "headerless" and not table.names
     if len(table.sample) < 2:
         return table.width > 1
     cells = table.cells(table.sample[1])
@@ -220,18 +262,10 @@ def is_headed(file: LogFile) -> bool:
     return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
 
 
-HEADED = Reader(
-    name="table",
-    recognises=is_headed,
-    read=lambda file, request: from_table(TextTable(file), request),
-    general=True,
-)
-
-HEADERLESS = Reader(
-    name="headerless",
-    recognises=lambda file: bool(file.lines) and TextTable(file).names is None,
-    read=lambda file, request: from_table(TextTable(file), request),
-    general=True,
-)
-
-NPY = Reader(name="npy", recognises=lambda file: file.head.startswith(b"\x93NUMPY"), read=read_npy)
+def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
+    """Read a table of text by its layout, --columns or aliases, or an .npy file."""
+    if layout.name == "npy":
+        return read_npy(file, request)
+    if layout.columns:
+        return read_layout(TextTable(file), layout, request)
+    return from_table(TextTable(file), request)

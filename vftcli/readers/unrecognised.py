@@ -4,7 +4,6 @@ import re
 import shlex
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 from vftcli.readers.opening import HEAD_BYTES
 from vftcli.readers.reader import LogFile
@@ -18,49 +17,39 @@ LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag
 SHOWN = 4
 
 
-class FileKind(NamedTuple):
-    """A kind of file that is no log."""
-
-    begins: re.Pattern[bytes]  #: How its content begins.
-    told: str  #: What it is, and what to do.
-
-
-#: Kinds of files that users give by mistake, by their first bytes.
-KINDS = tuple(
-    FileKind(re.compile(begins, re.DOTALL), told)
-    for begins, told in (
-        (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
-        (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
-        (rb"%PDF", "a PDF; give the log it tells of"),
-        (rb"RIFF....WAVE|ID3|OggS|fLaC", "a sound; give the log that was recorded with it"),
-        (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
-        (rb"\x7fELF|MZ[^\r\n]{0,60}\0", "a program; give the log that it wrote"),
-        (
-            rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
-            "a robot's description, no log; give it with --robot, beside a log",
-        ),
-        (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log it tells of"),
-        (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
-        (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
-        (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
-        (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
-        (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
-        (
-            rb"(#[^\n]*\n|\s)*(\[\[?[\w.-]+\]\]?\s*\n|[\w-]+\s*=\s*\"|schema\s*=)",
-            "a TOML file; a robot file goes to --robot, one of options to --config",
-        ),
-        (
-            rb"(#[^\n]*\n|---\s)*[A-Za-z_]\w*:( [^\n,;\t]*)?\r?\n(\s*-?\s*[A-Za-z_]\w*:|- )",
-            "a text in YAML; what rostopic or ros2 topic echo printed is read with their options "
-            "-p and --csv, a recorded bag as it is",
-        ),
-        (
-            rb"\s*(%[^\n]*\n\s*)*\\(documentclass|documentstyle|begin|input|section)\b",
-            "a LaTeX text; give the log that its numbers are from",
-        ),
-        (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself: git lfs pull"),
-        (rb"\xd0\xcf\x11\xe0", "an old Office document; save the sheet as CSV and give that"),
-    )
+#: How files begin that users give by mistake → what they are, and what to do.
+KINDS = (
+    (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
+    (rb"....ftyp|\x1aE\xdf\xa3|RIFF....AVI", "a video; give the log that was recorded with it"),
+    (rb"%PDF", "a PDF; give the log it tells of"),
+    (rb"RIFF....WAVE|ID3|OggS|fLaC", "a sound; give the log that was recorded with it"),
+    (rb"RRF2|RRIO", "a Rerun recording, which vftcli writes and does not read; give the log"),
+    (rb"\x7fELF|MZ[^\r\n]{0,60}\0", "a program; give the log that it wrote"),
+    (
+        rb"\s*(<\?xml[^>]*>\s*)?(<!--.*?-->\s*)*<(robot|mujoco|sdf)\b",
+        "a robot's description, no log; give it with --robot, beside a log",
+    ),
+    (rb"\s*<(!DOCTYPE|html|svg|\?xml)", "a page or document in XML; give the log it tells of"),
+    (rb"ULog\x01\x12\x35", "a PX4 ULog of a drone, which has no arm to estimate torques of"),
+    (rb"PK\x03\x04", "a zip archive; unpack it and give the log inside"),
+    (rb"(7z\xbc\xaf|Rar!|BZh|\xfd7zXZ)", "an archive; unpack it and give the log inside"),
+    (rb".{257}ustar", "a tar archive; unpack it and give the log inside"),
+    (rb"\xff\xfe|\xfe\xff", "a text in UTF-16; save it as UTF-8 (plain CSV)"),
+    (
+        rb"(#[^\n]*\n|\s)*(\[\[?[\w.-]+\]\]?\s*\n|[\w-]+\s*=\s*\"|schema\s*=)",
+        "a TOML file; a robot file goes to --robot, one of options to --config",
+    ),
+    (
+        rb"(#[^\n]*\n|---\s)*[A-Za-z_]\w*:( [^\n,;\t]*)?\r?\n(\s*-?\s*[A-Za-z_]\w*:|- )",
+        "a text in YAML; what rostopic or ros2 topic echo printed is read with their options "
+        "-p and --csv, a recorded bag as it is",
+    ),
+    (
+        rb"\s*(%[^\n]*\n\s*)*\\(documentclass|documentstyle|begin|input|section)\b",
+        "a LaTeX text; give the log that its numbers are from",
+    ),
+    (rb"version https://git-lfs", "a pointer of Git LFS; fetch the file itself: git lfs pull"),
+    (rb"\xd0\xcf\x11\xe0", "an old Office document; save the sheet as CSV and give that"),
 )
 #: File inside a zip archive → what the archive is.
 OFFICE = {
@@ -96,7 +85,7 @@ def known_kind(file: LogFile) -> str | None:
         for name, told in OFFICE.items():
             if name in end:
                 return told
-    return next((kind.told for kind in KINDS if kind.begins.match(file.head)), None)
+    return next((told for begins, told in KINDS if re.match(begins, file.head, re.DOTALL)), None)
 
 
 def of_folder(path: Path, entries: Sequence[str]) -> str:

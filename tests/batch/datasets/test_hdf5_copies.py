@@ -15,16 +15,16 @@ TORQUE = ForceColumn("external_torque", ("a", "b"), {"units": "N·m", "causal": 
 VALID = ForceColumn("external_torque_valid", (), {})
 
 
-def robomimic(path: Path) -> Path:
+def aloha(path: Path) -> Path:
     with h5py.File(path, "w") as content:
         for k in (0, 1):
-            content[f"data/demo_{k}/obs/robot0_joint_pos"] = np.zeros((5 + k, 7))
+            content[f"data/demo_{k}/observations/qpos"] = np.zeros((5 + k, 7))
         content.attrs["mine"] = "kept"
     return path
 
 
 def test_each_episode_gets_its_own(tmp_path: Path) -> None:
-    path = robomimic(tmp_path / "set.hdf5")
+    path = aloha(tmp_path / "set.hdf5")
     before = path.read_bytes()
     dataset = open_dataset(path)
     (file,) = dataset.files()
@@ -40,14 +40,14 @@ def test_each_episode_gets_its_own(tmp_path: Path) -> None:
     dataset.write(file, [TORQUE, VALID], forces, tmp_path / "out.hdf5")
     assert path.read_bytes() == before
     with h5py.File(tmp_path / "out.hdf5") as content:
-        data = content["data/demo_1/obs/external_torque"]
+        data = content["data/demo_1/observations/external_torque"]
         assert (data.shape, data.dtype) == ((6, 2), np.float32)
         assert (data.attrs["units"], bool(data.attrs["causal"])) == ("N·m", True)
         assert data.attrs["names"].tolist() == ["a", "b"]
-        assert content["data/demo_0/obs/external_torque_valid"].shape == (5,)
+        assert content["data/demo_0/observations/external_torque_valid"].shape == (5,)
         assert content.attrs["mine"] == "kept"
     again = open_dataset(tmp_path / "out.hdf5")
-    with pytest.raises(LogError, match="has data/demo_0/obs/external_torque already"):
+    with pytest.raises(LogError, match="has data/demo_0/observations/external_torque already"):
         again.check_new(next(iter(again.files())), [TORQUE])
 
 

@@ -5,8 +5,7 @@ from pathlib import Path
 from vftcli.batch.datasets.episodes import Dataset
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset
-from vftcli.readers.hdf5 import is_hdf5
-from vftcli.readers.lerobot import LEROBOT
+from vftcli.readers import FORMATS
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
@@ -22,9 +21,9 @@ def open_dataset(path: Path, columns: str | None = None) -> Dataset:
         LogError: If it is none that forces can be written into.
     """
     file = open_log(path)
-    if LEROBOT.recognises(file):
+    if FORMATS["lerobot"].recognises(file):
         return LeRobotDataset(path)
-    if path.is_file() and is_hdf5(file.head):
+    if FORMATS["hdf5"].recognises(file):
         return Hdf5Dataset(path.parent, path, columns)
     if path.is_dir() and files_below(path):
         return Hdf5Dataset(path, None, columns)

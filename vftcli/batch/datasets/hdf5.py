@@ -21,7 +21,7 @@ def files_below(folder: Path) -> list[Path]:
 
 
 class Hdf5Dataset:
-    """HDF5 files of one episode or many: DROID's, ALOHA's, robomimic's, any.
+    """HDF5 files of one episode or many: DROID's, ALOHA's, any.
 
     Args:
         folder: The folder in which they are, at any depth.

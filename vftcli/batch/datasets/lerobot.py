@@ -9,8 +9,8 @@ import numpy as np
 
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes, Statistics
 from vftcli.batch.datasets.statistics import KEYS, pooled
-from vftcli.readers.columnar import EPISODE, guarded
 from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
+from vftcli.readers.parquet import EPISODE, guarded
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 
@@ -44,10 +44,10 @@ class LeRobotDataset:
 
     def frames(self, file: DataFile, number: int) -> int:
         """How many frames an episode has."""
-        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+        pq = needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path, (pa.ArrowException,)):
+        with guarded(path):
             source = pq.ParquetFile(path)
             if EPISODE not in source.schema_arrow.names:
                 return int(source.metadata.num_rows)
@@ -60,10 +60,10 @@ class LeRobotDataset:
         Raises:
             LogError: If it has.
         """
-        pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
+        pq = needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path, (pa.ArrowException,)):
+        with guarded(path):
             there = {
                 *pq.read_schema(path).names,
                 *named_features(self.folder, info_of(self.folder)),
@@ -85,7 +85,7 @@ class LeRobotDataset:
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
-        with guarded(path, (pa.ArrowException,)):
+        with guarded(path):
             source = pq.ParquetFile(path)
             numbers = None
             if EPISODE in source.schema_arrow.names:
@@ -99,7 +99,7 @@ class LeRobotDataset:
         first = 0
         with pq.ParquetWriter(target, schema, compression=codec) as writer:
             for group in range(source.num_row_groups):
-                with guarded(path, (pa.ArrowException,)):
+                with guarded(path):
                     table = source.read_row_group(group)
                 rows = slice(first, first + table.num_rows)
                 first = rows.stop
@@ -155,7 +155,7 @@ class LeRobotDataset:
         """Write a table of episodes with the statistics of the columns, where it has those."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
-        with guarded(path, (pa.ArrowException,)):
+        with guarded(path):
             source = pq.ParquetFile(path)
             table = source.read()
         parts = [name.split("/") for name in table.column_names if name.startswith("stats/")]

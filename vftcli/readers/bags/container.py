@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.opening import UNPACKED_LIMIT, UNPACKED_RATIO
+from vftcli.readers.opening import check_unpacked
 from vftcli.readers.reader import LogFile
 from vftcli.signals import letters
 from vftcli.signals.errors import LogError
@@ -160,12 +160,7 @@ class Ingest:
     def claim(self, size: int) -> None:
         """Count bytes that are about to be unpacked."""
         self.unpacked += size
-        limit = max(UNPACKED_LIMIT, UNPACKED_RATIO * self.size)
-        if size < 0 or self.unpacked > limit:
-            raise LogError(
-                f"{self.path}: its chunks claim to unpack to more than {limit >> 20} MiB, more "
-                "than a log of this size can hold. It is damaged or made to fill memory."
-            )
+        check_unpacked(self.path, self.unpacked if size >= 0 else size, self.size)
 
     def note(self, remark: Remark) -> None:
         """Remember a remark once."""

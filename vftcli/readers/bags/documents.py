@@ -2,31 +2,122 @@
 
 import json
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.bags.decode import Stream
-from vftcli.readers.bags.json_messages import message_streams
-from vftcli.readers.columns import parse_columns
-from vftcli.readers.joints import laid_along
+from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
+from vftcli.readers.joints import in_order, kinematic_order, laid_along
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
+
+JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
+
+#: Names of a document's stamp, and of the seconds and nanoseconds in it.
+STAMPS = ("header.stamp", "timestamp", "stamp")
+SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "nanosec")
+Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
+
+
+def message_streams(
+    channel: Channel, rows: Sequence[Document], times: Sequence[int]
+) -> Iterator[Stream]:
+    """The streams of a channel whose documents are JointState or WrenchStamped messages.
+
+    Nothing where a document is something else, or its stamp no whole seconds and nanoseconds.
+    """
+    if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
+        yield from _stream(channel, WRENCH, rows, times, ())
+        return
+    if not all(is_joint_state(row) for row in rows):
+        return
+    by_names: dict[tuple[str, ...], list[int]] = {}
+    for k, row in enumerate(rows):
+        by_names.setdefault(tuple(row["name"]), []).append(k)
+    for names, at in by_names.items():
+        own, stamps = [rows[k] for k in at], [times[k] for k in at]
+        yield from _stream(channel, JOINT_STATE, own, stamps, names)
+
+
+def is_joint_state(row: Document) -> bool:
+    """Whether a document has joints' names and a position for each."""
+    names, positions = row.get("name"), row.get("position")
+    if not isinstance(names, list) or not isinstance(positions, list):
+        return False
+    return len(names) == len(positions) > 0 and all(isinstance(name, str) for name in names)
+
+
+def _stream(
+    channel: Channel,
+    kind: str,
+    rows: Sequence[Document],
+    times: Sequence[int],
+    names: tuple[str, ...],
+) -> Iterator[Stream]:
+    """One stream, none where its numbers or stamps are not what they should be."""
+    stamps = [stamp_of(row) for row in rows]
+    header = None
+    if any(stamp is not None for stamp in stamps):
+        if not all(stamp is not None for stamp in stamps):
+            return
+        header = np.array(stamps, dtype=np.int64)
+    elif any(key.startswith(STAMPS) for key in rows[0]):
+        return
+    signals = {}
+    order = kinematic_order(names)
+    for signal, paths in KINDS[kind].signals.items():
+        keys = [f"wrench.{path}" for path in VECTORS] if signal == "wrench" else paths
+        values = matrix(rows, keys, len(names) if names else len(VECTORS))
+        if values is not None:
+            signals[signal] = in_order(values, order, len(names)) if names else values
+    if "q" in signals or "wrench" in signals:
+        yield Stream(
+            channel=replace(channel, type=kind),
+            kind=KINDS[kind],
+            names=tuple(names[k] for k in order),
+            mixed=bool(names) and order != tuple(range(len(names))),
+            frame=str(rows[0].get("header.frame_id", "")),
+            receive=np.array(times, dtype=np.int64),
+            header=header,
+            robot=None,
+            signals=signals,
+            constants={},
+        )
+
+
+def matrix(rows: Sequence[Document], keys: Sequence[str], width: int) -> Array | None:
+    """The numbers at some paths of all documents, None where one has not as many. (T, width)"""
+    try:
+        found = [np.hstack([row[key] for key in keys]) for row in rows]
+        values = np.array(found, dtype=np.float64)
+    except (KeyError, ValueError, TypeError, OverflowError):
+        return None
+    return values if values.shape == (len(rows), width) else None
+
+
+def stamp_of(row: Document) -> int | None:
+    """A document's own stamp, None without whole seconds and nanoseconds. [ns]"""
+    for base, sec, nsec in product(STAMPS, SECONDS, NANOSECONDS):
+        whole, rest = row.get(f"{base}.{sec}"), row.get(f"{base}.{nsec}")
+        if not isinstance(whole, int) or not isinstance(rest, int):
+            continue
+        if abs(whole) < 9e9 and abs(rest) < 1e10:
+            return whole * 10**9 + rest
+    return None
+
 
 FOXGLOVE = "foxglove.JointStates"
 MAX_BYTES = 1 << 20
 MAX_DEPTH = 8
 MAX_VALUES = 4096
-
-
-class DocumentError(ValueError):
-    """A message is not the document it claims to be."""
 
 
 class Documents:
@@ -48,19 +139,18 @@ class Documents:
         for offset, length, time in zip(batch.offsets, batch.lengths, batch.times, strict=True):
             message = batch.buffer[offset : offset + length].tobytes()
             try:
-                rows.append(flattened(_document(message, json_like=json_like)))
-            except DocumentError as error:
+                rows.append(flattened(message, json_like=json_like))
+            except (ValueError, RecursionError) as error:
                 raise LogError(
                     f"{self.ingest.path}: message {len(rows) + 1} of {channel.topic} is damaged "
-                    f"({error})"
+                    f"({str(error)[:60]})"
                 ) from None
             times.append(int(time))
         return True
 
     def streams(self, request: ReadChoice) -> list[Stream]:
         """The channels that hold ROS messages, unless --columns speaks of other fields."""
-        items = parse_columns(request.columns).items if request.columns is not None else ()
-        fields = {(item.pattern or "").rpartition(".")[2] for item in items}
+        fields = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
         if not fields <= {"", "position", "velocity", "effort"}:
             return []
         found = (
@@ -69,18 +159,6 @@ class Documents:
             for stream in message_streams(channel, rows, self.times[channel])
         )
         return list(found)
-
-
-def _document(message: bytes, *, json_like: bool) -> Any:  # noqa: ANN401
-    """A message in JSON, or of JointStates."""
-    if len(message) > MAX_BYTES:
-        raise DocumentError("longer than any message of joints")
-    if not json_like:
-        return joint_states(message)
-    try:
-        return json.loads(message)
-    except (ValueError, RecursionError) as error:
-        raise DocumentError(str(error)[:60]) from None
 
 
 def joint_states(message: bytes) -> dict[str, Any]:
@@ -121,7 +199,7 @@ def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
             _varint(message, position) if kind == 2 else ({1: 8, 5: 4}.get(kind, -1), position)
         )
         if size < 0 or position + size > len(message):
-            raise DocumentError("a field ends outside its message")
+            raise ValueError("a field ends outside its message")
         raw = message[position : position + size]
         position += size
         yield key >> 3, raw if kind == 2 else struct.unpack("<d" if kind == 1 else "<f", raw)[0]
@@ -132,7 +210,7 @@ def _varint(message: bytes, position: int) -> tuple[int, int]:
     value = shift = 0
     while True:
         if position >= len(message) or shift > 63:
-            raise DocumentError("a number ends outside its message")
+            raise ValueError("a number ends outside its message")
         byte = message[position]
         value |= (byte & 127) << shift
         position, shift = position + 1, shift + 7
@@ -140,10 +218,13 @@ def _varint(message: bytes, position: int) -> tuple[int, int]:
             return value, position
 
 
-def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
+def flattened(message: bytes, *, json_like: bool) -> dict[str, Any]:
     """A document as dotted paths; joints given one object each become lists by field."""
+    if len(message) > MAX_BYTES:
+        raise ValueError("longer than any message of joints")
+    document = json.loads(message) if json_like else joint_states(message)
     if not isinstance(document, dict):
-        raise DocumentError("not an object")
+        raise ValueError("not an object")  # noqa: TRY004 - damage, as what json finds
     flat: dict[str, Any] = {}
     _flatten(document, "", flat, 0)
     return flat
@@ -152,7 +233,7 @@ def flattened(document: Any) -> dict[str, Any]:  # noqa: ANN401
 def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
     """Put the values below a path into the flat document."""
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
-        raise DocumentError("nested or long beyond any message of joints")
+        raise ValueError("nested or long beyond any message of joints")
     if isinstance(value, dict):
         for key, inner in value.items():
             _flatten(inner, f"{path}.{key}" if path else str(key), flat, depth + 1)
@@ -162,7 +243,7 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
             if len(found) == len(value):
                 flat[key] = found
     elif isinstance(value, list) and len(value) > MAX_VALUES:
-        raise DocumentError("nested or long beyond any message of joints")
+        raise ValueError("nested or long beyond any message of joints")
     elif isinstance(value, list | int | float | str | bool):
         flat[path] = value
 
@@ -226,16 +307,10 @@ def _column(first: Any, values: list[Any]) -> Column | None:  # noqa: ANN401
 
 def _stamps(rows: list[dict[str, Any]]) -> Column | None:
     """Stamps in the documents, in nanoseconds, or as they are if they are one number."""
-    for base in ("timestamp", "header.stamp", "stamp"):
-        for sec in ("sec", "seconds"):
-            for nsec in ("nsec", "nanos", "nanosec"):
-                if f"{base}.{sec}" in rows[0] and f"{base}.{nsec}" in rows[0]:
-                    pairs = [(row.get(f"{base}.{sec}"), row.get(f"{base}.{nsec}")) for row in rows]
-                    whole = [
-                        s * 10**9 + n for s, n in pairs if isinstance(s, int) and isinstance(n, int)
-                    ]
-                    if len(whole) == len(pairs) and all(abs(w) < 2**62 for w in whole):
-                        return np.array(whole, dtype=np.int64)
+    stamps = [stamp_of(row) for row in rows]
+    if None not in stamps:
+        return np.array(stamps, dtype=np.int64)
+    for base in STAMPS:
         if isinstance(rows[0].get(base), int | float):
             return _column(0.0, [row.get(base) for row in rows])
     return None

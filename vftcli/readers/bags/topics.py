@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.readers.aliases import RESIDUAL_TURNED
 from vftcli.readers.bags.container import Integers
 from vftcli.readers.bags.decode import Stream
-from vftcli.readers.columns import SIGNALS, Item, parse_columns
+from vftcli.readers.columns import SIGNALS
 from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
@@ -87,14 +87,14 @@ class Gathering:
     def __init__(self, lead: Stream, request: ReadChoice) -> None:
         self.lead = lead
         self.clock = clock_of(lead)
-        items = said(request)
+        items = request.spec.items
         # A wrench without a field is the one that is read anyway, of whichever topic.
         self.chosen = {
             SIGNALS[item.signal]: (item.pattern or "", item.factor)
             for item in items
             if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
         }
-        self.said_of_wrench = next((i for i in items if i.signal == "wrench"), None)
+        self.said_of_wrench = request.spec.item("wrench")
         self.signals: dict[str, Array] = {}
         self.taken: set[str] = set()
         self.remarks: list[Remark] = []
@@ -267,11 +267,6 @@ class Gathering:
 FIELDS = {"position": "q", "velocity": "dq", "effort": "effort"}  #: Field of a JointState → signal.
 
 
-def said(request: ReadChoice) -> tuple[Item, ...]:
-    """The items of --columns, none without."""
-    return parse_columns(request.columns).items if request.columns is not None else ()
-
-
 def same_arm(stream: Stream, lead: Stream) -> bool:
     """Whether a stream is about the leading topic's joints, or about no joints by name."""
     if "q" not in stream.signals and "effort" not in stream.signals:
@@ -294,7 +289,7 @@ def leading(
         if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.channel.topic)
     ]  # fmt: skip
     found = [s for s in found if s.signals["q"].shape[1] > 2] or found
-    named = {(i.pattern or "").rpartition(".")[0] for i in said(request) if i.signal == "q"}
+    named = {(i.pattern or "").rpartition(".")[0] for i in request.spec.items if i.signal == "q"}
     found = [s for s in found if s.channel.topic in named] or found
     if not found:
         there = [f"{s.channel.topic} ({s.channel.type})" for s in streams]
