@@ -270,13 +270,13 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 64_496,
-    "files": 451,
-    "functions": 3459,
+    "lines of Python": 62_026,
+    "files": 399,
+    "functions": 3352,
     "functions over 60 lines": 12,
-    "names, operators, numbers": 429_119,
+    "names, operators, numbers": 414_822,
     "characters a line that is not blank": 49.6,
-    "noqa": 192,
+    "noqa": 172,
     "lines of TOML, JavaScript, CSS": 6105,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""

@@ -23,7 +23,7 @@ from vftcli.robots.terms import DynamicsTerms
 
 STEP = 0.008
 
-TermsOf = Callable[..., DynamicsTerms]
+MakesTerms = Callable[..., DynamicsTerms]
 Pushed = Callable[..., tuple[RunSamples, RunSamples]]
 
 
@@ -39,13 +39,13 @@ def low_passed_noise(samples: int, corner: float, seed: int) -> np.ndarray:
 
 
 @pytest.fixture
-def pushed(terms_of: TermsOf) -> Pushed:
+def pushed(terms_of: MakesTerms) -> Pushed:
     """Makes a log that is half free, half under a random torque."""
     return lambda **how: half_pushed(terms_of, **how)
 
 
 def half_pushed(
-    terms_of: TermsOf, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
+    terms_of: MakesTerms, samples: int = 8000, scale: float = 5.0, noise: float = 2.0
 ) -> tuple[RunSamples, RunSamples]:
     """Half free, half with a random torque; white torque noise everywhere. Seed 1."""
     t = STEP * np.arange(samples)

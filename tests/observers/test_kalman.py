@@ -19,7 +19,7 @@ Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])
 Q_TAU = np.full(6, 5000.0)
 STEP = 0.008
 
-TermsOf = Callable[..., DynamicsTerms]
+MakesTerms = Callable[..., DynamicsTerms]
 
 
 def paper(scheme: str, convention: str = "density", **more: object) -> KalmanObserver:
@@ -65,7 +65,7 @@ def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_agrees_with_the_dense_textbook_filter(
-    scheme: str, convention: str, jitter: float, wandering: TermsOf
+    scheme: str, convention: str, jitter: float, wandering: MakesTerms
 ) -> None:
     observer, log = paper(scheme, convention), wandering(jitter=jitter)
     tau, sd = dense(observer, log)
@@ -76,13 +76,13 @@ def test_agrees_with_the_dense_textbook_filter(
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_decay_agrees_with_the_dense_textbook_filter(scheme: str, wandering: TermsOf) -> None:
+def test_decay_agrees_with_the_dense_textbook_filter(scheme: str, wandering: MakesTerms) -> None:
     observer, log = paper(scheme, decay=3.0), wandering(samples=600)
     tau, _ = dense(observer, log)
     np.testing.assert_allclose(observer.estimate(log).tau, tau, atol=1e-9)
 
 
-def test_as_printed_euler_agrees_with_the_dense_filter_on_mu_alone(wandering: TermsOf) -> None:
+def test_as_printed_euler_agrees_with_the_dense_filter_on_mu_alone(wandering: MakesTerms) -> None:
     observer, log = paper("fe", as_printed=True), wandering(samples=600)
     for ours, named in zip(observer.model(STEP, 6), paper("fe", "literal").model(STEP, 6),
                            strict=True):  # fmt: skip
@@ -111,7 +111,7 @@ def printed_loop(log: DynamicsTerms, joint: int, decay: float) -> tuple[np.ndarr
 @pytest.mark.parametrize("decay", [0.0, 2.0])
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_as_printed_hold_runs_the_printed_block(
-    jitter: float, decay: float, wandering: TermsOf
+    jitter: float, decay: float, wandering: MakesTerms
 ) -> None:
     log = wandering(samples=300, jitter=jitter)
     observer = paper("zoh", as_printed=True, decay=decay, initial_covariance=[4.0, 0.0, 100.0])
@@ -124,13 +124,13 @@ def test_as_printed_hold_runs_the_printed_block(
 
 
 def test_as_printed_hold_goes_on_where_a_block_ends(
-    wandering: TermsOf, in_blocks: Callable[..., Any]
+    wandering: MakesTerms, in_blocks: Callable[..., Any]
 ) -> None:
     observer, log = paper("zoh", as_printed=True), wandering(samples=300, jitter=0.2)
     np.testing.assert_array_equal(in_blocks(observer, log, 37)[0], observer.estimate(log).tau)
 
 
-def test_as_printed_hold_settles_to_what_its_loop_does(wandering: TermsOf) -> None:
+def test_as_printed_hold_settles_to_what_its_loop_does(wandering: MakesTerms) -> None:
     """Without a covariance of the user's the gains are stationary from the first sample on."""
     log = wandering(samples=900)
     settled = paper("zoh", as_printed=True).estimate(log).sd[-1]
@@ -223,7 +223,7 @@ def test_started_from_the_stationary_prior_there_is_no_transient() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
-def test_a_users_initial_covariance_is_followed_exactly(scheme: str, wandering: TermsOf) -> None:
+def test_a_users_initial_covariance_is_followed_exactly(scheme: str, wandering: MakesTerms) -> None:
     """Blocks run side by side give the plain loop's covariances, transient and all."""
     start = np.array([[50.0] * 6, [3.0] * 6, [4e4] * 6])
     observer, log = paper(scheme, initial_covariance=start), wandering(samples=800, jitter=0.3)
@@ -304,7 +304,7 @@ def test_frequency_response_is_that_of_the_filter() -> None:
     np.testing.assert_allclose(sine + 1j * cosine, response, atol=1e-9)  # transient long gone
 
 
-def test_forward_euler_refuses_a_decay_it_cannot_hold(wandering: TermsOf) -> None:
+def test_forward_euler_refuses_a_decay_it_cannot_hold(wandering: MakesTerms) -> None:
     with pytest.raises(ParameterError, match=r"unstable: decay·Ts = 2\.4"):
         paper("fe", decay=300.0).estimate(wandering(samples=50))
 
@@ -358,7 +358,7 @@ def test_half_the_power_passes_at_the_bandwidth(scheme: str) -> None:
 )
 @pytest.mark.parametrize("jitter", [0.0, 0.2])
 def test_blocks_of_a_log_give_the_whole_log_s_estimate(
-    jitter: float, more: dict[str, object], wandering: TermsOf, in_blocks: Callable[..., Any]
+    jitter: float, more: dict[str, object], wandering: MakesTerms, in_blocks: Callable[..., Any]
 ) -> None:
     # (44) as printed has no pieces.
     scheme = "fe" if "as_printed" in more else "zoh"

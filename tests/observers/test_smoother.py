@@ -12,7 +12,7 @@ from vftcli.robots.terms import DynamicsTerms
 R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
 STEP = 0.008
 
-TermsOf = Callable[..., DynamicsTerms]
+MakesTerms = Callable[..., DynamicsTerms]
 
 
 def smoother(scheme: str = "fe", convention: str = "density", **more: object) -> KalmanSmoother:
@@ -60,7 +60,7 @@ def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, n
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
 @pytest.mark.parametrize("jitter", [0.0, 0.3])
 def test_agrees_with_a_dense_textbook_smoother(
-    scheme: str, convention: str, jitter: float, wandering: TermsOf
+    scheme: str, convention: str, jitter: float, wandering: MakesTerms
 ) -> None:
     smooth, log = smoother(scheme, convention), wandering(700, jitter, joints=2)
     tau, sd = dense_rts(smooth, log)
@@ -70,7 +70,7 @@ def test_agrees_with_a_dense_textbook_smoother(
     np.testing.assert_allclose(estimate.sd, sd, rtol=1e-9)
 
 
-def test_agrees_with_the_dense_smoother_from_a_users_covariance(wandering: TermsOf) -> None:
+def test_agrees_with_the_dense_smoother_from_a_users_covariance(wandering: MakesTerms) -> None:
     start = np.array([[4.0, 4.0], [1.0, 1.0], [900.0, 900.0]])
     smooth, log = smoother(initial_covariance=start), wandering(300, 0.0, joints=2)
     plain = smoother()
@@ -132,7 +132,7 @@ def test_the_bandwidth_is_that_of_the_formula() -> None:
     assert not np.any(tuning.delay)
 
 
-def test_it_knows_more_than_the_filter(wandering: TermsOf) -> None:
+def test_it_knows_more_than_the_filter(wandering: MakesTerms) -> None:
     log = wandering(500, 0.1, joints=2)
     smooth = smoother()
     before, after = smooth.filter.estimate(log).sd, smooth.estimate(log).sd

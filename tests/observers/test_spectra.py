@@ -14,17 +14,17 @@ from vftcli.signals.errors import ParameterError
 
 STEP = 0.008
 
-TermsOf = Callable[..., DynamicsTerms]
+MakesTerms = Callable[..., DynamicsTerms]
 
 
-def test_the_raw_disturbance_of_a_constant_torque_is_that_torque(terms_of: TermsOf) -> None:
+def test_the_raw_disturbance_of_a_constant_torque_is_that_torque(terms_of: MakesTerms) -> None:
     t = STEP * np.arange(100)
     d = raw_disturbance(terms_of(t, np.full((100, 2), 3.0)))
     # differences of a sum of a hundred terms: rounding only
     np.testing.assert_allclose(d, 3.0, rtol=1e-12)
 
 
-def test_spectra_hold_the_mean_square_and_the_mean(terms_of: TermsOf) -> None:
+def test_spectra_hold_the_mean_square_and_the_mean(terms_of: MakesTerms) -> None:
     """Parseval: the density summed over frequency is the power, a constant's included."""
     t = STEP * np.arange(4000)
     torque = 2.0 + np.random.default_rng(5).normal(0.0, 0.5, (4000, 2))
@@ -52,7 +52,7 @@ def test_white_noise_has_a_flat_spectrum_of_the_known_height() -> None:
     assert found.external.sum() < 0.1 * found.loaded.sum()
 
 
-def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: TermsOf) -> None:
+def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: MakesTerms) -> None:
     rng = np.random.default_rng(11)
     t = np.cumsum(STEP * rng.uniform(0.9, 1.1, 6000))
     torque = 3.0 * np.sin(2 * np.pi * 2.0 * t)[:, None]
@@ -65,14 +65,14 @@ def test_an_uneven_clock_has_the_spectrum_of_its_median_step(terms_of: TermsOf) 
     assert found.loaded.sum() * found.width == pytest.approx(4.5, rel=0.03)
 
 
-def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: TermsOf) -> None:
+def test_a_part_too_short_for_a_spectrum_is_refused(terms_of: MakesTerms) -> None:
     terms = terms_of(STEP * np.arange(100), np.zeros((100, 1)))
     few = np.arange(100) < 20
     with pytest.raises(ParameterError, match="needs 32 samples in a row; the loaded part has 99"):
         spectra_of(samples_of(terms, ~few), [samples_of(terms, few)])
 
 
-def test_no_segment_reaches_across_a_gap(terms_of: TermsOf) -> None:
+def test_no_segment_reaches_across_a_gap(terms_of: MakesTerms) -> None:
     t = np.concatenate([STEP * np.arange(60), 10.0 + STEP * np.arange(25)])
     t += np.random.default_rng(0).uniform(0, 1e-4, len(t))
     terms = terms_of(t, np.ones((85, 1)))
