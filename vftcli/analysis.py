@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.print_table import Comparison
-    from vftcli.refinement.baseline import Baselines
     from vftcli.refinement.refine import Refinement
     from vftcli.repetition.free_motion import FreeMotion
     from vftcli.robots.run import Run
@@ -117,7 +116,7 @@ class Analysis(Shown):
     def run_of(self, name: str, run: "Run") -> "Run":
         """The log or one of its free runs, as the observer of this name has it."""
         found = self.refinement
-        return run_of(found.baselines if found is not None else None, name, run)
+        return run if found is None else found.baselines.of(name).of(run)
 
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
@@ -137,8 +136,3 @@ class Analysis(Shown):
     def t(self) -> Array:
         """Time since the log's first sample. (T,) [s]"""
         return self.recording.t
-
-
-def run_of(baselines: "Baselines | None", name: str, run: "Run") -> "Run":
-    """A recording as one observer of its log has it."""
-    return run if baselines is None else baselines.of(name).of(run)

@@ -251,7 +251,7 @@ def observe(
     motion: FreeMotion, baselines: "Baselines | None", choice: AnalysisChoice
 ) -> "Analysis":
     """Run the observers along the log."""
-    from vftcli.analysis import Analysis, run_of
+    from vftcli.analysis import Analysis
     from vftcli.signals.remarks import caution
 
     log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
@@ -263,7 +263,10 @@ def observe(
     return Analysis(
         motion=motion,
         observers=observers,
-        estimates=tuple(run(o, run_of(baselines, o.name, log).terms) for o in whole),
+        estimates=tuple(
+            run(o, (log if baselines is None else baselines.of(o.name).of(log)).terms)
+            for o in whole
+        ),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
     )

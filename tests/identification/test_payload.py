@@ -130,6 +130,14 @@ def test_the_shift_between_two_logs_is_found(prepared, shift):
     assert distance < 1e-3
 
 
+def test_a_pair_that_moves_by_its_positions_alone_is_refused_in_one_line():
+    """All velocities are zero, as of a driver that leaves them out: no motion is left to fit."""
+    t, q, _ = swinging()
+    silent = Recording(t=t, q=q, dq=0 * q, current=0 * q)
+    with pytest.raises(IdentificationError, match="moves; a pair must repeat one trajectory"):
+        payload_from_pair(silent, replace(silent), load_robot("ur5"))
+
+
 def test_another_motion_is_no_pair(prepared):
     t, q, dq = swinging()
     bent = Recording(t=t, q=swinging(bend=0.03)[1], dq=dq, torque=0 * q)

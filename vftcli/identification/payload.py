@@ -198,10 +198,7 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
 
 
 def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[JointsFit, Array, Remark]:
-    """Fit of what the loaded log's torque has beyond the free one's at the same phase.
-
-    Also the standard deviations of mass and moments (4,), and how they were found.
-    """
+    """Fit of a log's torque beyond the free one's, sd of mass and moments (4,), and the origin."""
     processing = Processing()
     motion = prepare(loaded, robot, processing)
     shift, distance = find_time_shift(motion, free)
@@ -238,6 +235,9 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
     """Shift [s] from the motion's clock to the other log's, and what is left. [rad rms]"""
+    if not len(motion.t):
+        name = motion.recording.name
+        raise NotSameMotionError(f"no joint of {name} moves; a pair must repeat one trajectory")
 
     def distance(shift: float) -> float:
         at = motion.t + shift

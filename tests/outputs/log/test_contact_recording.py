@@ -30,7 +30,7 @@ def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None
     np.testing.assert_allclose(lines["|F|"], size, rtol=1e-12)
     assert np.all(lines["95 % lower"] <= size)
     assert np.all(lines["95 % upper"] >= size)
-    assert set(lines["smallest that can be told"]) == {6.5}
+    assert set(lines["smallest that is listed"]) == {6.5}
     t = touched.t
     for name, start, stop in (("wrist", 1.0, 1.5), ("forearm", 2.2, 2.6)):
         bar = lines[f"touched: {name}"]

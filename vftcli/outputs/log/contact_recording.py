@@ -60,8 +60,8 @@ def force_lines(analysis: Analysis) -> Lines | None:
     )
     if found.told_force is not None:
         least = np.full(len(size), found.told_force)
-        lines.append(PlotLine("smallest that can be told", least, SPARE[7], 1.0))
-        title += f"; green: {found.told_force:.0f} N, the smallest told"
+        lines.append(PlotLine("smallest that is listed", least, SPARE[7], 1.0))
+        title += f"; green: {found.told_force:.0f} N, the smallest that is listed"
     points = peaks(found)
     tallest = np.nanmax(np.concatenate([size, [1.0], points.values if points else []]))
     lines += span_lines(analysis.t, found, -BELOW * float(tallest))
