@@ -93,15 +93,18 @@ def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:
 
 
 def test_a_size_is_as_sure_as_its_place() -> None:
-    def fit(link: int, size: float, score: float) -> PointFit:
+    def fit(link: int, size: float, score: float, share: float = 0.5) -> PointFit:
         force = np.array([size, 0.0, 0.0])
-        return PointFit(link=link, share=0.5, misfit=0.0, score=score, force=force, band=1.0)
+        return PointFit(link=link, share=share, misfit=0.0, score=score, force=force, band=1.0)
 
     parts = arm_parts(6)
     alike = Site([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
     assert alike.spread(40.0) == 0.0  # both on the wrist, whose wrench holds them
     apart = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
     assert apart.spread(40.0) == pytest.approx(20.0 / np.sqrt(2.0))
+    assert apart.links(6) == (3, 5)
+    tip = Site([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], parts, np.zeros((1, 6, 6)))
+    assert tip.links(6) == (0, 3)  # the last link's end is the flange, and that of no other
     # Four in the score are e⁻² in likelihood.
     less = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], parts, np.zeros((1, 6, 6)))
     assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))

@@ -29,3 +29,4 @@ def test_when_there_are_no_more_colours_they_come_again() -> None:
 
 def test_a_colour_in_numbers() -> None:
     assert rgb("#0c9fff") == (12, 159, 255)
+    assert rgb("#9cf00a") == (156, 240, 10)

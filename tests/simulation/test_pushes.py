@@ -1,5 +1,6 @@
 """Contacts one by one."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -83,6 +84,8 @@ def test_stop_pushes_and_never_pulls() -> None:
     stop = StopSpec(name="s", through=(0, 0, 0.31), stiffness=1000.0, damping=100.0)
     wall = stop.start(rng(), 1.0)
     np.testing.assert_allclose(wall.wrench(0.0, HERE)[:3], [0, 0, 10.0])
+    longer = replace(stop, normal=(0.0, 0.0, 3.0)).start(rng(), 1.0)
+    np.testing.assert_allclose(longer.wrench(0.0, HERE), wall.wrench(0.0, HERE))
     leaving = HERE._replace(velocity=np.array([0.0, 0, 1.0]))
     np.testing.assert_array_equal(wall.wrench(0.0, leaving), 0.0)
     away = HERE._replace(position=np.array([0.4, 0.1, 0.32]))

@@ -48,6 +48,7 @@ def test_there_are_always_numbers_on_an_axis(high: float) -> None:
 
 def test_numbers_of_axes() -> None:
     assert decades(Span(0.02, 62.5)) == [0.1, 1.0, 10.0]
+    assert decades(Span(0.1, 10.0)) == [0.1, 1.0, 10.0]  # its ends are on it
     assert (label(-0.5), label(-0.0), label(1e6)) == ("−0.5", "0", "1e+06")
     text = axes(SCALES, "<s>")
     assert "&lt;s&gt;" in text
