@@ -128,9 +128,7 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
     fine = JointFriction(model="coulomb-viscous", parameters={"coulomb": 1.0, "viscous": 1.0})
     assert check_friction(0, fine, data) == []
     pushing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -5.0, "viscous": -5.0})
-    with pytest.raises(
-        IdentificationError, match=r"friction of joint 1 comes out .* it would push"
-    ):
+    with pytest.raises(IdentificationError, match=r"of joint 1 comes out .* it would push"):
         check_friction(0, pushing, data)
     crossing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0})
     (remark,) = check_friction(2, crossing, data)
