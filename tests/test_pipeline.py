@@ -26,8 +26,9 @@ from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition import alignment, free_run
+from vftcli.repetition import alignment
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots import run as modelled
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
@@ -166,7 +167,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
         monkeypatch.setattr(module, name, wrapped)
 
     count(reading, "read_chosen")
-    count(free_run, "dynamics_terms")
+    count(modelled, "dynamics_terms")
     count(alignment, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
     names["TRUTH"] = Path(f"file:{FIXTURE}.truth.parquet")
