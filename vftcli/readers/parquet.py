@@ -236,7 +236,8 @@ class ParquetTable(ColumnarTable):
         source = file.direct or BytesIO(file.content)
         self._direct = file.direct
         self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
-        return self._file.schema_arrow, int(self._file.metadata.num_rows)
+        about = self._file.metadata  # vftcli's own is the file's, not the schema's
+        return self._file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
 
     def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
         name = self.names[column]
