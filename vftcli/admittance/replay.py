@@ -26,7 +26,7 @@ RISE = 1e-12
 LONGEST = 600.0  #: Longest release that is computed. [s]
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
-#: A drag in which the log's arm stays within this distance for so long is told. [s, m]
+#: A drag in which the log's arm stays within this distance for so long has a remark. [s, m]
 RESTING = (2.0, 0.01)
 #: A log whose flange stays this near to its first pose replays as it was: no remark. [m]
 STILL = 0.01

@@ -22,7 +22,7 @@ DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
 DEFLATE_RATIO = 1032  #: The most that deflate unpacks a byte to (zlib, algorithm.txt).
 
 
-def check_chunks(told: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 - h5py
+def check_chunks(name: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 - h5py
     """Check that no chunk unpacks to more than a log's may."""
     if dataset.chunks is None:
         return
@@ -30,20 +30,20 @@ def check_chunks(told: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 -
     for length in dataset.chunks:
         size *= length
     if size > limit:
-        raise LogError(f"{told}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
+        raise LogError(f"{name}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
     settings = dataset.id.get_create_plist()
     filters = [settings.get_filter(k)[0] for k in range(settings.get_nfilters())]
     # Each unpacks what the next has unpacked: two of a kind are a thousandfold of a thousandfold.
     if set(filters) - {DEFLATE, SHUFFLE, FLETCHER32, LZF} or len(set(filters)) < len(filters):
         raise LogError(
-            f"{told}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
+            f"{name}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
             "and lzf are read, once each; repack it: h5repack -f GZIP=4 OLD NEW"
         )
     if DEFLATE in filters and DEFLATE_RATIO * dataset.id.get_storage_size() > limit:
-        inflate_suspects(told, dataset, size, limit)
+        inflate_suspects(name, dataset, size, limit)
 
 
-def inflate_suspects(told: str, dataset: Any, size: int, limit: int) -> None:  # noqa: ANN401
+def inflate_suspects(name: str, dataset: Any, size: int, limit: int) -> None:  # noqa: ANN401
     """Inflate chunks that could unpack to more than `limit`, no further than to their `size`."""
     suspects: list[tuple[int, ...]] = []
 
@@ -59,7 +59,7 @@ def inflate_suspects(told: str, dataset: Any, size: int, limit: int) -> None:  #
         except zlib.error:
             continue  # no more than this was unpacked; HDF5 says where it breaks off
         if len(unpacked) > size:
-            raise LogError(f"{told}: a chunk unpacks to more than the {size} bytes that it holds.")
+            raise LogError(f"{name}: a chunk unpacks to more than the {size} bytes that it holds.")
 
 
 #: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
@@ -123,8 +123,8 @@ class Hdf5Table:
         self.check_size(columns)
         names, datasets = list(self._datasets), list(self._datasets.values())
         if len({datasets[c].shape[0] for c in columns}) > 1:
-            told = ", ".join(f"{names[c]} {datasets[c].shape[0]}" for c in columns)
-            raise LogError(f"{self.path}: the datasets differ in length: {told} rows.")
+            lengths = ", ".join(f"{names[c]} {datasets[c].shape[0]}" for c in columns)
+            raise LogError(f"{self.path}: the datasets differ in length: {lengths} rows.")
         return {c: self._numbers(datasets[c], c == clock) for c in columns}
 
     def check_size(self, columns: Sequence[int]) -> None:

@@ -58,8 +58,8 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
         return read_any(table, request)
     if stated := request.spec.item("q") is not None:
         refuse_arm(table.path, request)
-    told = "left: columns 0-5, right: columns 7-12"
-    arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, told)
+    places = "left: columns 0-5, right: columns 7-12"
+    arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, places)
     first = ALOHA_ARM * ARMS.index(arm)
     span = f"[{first}:{first + ALOHA_ARM - 1}]"
     usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
@@ -96,8 +96,8 @@ def robot_of(folder: Path) -> str | None:
     for path in sorted(folder.glob("metadata_*.json"))[:1]:
         try:
             with path.open("rb") as metadata:
-                told = json.loads(metadata.read(TOLD_LIMIT))
-            serial = str(told.get("robot_serial", "")).lower()
+                about = json.loads(metadata.read(TOLD_LIMIT))
+            serial = str(about.get("robot_serial", "")).lower()
         except (OSError, ValueError, RecursionError, AttributeError):
             return None
         return next((name for name in FRANKA if serial.startswith(f"{name}-")), None)

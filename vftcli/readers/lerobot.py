@@ -68,10 +68,10 @@ class Episode(NamedTuple):
     """Where an episode is."""
 
     number: int  #: Its index.
-    length: int | None = None  #: Its frames, None where that is not told.
-    #: Index of its first frame in the dataset, None where that is not told.
+    length: int | None = None  #: Its frames, None where it is unknown.
+    #: Index of its first frame in the dataset, None where it is unknown.
     start: int | None = None
-    #: Its data file by the dataset's usual name, None where that is not told.
+    #: Its data file by the dataset's usual name, None where it is unknown.
     file: Path | None = None
 
 
@@ -97,9 +97,9 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
     else:
-        told = info.get("features")
-        told = told.items() if isinstance(told, dict) else ()
-        features = {name: each.get("names") for name, each in told if isinstance(each, dict)}
+        each_of = info.get("features")
+        each_of = each_of.items() if isinstance(each_of, dict) else ()
+        features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
         usual, names, side, more = columns_of(file.path, table, features, request)
         remarks = (*remarks, *more)
     raw = described(table, usual, request, joint_names=names, remarks=remarks)
@@ -280,8 +280,8 @@ def episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
     chunk = chunk if isinstance(chunk, int) and chunk > 0 else 1000
     for line in filter(str.strip, text_of(path).splitlines()):
         try:
-            told = json.loads(line)
-            number, length = int(told[EPISODE]), int(told["length"])
+            row = json.loads(line)
+            number, length = int(row[EPISODE]), int(row["length"])
         except (ValueError, KeyError, TypeError, RecursionError, OverflowError):
             raise LogError(f"{path}: a line that tells no episode: {line[:60]!r}.") from None
         name = f"episode_{number:06d}.parquet"
@@ -311,8 +311,8 @@ def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     differs = episode.length is not None and len(rows) != episode.length
     if "index" in names and episode.start is not None and not differs:
         index = names.index("index")
-        told = episode.start + np.arange(len(rows))
-        differs = not np.array_equal(table.load([index], index)[index][rows], told)
+        usual = episode.start + np.arange(len(rows))
+        differs = not np.array_equal(table.load([index], index)[index][rows], usual)
     if differs:
         raise LogError(
             f"{file.path}: the rows of episode {episode.number} are not those that the table of "

@@ -57,7 +57,7 @@ class ColumnarTable(ABC):
         self._size = len(file.content)
         with guarded(self.path):
             schema, self.rows = self._opened(file)
-            self._told = (schema.metadata or {}).get(b"vftcli", b"{}")
+            self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
             self._lists = [k for k, kind in enumerate(schema.types) if is_list(kind)]
             if self.rows == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
@@ -80,14 +80,14 @@ class ColumnarTable(ABC):
         """Number of columns."""
         return len(self.names)
 
-    def told(self) -> dict[str, Any]:
+    def conversion(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
         try:
-            told = json.loads(self._told)
+            about = json.loads(self._about)
         except (ValueError, RecursionError):
             return {}
-        good = isinstance(told, dict) and isinstance(told.get("joint_names", []), list)
-        return told if good else {}
+        good = isinstance(about, dict) and isinstance(about.get("joint_names", []), list)
+        return about if good else {}
 
     @cached_property
     def lists(self) -> Mapping[int, int]:
@@ -210,13 +210,13 @@ def read_columns(table: ColumnarTable, request: ReadChoice) -> RawLog:
         number, part, remarks = episode_of(table.path, request, episodes_of(numbers))
         table.keep(np.flatnonzero(numbers == number) if part else None)
     raw = from_table(table, request)
-    told = table.told()
-    names = tuple(str(name) for name in told.get("joint_names") or ())
+    about = table.conversion()
+    names = tuple(str(name) for name in about.get("joint_names") or ())
     return replace(
         raw,
-        wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(told.get("wrench_frame")),
+        wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(about.get("wrench_frame")),
         joint_names=raw.joint_names or names,
-        robot_hint=raw.robot_hint or told.get("robot"),
+        robot_hint=raw.robot_hint or about.get("robot"),
         part=part,
         remarks=(*remarks, *raw.remarks),
     )

@@ -15,7 +15,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 
-#: The payload that the controller was told of; its last value counts.
+#: The payload that is set in the controller; its last value counts.
 PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3

@@ -33,7 +33,7 @@ class Kind:
     wrench_frame: WrenchFrame | None = None  #: What is known of its wrench.
 
 
-#: Message type → what is taken from it.
+#: Message type → the signals that are read from it.
 KINDS: dict[str, Kind] = {
     "sensor_msgs/JointState": Kind(
         signals={"q": ("position",), "dq": ("velocity",), "effort": ("effort",)},

@@ -29,7 +29,7 @@ from vftcli.signals.remarks import Where, fact, warning
 WHOLE_BYTES = 1 << 24  #: A bag of no more bytes is read in one piece.
 #: Messages of a topic from which a block is made, and those that wait for others at most.
 BLOCK_MESSAGES, MOST_MESSAGES = 1 << 13, 1 << 17
-#: What is said of topics that cannot be laid side by side, message by message.
+#: What is said of topics that do not pair message by message.
 APART = frozenset({"signal-interpolated", "topic-too-short", "messages-left-out"})
 
 
@@ -64,7 +64,7 @@ def bag_blocks(
         count(messages)
         yield block(list(waiting.streams.values()))
     except LogError:
-        raise InOnePieceError from None  # what is wrong is told by the whole
+        raise InOnePieceError from None  # reading the whole says what is wrong
 
 
 Key = tuple[object, ...]  #: What tells streams apart.
@@ -119,7 +119,7 @@ class Waiting:
             key: replace(rest, header=None) if key in self._headless else rest
             for key, (_, rest) in parts.items()
         }
-        # What else there is is told once.
+        # The first block alone says what else there is.
         beside = [s for s in streams if first and not any(s is c for c in counting.values())]
         return [*(part for part, _ in parts.values()), *beside]
 
