@@ -242,7 +242,7 @@ def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(set=("gmo.gain=30",)),
         reference=ReferenceChoice(name="vendor"),
     )
     rmse = rmse_of(analyse_log(folder / "circle.csv", request))
@@ -259,7 +259,7 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
     request = AnalysisChoice(
         read=ReadChoice(interval=(1.5, 27.5)),
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(assignments=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(set=("gmo.gain=30",)),
         reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     rmse = rmse_of(analyse_log(tmp_path / "pushes.csv", request))

@@ -38,7 +38,7 @@ def test_xi_and_threshold_mode_are_settings() -> None:
 
 def test_as_printed_the_whole_force_enters_unless_a_mode_is_named() -> None:
     def mode(*assignments: str, **words: str) -> str:
-        choice = ControlChoice.parsed(assignments=assignments, as_printed=True, **words)
+        choice = ControlChoice(assignments=assignments, as_printed=True, **words)
         return choice.parameters(UR5).threshold_mode
 
     assert mode() == "literal"
@@ -61,7 +61,7 @@ def test_settings_go_before_a_file(tmp_path: Path) -> None:
         "[admittance.rotation]\nmass = 1\ndamping = 9\nstiffness = 20\nalpha = 1\nthreshold = 1\n",
         encoding="utf-8",
     )
-    choice = ControlChoice.parsed(parameters=file, assignments=["x.mass=5"])
+    choice = ControlChoice(file=file, assignments=("x.mass=5",))
     parameters = choice.parameters(UR5)
     assert parameters.period == 0.004
     np.testing.assert_array_equal(parameters.mass, [5, 2, 2, 1, 1, 1])

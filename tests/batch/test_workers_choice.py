@@ -52,7 +52,8 @@ def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted
     with pytest.raises(ParameterError, match=r"run code as you; use tls://.* or --anyway"):
         opened.check_closed(anyway=False)
     opened.check_closed(anyway=True)
-    WorkersChoice(scheduler="tls://host:8786", tls=(KEY, KEY, KEY)).check_closed(anyway=False)
+    tls = {"tls_ca": KEY, "tls_cert": KEY, "tls_key": KEY}
+    WorkersChoice(scheduler="tls://host:8786", **tls).check_closed(anyway=False)
     WorkersChoice(workers=0).check_closed(anyway=False)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.cli import bundles
+from vftcli.cli import options
 from vftcli.robots import PROFILES
 from vftcli.simulation.load import FOLDER
 
@@ -73,5 +73,5 @@ def test_what_an_option_names_is_an_input_unless_it_is_one_of_ours() -> None:
         "reference_reference": "file:truth.parquet",
         "seed": 3,
     }
-    names = {str(path) for path in bundles.inputs_of(values)}
+    names = {str(path) for path in options.inputs_of(values)}
     assert names == {"log.csv", "bag", "1:2", "truth.parquet"}

@@ -7,7 +7,7 @@ import pytest
 
 from vftcli import readers
 from vftcli.evaluation.obvious_contacts import touched_remarks, touches
-from vftcli.evaluation.reference_choice import zero_reference
+from vftcli.evaluation.references import zero_reference
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.remarks import sentence

@@ -6,13 +6,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import reference_choice
+from vftcli.evaluation import references
 from vftcli.evaluation.judgement import reference_wrench
-from vftcli.evaluation.reference_choice import (
-    REFERENCES,
-    ReferenceChoice,
-    make_reference,
-)
+from vftcli.evaluation.reference_choice import NAMES, ReferenceChoice
+from vftcli.evaluation.references import REFERENCES, make_reference
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
@@ -55,7 +52,8 @@ def test_an_unknown_name_is_refused_before_any_log_is_read() -> None:
         ReferenceTorqueError, match="there is zero, vendor, two-cycle, sensor, file"
     ):
         ReferenceChoice(name="magic")
-    assert [ReferenceChoice(name=name).path for name in REFERENCES] == [None] * len(REFERENCES)
+    assert [ReferenceChoice(name=name).path for name in REFERENCES] == [None] * len(NAMES)
+    assert set(REFERENCES) == set(NAMES)
 
 
 def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
@@ -70,7 +68,7 @@ def test_zero_is_zero_and_vendor_is_the_log_s_own() -> None:
 def test_a_file_is_read_once_for_torque_and_wrench(tmp_path, monkeypatch) -> None:
     reads = []
     monkeypatch.setattr(
-        reference_choice, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
+        references, "read_reference", lambda *a: reads.append(a) or read_reference(*a)
     )
     choice = write_wrench(tmp_path / "truth.parquet", WRENCH)
     reference = make_reference(MOTION, choice)

@@ -76,7 +76,7 @@ def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None
     assert np.all(zoh.r_diag == 2.0)
     np.testing.assert_array_equal(zoh.q_p_diag, UR5.gains["kfo"]["q_p_diag"])
     assert remarks == ()
-    both = ObserverChoice.parsed(gains="auto", observer=["gmo"], assignments=["gmo.gain=33"])
+    both = ObserverChoice.parsed(gains="auto", observer=["gmo"], set=["gmo.gain=33"])
     assert np.all(both.build(UR5, STEP, shown)[0][0].gain == 33.0)
     # A log without a free part has none to give: those of the file, read as what it would give.
     (gmo, zoh), remarks = asked.build(UR5, STEP)
@@ -106,7 +106,7 @@ def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> N
     own = gain(ObserverChoice(names=("gmo",)))
     assert own == np.atleast_1d(UR5.gains["gmo"]["gain"])[0]
     assert gain(ObserverChoice(names=("gmo",), gains_file=file)) == 21.0
-    both = ObserverChoice.parsed(observer=["gmo"], gains_file=file, assignments=["gmo.gain=33"])
+    both = ObserverChoice.parsed(observer=["gmo"], set_file=file, set=["gmo.gain=33"])
     assert gain(both) == 33.0
 
 
@@ -122,14 +122,14 @@ def test_a_gains_file_has_two_names(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
     new = ObserverChoice.parsed(observer=["gmo"], gains=str(file))
-    assert new == ObserverChoice.parsed(observer=["gmo"], gains_file=file)
+    assert new == ObserverChoice.parsed(observer=["gmo"], set_file=file)
     assert gain(new) == 21.0
     assert not new.of_robot_file
     paper = ObserverChoice.parsed(observer=["gmo"], gains="paper")
     assert paper == ObserverChoice.parsed(observer=["gmo"])
     assert paper.of_robot_file
     with pytest.raises(ParameterError, match="the old name of --gains FILE"):
-        ObserverChoice.parsed(gains="auto", gains_file=file)
+        ObserverChoice.parsed(gains="auto", set_file=file)
 
 
 def test_a_match_moves_the_gains() -> None:
@@ -149,8 +149,8 @@ def test_only_observers_that_a_log_tunes_need_its_spectra() -> None:
     ("words", "message"),
     [
         ({"observer": ["kalman"]}, "no observer 'kalman'; there is best, fdo, gmo"),
-        ({"assignments": ["gmo"]}, "is not OBSERVER.PARAMETER=VALUE"),
-        ({"assignments": ["gmo.gian=3"]}, "Did you mean gain"),
+        ({"set": ["gmo"]}, "is not OBSERVER.PARAMETER=VALUE"),
+        ({"set": ["gmo.gian=3"]}, "Did you mean gain"),
         ({"match": "speed=3"}, "is not delay=S"),
         ({"match": "delay=-1"}, "is not delay=S"),
     ],

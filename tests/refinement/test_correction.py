@@ -20,9 +20,7 @@ from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-BY_DENSITY = ObserverChoice.parsed(
-    observer=["kfo-rts"], assignments=["kfo.noise_convention=density"]
-)
+BY_DENSITY = ObserverChoice.parsed(observer=["kfo-rts"], set=["kfo.noise_convention=density"])
 """What `best` falls back to."""
 MOVING = [0, 1, 2, 3, 5]
 """Joint 5 of the circle rests."""

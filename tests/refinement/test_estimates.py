@@ -22,7 +22,7 @@ from vftcli.signals.remarks import Remark
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 WHOLE_LOG = RefinementChoice(remove_bias="whole-log")
 DENSITIES = ObserverChoice.parsed(
-    observer=["rts-auto", "kfo-rts"], assignments=["kfo.noise_convention=density"]
+    observer=["rts-auto", "kfo-rts"], set=["kfo.noise_convention=density"]
 )
 """A tuned smoother, and what it falls back to."""
 MOVING = np.array([1, 2, 3, 4, 6])

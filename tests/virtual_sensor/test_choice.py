@@ -8,30 +8,9 @@ from vftcli.signals.errors import ParameterError
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice, ZeroChoice
 
 
-@pytest.mark.parametrize(
-    "option",
-    [
-        {"wrench": True},
-        {"frame": "base"},
-        {"solver": "map"},
-        {"tool": "0,0,0.1"},
-        {"sensor_pose": FIT},
-        {"zero": ["1:2"]},
-        {"torque_sd": "own"},
-    ],
-)
-def test_any_option_asks_for_a_wrench(option: dict[str, object]) -> None:
-    assert WrenchChoice.parsed(**option) is not None  # type: ignore[arg-type]
-
-
-def test_no_option_asks_for_none() -> None:
-    assert WrenchChoice.parsed(zero=[]) is None
-
-
 def test_what_is_not_chosen_is_the_flange_smoothed_for_best_by_least_squares_for_others() -> None:
-    choice = WrenchChoice.parsed(wrench=True)
+    choice = WrenchChoice.parsed(zero=[])
     assert choice == WrenchChoice(frame="flange", solver=None)
-    assert choice is not None
     assert choice.by_pose == "pinv"
     assert choice.smooths("best")
     assert not choice.smooths("kfo-fe")

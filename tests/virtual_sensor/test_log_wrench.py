@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 from rosbags.highlevel import AnyReader
 
-from vftcli.evaluation.reference_choice import sensor_reference
+from vftcli.evaluation.references import sensor_reference
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import flange_jacobian, link_poses

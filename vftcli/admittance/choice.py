@@ -1,120 +1,188 @@
 """What a user may choose of an admittance replay: its controllers, and a release from rest."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-import numpy as np
-
-from vftcli.admittance.law import Controller, check_kinds, controllers
-from vftcli.admittance.parameters import (
-    Admittance,
-    from_table,
-    is_admittance_setting,
-    parse_settings,
-    release_deviation,
-)
-from vftcli.robots import PROFILES, Robot
+from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.profile import checked_admittance
-from vftcli.robots.robot_file import RobotFile
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.option import Choice, Option
 
+if TYPE_CHECKING:
+    from vftcli.admittance.law import Controller
+    from vftcli.admittance.parameters import Admittance
+    from vftcli.robots.robot import Robot
+    from vftcli.signals.arrays import Array
+
+WITHOUT_LOG = "Without a log"  #: Heading of what needs none.
 FROM_DAMPING = "from-B"  #: The word for a damping ratio ξ that is that of the drag phase.
 
 
+def listed(text: str, option: str) -> tuple[float, ...]:
+    """The numbers of ``A,B,C``."""
+    numbers = parsing.numbers(text)
+    if numbers is None:
+        raise ParameterError(f"{option} {text!r} is not a list of numbers")
+    return numbers
+
+
+def deviation_of(words: Sequence[str]) -> "Array":
+    """The deviation of ``AXIS=VALUE`` words. (6,) [m, rad]"""
+    from vftcli.admittance.parameters import release_deviation
+
+    return release_deviation(words)
+
+
 @dataclass(frozen=True, kw_only=True)
-class ControlChoice:
+class ControlChoice(Choice):
     """Which controllers are compared, and with which parameters."""
 
-    kinds: tuple[str, ...] = ()  #: Keys of `vftcli.admittance.law.KINDS`; all if empty.
+    GROUP: ClassVar[str] = "The controller"
+
     #: One variable controller for each; the parameters' own α if empty.
-    alphas: tuple[float, ...] = ()
-    #: Parameters the user sets, which go before every file's.
-    settings: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    alphas: Annotated[
+        tuple[float, ...],
+        Option(
+            "--alpha",
+            "A,B,…",
+            "One variable controller each. Default the profile's.",
+            lambda text: listed(text, "--alpha"),
+        ),
+    ] = ()
+    #: Keys of `vftcli.admittance.law.KINDS`; all if empty.
+    kinds: Annotated[
+        tuple[str, ...],
+        Option("--controller", "variable|traditional", "Repeatable; default both.", several=True),
+    ] = ()
+    #: The damping ratio ξ, or `FROM_DAMPING`; None for the parameters' own.
+    xi: Annotated[
+        str | None,
+        Option(
+            "--xi",
+            "NUMBER|from-B",
+            "Damping ratio of the recovery; default from B_d, M_d, K_d.",
+            seldom=True,
+        ),
+    ] = None
+    threshold_mode: Annotated[
+        str | None,
+        Option(
+            "--threshold-mode",
+            "hard|soft|literal",
+            "The whole force above it, the excess, or all of it always (--as-printed).",
+            seldom=True,
+        ),
+    ] = None
     #: A file whose ``[admittance]`` is taken instead of the robot's, or None.
-    file: Path | None = None
-    force_unstable: bool = False  #: Whether unstable settings run too.
+    file: Annotated[
+        Path | None,
+        Option(
+            "--parameters",
+            "FILE.toml",
+            "Take [admittance] from this file, not the profile.",
+            seldom=True,
+        ),
+    ] = None
+    #: Whether unstable settings run too.
+    force_unstable: Annotated[
+        bool,
+        Option("--force-unstable", "", "Run settings that are unstable, for study.", seldom=True),
+    ] = False
+    #: Parameters the user sets, which go before every file's, each ``AXIS.PARAMETER=VALUE``.
+    assignments: tuple[str, ...] = ()
+    as_printed: bool = False  #: Whether the paper's printed formulas run.
 
     def __post_init__(self) -> None:
+        from vftcli.admittance.law import check_kinds
+
         check_kinds(self.kinds)
+        _ = self.settings  # malformed ones are refused before a log is read
 
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        assignments: Sequence[str] = (),
-        alpha: str | None = None,
-        controller: Sequence[str] | None = None,
-        xi: str | None = None,
-        threshold_mode: str | None = None,
-        parameters: Path | None = None,
-        force_unstable: bool = False,
-        as_printed: bool = False,
-    ) -> "ControlChoice":
-        """The choice that the options of a command state."""
+    @property
+    def settings(self) -> Mapping[str, Mapping[str, Any]]:
+        """The parameters that the user sets, by axis.
+
+        Raises:
+            ParameterError: If there is no such parameter, or a value is malformed.
+        """
+        from vftcli.admittance.parameters import parse_settings
+
         # What is named comes later, and so goes before it.
-        given = ["admittance.threshold_mode=literal"] if as_printed else []
-        given += assignments
-        if xi is not None and xi != FROM_DAMPING:
-            given.append(f"admittance.xi={xi}")
-        if threshold_mode is not None:
-            given.append(f"admittance.threshold_mode={threshold_mode}")
-        return cls(
-            kinds=tuple(controller or ()),
-            alphas=listed(alpha, "--alpha") if alpha is not None else (),
-            settings=parse_settings(given),
-            file=parameters,
-            force_unstable=force_unstable,
-        )
+        given = ["admittance.threshold_mode=literal"] if self.as_printed else []
+        given += self.assignments
+        if self.xi is not None and self.xi != FROM_DAMPING:
+            given.append(f"admittance.xi={self.xi}")
+        if self.threshold_mode is not None:
+            given.append(f"admittance.threshold_mode={self.threshold_mode}")
+        return parse_settings(given)
 
-    def parameters(self, robot: Robot) -> Admittance:
+    def parameters(self, robot: "Robot") -> "Admittance":
         """The admittance parameters: the file's or the robot's, then those that are set."""
+        from vftcli.admittance.parameters import from_table
+        from vftcli.robots.profile import checked_admittance
+        from vftcli.robots.robot_file import RobotFile
+
         table = robot.admittance
         if self.file is not None:
             table = checked_admittance(RobotFile(self.file).root.section("admittance"))
         return from_table(table, robot.name, self.settings)
 
-    def controllers(self, parameters: Admittance) -> tuple[Controller, ...]:
+    def controllers(self, parameters: "Admittance") -> "tuple[Controller, ...]":
         """The controllers that are compared, the traditional one first."""
+        from vftcli.admittance.law import controllers
+
         return controllers(parameters, self.kinds, self.alphas)
 
 
 def split_settings(assignments: Sequence[str]) -> tuple[list[str], list[str]]:
     """The assignments of ``--set`` that are of the admittance, and those of the observers."""
+    from vftcli.admittance.parameters import is_admittance_setting
+
     own = [text for text in assignments if is_admittance_setting(text)]
     return own, [text for text in assignments if text not in own]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReleaseChoice:
+class ReleaseChoice(Choice):
     """A release from rest."""
 
-    deviation: Array  #: From the target pose. (6,) [m, rad]
+    GROUP: ClassVar[str] = WITHOUT_LOG
+
+    #: From the target pose. (6,) [m, rad]
+    deviation: Annotated[
+        "Array",
+        Option(
+            "--release",
+            "AXIS=VALUE",
+            "Replay a release from rest: x=0.3 [m], rz=0.5 [rad].",
+            deviation_of,
+            several=True,
+        ),
+    ]
     #: Joint positions of the target pose, None for the robot file's. [rad]
-    start: tuple[float, ...] | None = None
-    duration: float | None = None  #: How long to watch, None for as long as it takes. [s]
+    start: Annotated[
+        tuple[float, ...] | None,
+        Option(
+            "--start",
+            "Q1,Q2,…",
+            "Start pose of a release [rad]; default the profile's.",
+            lambda text: listed(text, "--start"),
+            seldom=True,
+        ),
+    ] = None
+    #: How long to watch, None for as long as it takes. [s]
+    duration: Annotated[
+        float | None,
+        Option("--duration", "S", "Length of a release; default until it is over.", seldom=True),
+    ] = None
 
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        release: Sequence[str],
-        start: str | None = None,
-        duration: float | None = None,
-    ) -> "ReleaseChoice":
-        """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state."""
-        return cls(
-            deviation=release_deviation(release),
-            start=listed(start, "--start") if start is not None else None,
-            duration=duration,
-        )
-
-    def pose(self, robot: Robot) -> Array:
+    def pose(self, robot: "Robot") -> "Array":
         """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]"""
+        import numpy as np
+
         start = self.start or robot.admittance.get("start")
         if start is None:
             raise ParameterError(
@@ -124,16 +192,8 @@ class ReleaseChoice:
         return np.array(start, dtype=np.float64)
 
 
-def released_robot(choice: RobotChoice) -> Robot:
+def released_robot(choice: RobotChoice) -> "Robot":
     """The arm of a release, which no log settles."""
     if choice.name is None:
         raise RobotError(f"a release needs an arm: --robot {'|'.join(PROFILES)}, or a file")
     return choice.named()
-
-
-def listed(text: str, option: str) -> tuple[float, ...]:
-    """The numbers of ``A,B,C``."""
-    numbers = parsing.numbers(text)
-    if numbers is None:
-        raise ParameterError(f"{option} {text!r} is not a list of numbers")
-    return numbers

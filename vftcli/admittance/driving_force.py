@@ -64,7 +64,7 @@ def truth_force(
 ) -> DrivingForce:
     """The wrench of a truth file, on the log's own clock."""
     # Few replays have a truth, and reading one loads the references.
-    from vftcli.evaluation.reference_choice import file_reference
+    from vftcli.evaluation.references import file_reference
 
     wrench = file_reference(path, recording, robot, choice.mounting(robot)).wrench
     if wrench is None:

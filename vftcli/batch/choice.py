@@ -4,8 +4,10 @@ import re
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import Choice, Option
 
 ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
 MEMORY = 1.5e9  #: What a worker needs of the machine's memory at least. [B]
@@ -14,24 +16,70 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 
 @dataclass(frozen=True, kw_only=True)
-class WorkersChoice:
+class WorkersChoice(Choice):
     """Where many pieces of work are done."""
 
     #: How many processes of this machine; 0 for this process alone, None for as many as it has
     #: cores and memory for.
-    workers: int | None = None
-    scheduler: str | None = None  #: Address of a Dask scheduler that stands, or None.
-    #: Files of the authority's certificate, the own certificate and its key, or None.
-    tls: tuple[Path, Path, Path] | None = None
-    #: Bytes that a worker of this machine may take before it is ended, None for its share.
-    memory: int | None = None
+    workers: Annotated[
+        int | None,
+        Option(
+            "--workers",
+            "N",
+            "Processes of this machine. Default: one a core, at most 8. 0 does one log after the "
+            "other in this process, and needs no Dask.",
+            least=0,
+            most=4096,
+        ),
+    ] = None
+    #: Address of a Dask scheduler that stands, or None.
+    scheduler: Annotated[
+        str | None,
+        Option(
+            "--scheduler",
+            "ADDRESS",
+            "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
+        ),
+    ] = None
     #: Whether logs are sent to workers that do not see the files, and results sent back.
-    ship: bool = False
+    ship: Annotated[
+        bool,
+        Option(
+            "--ship",
+            "",
+            "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
+            seldom=True,
+        ),
+    ] = False
+    #: What a worker of this machine may take before it is ended, None for its share. [GB]
+    worker_memory: Annotated[
+        float | None,
+        Option(
+            "--worker-memory",
+            "GB",
+            "What a process of this machine may take before it is ended; default: its share.",
+            seldom=True,
+            least=0.1,
+        ),
+    ] = None
+    tls_ca: Annotated[
+        Path | None,
+        Option("--tls-ca", "FILE", "Certificate of the authority, for tls://.", seldom=True),
+    ] = None
+    tls_cert: Annotated[
+        Path | None,
+        Option("--tls-cert", "FILE", "Own certificate, for tls://.", seldom=True),
+    ] = None
+    tls_key: Annotated[
+        Path | None, Option("--tls-key", "FILE", "Its key, for tls://.", seldom=True)
+    ] = None
 
     def __post_init__(self) -> None:
+        if len(self.tls) in {1, 2}:
+            raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
         if self.scheduler is not None:
             self._check_address(self.scheduler)
-        elif self.ship or self.tls is not None:
+        elif self.ship or self.tls:
             raise ParameterError(
                 "--ship and --tls-… are for the workers of a cluster; add --scheduler ADDRESS"
             )
@@ -45,36 +93,23 @@ class WorkersChoice:
             raise ParameterError(
                 f"--scheduler {address!r} is no address, as tcp://host:8786 or tls://host:8786"
             )
-        if address.startswith("tls") != (self.tls is not None):
+        if address.startswith("tls") != bool(self.tls):
             raise ParameterError(
                 "tls:// and --tls-ca, --tls-cert, --tls-key (all three) belong together"
             )
         if self.workers is not None:
             raise ParameterError("--scheduler has its own workers; leave --workers out")
 
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        workers: int | None = None,
-        scheduler: str | None = None,
-        ship: bool = False,
-        worker_memory: float | None = None,
-        tls_ca: Path | None = None,
-        tls_cert: Path | None = None,
-        tls_key: Path | None = None,
-    ) -> "WorkersChoice":
-        """The choice that ``--workers``, ``--scheduler`` and what goes with them state."""
-        given = [path for path in (tls_ca, tls_cert, tls_key) if path is not None]
-        if len(given) in {1, 2}:
-            raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
-        return cls(
-            workers=workers,
-            scheduler=scheduler,
-            tls=(given[0], given[1], given[2]) if given else None,
-            memory=None if worker_memory is None else int(worker_memory * 1e9),
-            ship=ship,
-        )
+    @property
+    def tls(self) -> tuple[Path, ...]:
+        """The files of the authority's certificate, the own certificate and its key, or none."""
+        given = (self.tls_ca, self.tls_cert, self.tls_key)
+        return tuple(path for path in given if path is not None)
+
+    @property
+    def memory(self) -> int | None:
+        """Bytes that a worker of this machine may take before it is ended, None for its share."""
+        return None if self.worker_memory is None else int(self.worker_memory * 1e9)
 
     def check_closed(self, *, anyway: bool) -> None:
         """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""

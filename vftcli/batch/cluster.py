@@ -120,7 +120,7 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
     from distributed.security import Security
 
     security = None
-    if choice.tls is not None:
+    if choice.tls:
         authority, certificate, key = map(str, choice.tls)
         security = Security(
             tls_ca_file=authority,

@@ -35,8 +35,8 @@ def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
     for name, command in COMMANDS.items():
         how: Any = {"cls": GroupedCommand, "context_settings": HELP}
         if name in load:
-            module, function = command.target.split(":")
-            app.command(name, **how)(getattr(import_module(f"vftcli.cli.{module}"), function))
+            module = import_module(f"vftcli.cli.{command.file}")
+            app.command(name, **how)(getattr(module, command.function))
         else:
             app.command(name, help=command.summary, **how)(not_loaded)
     return app

@@ -6,13 +6,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vftcli.admittance.choice import WITHOUT_LOG, ControlChoice, ReleaseChoice
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, option, taken_apart
-from vftcli.cli.help import OUTPUT, WRITE
-from vftcli.cli.log_options import Words
+from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
-    from vftcli.admittance.choice import ControlChoice
     from vftcli.admittance.closed_loop import ClosedLoop
     from vftcli.admittance.driving_force import DrivingForce
     from vftcli.admittance.replay import Replay
@@ -24,129 +22,75 @@ if TYPE_CHECKING:
 #: Whose estimate is the force unless another is named: the paper drives its controller with it.
 OBSERVER = "kfo-fe"
 
-LogOrNone = Annotated[
-    Path | None,
-    typer.Argument(metavar="[LOG]", help="A log or an estimates.parquet; none with --release."),
-]
-Output = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="DIR",
-        help="Folder to write into; none: table only.",
-        rich_help_panel=WRITE,
-    ),
-]
 
-
-class ControllerOptions(Bundle):
-    """Which controllers are compared."""
-
-    GROUP = "The controller"
-
-    alpha: str | None = option(
-        "--alpha", "A,B,…", "One variable controller each. Default the profile's."
-    )
-    controller: Words = option("--controller", "variable|traditional", "Repeatable; default both.")
-    xi: str | None = option(
-        "--xi",
-        "NUMBER|from-B",
-        "Damping ratio of the recovery; default from B_d, M_d, K_d.",
-        seldom=True,
-    )
-    threshold_mode: str | None = option(
-        "--threshold-mode",
-        "hard|soft|literal",
-        "The whole force above it, the excess, or all of it always (--as-printed).",
-        seldom=True,
-    )
-    parameters: Path | None = option(
-        "--parameters",
-        "FILE.toml",
-        "Take [admittance] from this file, not the profile.",
-        seldom=True,
-    )
-    force_unstable: bool = flag(
-        "--force-unstable", "Run settings that are unstable, for study.", seldom=True
-    )
-
-
-class ReleaseOptions(Bundle):
-    """A release from rest, without a log."""
-
-    GROUP = "Without a log"
-
-    release: Words = option(
-        "--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."
-    )
-    start: str | None = option(
-        "--start", "Q1,Q2,…", "Start pose of a release [rad]; default the profile's.", seldom=True
-    )
-    duration: float | None = option(
-        "--duration", "S", "Length of a release; default until it is over.", seldom=True
-    )
-
-
-class LoopOptions(Bundle):
+class LoopOptions(opt.Bundle):
     """A controller in the loop of a simulation, without a log."""
 
-    GROUP = "Without a log"
+    closed_loop: Annotated[
+        str | None,
+        Option(
+            "--closed-loop",
+            "SCENARIO",
+            "Run a scenario against the controller. Its contacts are simulated, then the force "
+            "that it acted on is replayed.",
+            group=WITHOUT_LOG,
+        ),
+    ]
+    seed: Annotated[int | None, opt.SEED._replace(seldom=True, group=WITHOUT_LOG)]
+    torque: Annotated[
+        str,
+        Option(
+            "--torque",
+            "average|instant",
+            "What the closed loop's sensors report.",
+            seldom=True,
+            group=WITHOUT_LOG,
+        ),
+    ] = "average"
 
-    closed_loop: str | None = option(
-        "--closed-loop",
-        "SCENARIO",
-        "Run a scenario against the controller. Its contacts are simulated, then the force that it "
-        "acted on is replayed.",
-    )
-    seed: int | None = option(*opt.SEED, seldom=True, min=0)
-    torque: str = option(
-        "--torque",
-        "average|instant",
-        "What the closed loop's sensors report.",
-        "average",
-        seldom=True,
-    )
 
-
-class ForceOptions(Bundle):
+class ForceOptions(opt.Bundle):
     """Which force drives the replay, if not an observer's."""
 
-    GROUP = "The force"
-
-    sensor: bool = flag("--sensor", "Take the log's own wrench.")
-    truth: Path | None = option(
-        "--truth", "FILE", "Take the wrench of a truth file, flange, base axes.", seldom=True
-    )
-
-
-class LatexOption(Bundle):
-    """The tables for a paper."""
-
-    GROUP = OUTPUT
-
-    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).", seldom=True)
+    sensor: Annotated[bool, Option("--sensor", "", "Take the log's own wrench.", group="The force")]
+    truth: Annotated[
+        Path | None,
+        Option(
+            "--truth",
+            "FILE",
+            "Take the wrench of a truth file, flange, base axes.",
+            seldom=True,
+            group="The force",
+        ),
+    ]
 
 
-class ShownOptions(opt.FigureOptions):
+class ShownOptions(opt.Bundle):
     """What is shown and drawn of the comparison."""
 
-    json: opt.Json = False
-    table: LatexOption
+    figures: opt.Figures
+    json: opt.Json
+    latex: Annotated[bool, opt.LATEX._replace(seldom=True, group=OUTPUT)]
 
 
-@taken_apart
+@opt.command
 def admit(
-    controllers: ControllerOptions,
-    release: ReleaseOptions,
+    controllers: opt.Typed[ControlChoice],
+    release: opt.Typed[ReleaseChoice],
     loop: LoopOptions,
     source: ForceOptions,
     analysis: opt.AnalysisOptions,
     shown: ShownOptions,
-    log: LogOrNone = None,
-    output: Output = None,
-    force: opt.Force = False,
-    show_made: opt.Open = False,
+    log: Annotated[
+        Path | None,
+        Option("", "[LOG]", "A log or an estimates.parquet; none with --release."),
+    ],
+    output: Annotated[
+        Path | None,
+        Option("-o/--output", "DIR", "Folder to write into; none: table only.", group=WRITE),
+    ],
+    force: opt.Force,
+    show_made: opt.Open,
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
@@ -157,28 +101,27 @@ def admit(
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
-    from vftcli.admittance.choice import ControlChoice, split_settings
+    from vftcli.admittance.choice import split_settings
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
     from vftcli.outputs.admittance.files import files_of_replay, write_admittance
+    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
 
-    if sum((log is not None, bool(release.release), loop.closed_loop is not None)) != 1:
+    asked = log is not None, bool(release.words["release"]), loop.closed_loop is not None
+    if sum(asked) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
     check_installed("pinocchio", "vftcli admit")
-    own, others = split_settings(analysis.observers.assignments or ())
-    control = ControlChoice.parsed(
-        assignments=own, as_printed=analysis.observers.as_printed, **controllers.words()
-    )
-    observers = analysis.observers.changed(assignments=others)
-    analysis = analysis.changed(observers=observers)
-    form = shown.form()
+    typed = analysis.observers.words
+    own, typed["set"] = split_settings(typed["set"] or ())
+    control = replace(controllers.choice(), assignments=tuple(own), as_printed=typed["as_printed"])
+    form = checked_form(shown.figures)
     if output is not None:
         OutputFolder(output, force, files_of_replay(form)).check()
     elif show_made or form:
         raise typer.BadParameter("--open and --figures are of what -o DIR writes; give -o too")
-    if shown.json and shown.table.latex:
+    if shown.json and shown.latex:
         raise typer.BadParameter("choose one of --json and --latex")
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
@@ -200,7 +143,7 @@ def admit(
             examinations=examinations,
             form=form,
         )
-        if not (shown.json or shown.table.latex):
+        if not (shown.json or shown.latex):
             say(f"wrote {output}: vftcli open {output}")
         say_left_out(files_of_replay(form))
         if show_made:
@@ -213,12 +156,11 @@ def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisC
     from vftcli.signals.errors import ParameterError
     from vftcli.virtual_sensor.choice import WrenchChoice
 
-    named = analysis.observers.observer or [OBSERVER]
+    named = analysis.observers.words["observer"] or [OBSERVER]
     if len(named) > 1:
         raise ParameterError("one observer's force drives the replay; give --observer once")
-    observers = analysis.observers.changed(observer=named)
-    choice = analysis.changed(observers=observers).choice(Library([log] if log else []))
-    if analysis.wrench.frame not in {None, "base"}:
+    choice = analysis.choice(Library([log] if log else []), observer=named)
+    if analysis.wrench.words["frame"] not in {None, "base"}:
         raise ParameterError(
             "the replay is in base axes about the flange point; leave --frame away"
         )
@@ -226,13 +168,13 @@ def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisC
 
 
 def released(
-    release: ReleaseOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+    release: opt.Typed[ReleaseChoice], analysis: opt.AnalysisOptions, control: ControlChoice
 ) -> "Replay":
     """A release from rest."""
-    from vftcli.admittance.choice import ReleaseChoice, released_robot
+    from vftcli.admittance.choice import released_robot
     from vftcli.admittance.replay import replay_release
 
-    choice = ReleaseChoice.parsed(**release.words())
+    choice = release.choice()
     arm = released_robot(chosen(analysis).robot)
     settings = control.parameters(arm)
     return replay_release(
@@ -247,21 +189,20 @@ def released(
 
 
 def replayed(
-    log: Path, source: ForceOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+    log: Path, source: ForceOptions, analysis: opt.AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
     from vftcli.pipeline import check_logged, prepared
     from vftcli.readers.estimates import estimates_columns
 
-    stored, observers = None, analysis.observers
-    if analysis.reading.columns is None:
-        name = (observers.observer or [OBSERVER])[0]
+    stored, typed = None, analysis.observers.words
+    if analysis.reading.words["columns"] is None:
+        name = (typed["observer"] or [OBSERVER])[0]
         if (columns := estimates_columns(log, name)) is not None:
             # A table of estimates may hold those of an observer that is none of ours.
-            stored, observers = name, observers.changed(observer=None)
-            reading = analysis.reading.changed(columns=columns)
-            analysis = analysis.changed(reading=reading, observers=observers)
+            stored, typed["observer"] = name, None
+            analysis.reading.words["columns"] = columns
     choice = chosen(analysis, log)
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     check_logged(recording, "admit runs a controller that must not see the future")
@@ -308,7 +249,7 @@ def force_of(
 
 
 def looped(
-    loop: LoopOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
+    loop: LoopOptions, analysis: opt.AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, ClosedLoop]":
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
@@ -370,7 +311,7 @@ def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> Non
     if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))
         return
-    if shown.table.latex:
+    if shown.latex:
         typer.echo(latex_text(result).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")

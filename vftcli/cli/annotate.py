@@ -3,13 +3,13 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
+from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.batch import WorkerOptions
-from vftcli.cli.bundles import Bundle, flag, taken_apart
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.observers.choice import ObserverChoice
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import WRITE, Option
+from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -17,49 +17,63 @@ if TYPE_CHECKING:
     from vftcli.batch.annotation import ForceChoice
 
 
-class ColumnOptions(Bundle):
+class ColumnOptions(opt.Bundle):
     """Which columns are added, and how the copy is made."""
 
-    GROUP = WRITE
+    sd: Annotated[
+        bool,
+        Option(
+            "--sd", "", "Also the observer's own standard deviation of each torque.", group=WRITE
+        ),
+    ]
+    contact: Annotated[
+        bool,
+        Option(
+            "--contact",
+            "",
+            "Also 1 in a listed contact, else 0. The list sees the complete episode: a label, no "
+            "causal input.",
+            group=WRITE,
+        ),
+    ]
+    allow_missing: Annotated[
+        bool,
+        Option(
+            "--allow-missing",
+            "",
+            "Write 0 where nothing can be told. Columns …_valid say where; without it, such a "
+            "frame stops the run.",
+            group=WRITE,
+        ),
+    ]
+    copy: Annotated[
+        bool,
+        Option(
+            "--copy",
+            "",
+            "Copy videos too. They are linked else, where that can be.",
+            group=WRITE,
+        ),
+    ]
 
-    sd: bool = flag("--sd", "Also the observer's own standard deviation of each torque.")
-    contact: bool = flag(
-        "--contact",
-        "Also 1 in a listed contact, else 0. The list sees the complete episode: a label, no "
-        "causal input.",
-    )
-    allow_missing: bool = flag(
-        "--allow-missing",
-        "Write 0 where nothing can be told. Columns …_valid say where; without it, such a frame "
-        "stops the run.",
-    )
-    copy: bool = flag("--copy", "Copy videos too. They are linked else, where that can be.")
 
-
-@taken_apart
+@opt.command
 def annotate_dataset(
     dataset: Annotated[
-        Path,
-        typer.Argument(
-            metavar="DATASET", help="A LeRobot folder, a DROID folder, or HDF5 episodes."
-        ),
+        Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
     ],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="COPY", help="Folder of the copy.", rich_help_panel=WRITE
-        ),
-    ],
-    reading: ReadOptions,
-    robot: RobotOptions,
-    observers: opt.ObserverOptions,
-    wrench: opt.WrenchOptions,
+    output: Annotated[Path, Option("-o/--output", "COPY", "Folder of the copy.", group=WRITE)],
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    observers: opt.Typed[ObserverChoice],
+    also_wrench: opt.Wrench,
+    wrench: opt.Typed[WrenchChoice],
     columns: ColumnOptions,
-    workers: WorkerOptions,
-    anyway: opt.AnywayOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    json: opt.Json = False,
-    force: opt.Force = False,
+    workers: opt.Typed[WorkersChoice],
+    anyway: opt.Anyway,
+    _talk: opt.TalkOptions,
+    json: opt.Json,
+    force: opt.Force,
 ) -> None:
     """Write the forces of every frame into a copy of a dataset.
 
@@ -75,14 +89,14 @@ def annotate_dataset(
     asked = ForceChoice(
         read=reading.choice(),
         robot=robot.choice(),
-        observers=observers.changed(observer=observers.observer or [USUAL]).choice(),
-        wrench=wrench.choice(),
+        observers=observers.choice(observer=observers.words["observer"] or [USUAL]),
+        wrench=wrench.choice() if also_wrench or wrench.is_asked else None,
         sd=columns.sd,
         contact=columns.contact,
-        anyway=anyway.anyway,
+        anyway=anyway,
     )
     engine = workers.choice()
-    engine.check_closed(anyway=anyway.anyway)
+    engine.check_closed(anyway=anyway)
     how = CopyChoice(allow_missing=columns.allow_missing, link=not columns.copy, force=force)
     record = annotate(
         dataset,

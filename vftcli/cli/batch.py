@@ -7,93 +7,49 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, ChoiceBundle, flag, option, taken_apart
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.signals.option import Option
 
 if TYPE_CHECKING:
-    from vftcli.batch.choice import WorkersChoice
     from vftcli.batch.run import BatchCount
 
-Places = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="LOG|FOLDER...",
-        help="Logs, folders, data sets; an episode is a log.",
-    ),
-]
 EVERY = 2.0  #: How often a line of progress is printed where nobody watches. [s]
 #: What is asked of logs without comparing them with anything.
 WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 
 
-class WorkerOptions(ChoiceBundle["WorkersChoice"]):
-    """Where the work is done."""
-
-    HOME = "batch.choice:WorkersChoice"
-
-    workers: int | None = option(
-        "--workers",
-        "N",
-        "Processes of this machine. Default: one a core, at most 8. 0 does one log after the other "
-        "in this process, and needs no Dask.",
-        min=0,
-        max=4096,
-    )
-    scheduler: str | None = option(
-        "--scheduler",
-        "ADDRESS",
-        "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
-    )
-    ship: bool = flag(
-        "--ship",
-        "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
-        seldom=True,
-    )
-    worker_memory: float | None = option(
-        "--worker-memory",
-        "GB",
-        "What a process of this machine may take before it is ended; default: its share.",
-        seldom=True,
-        min=0.1,
-    )
-    tls_ca: Path | None = option(
-        "--tls-ca", "FILE", "Certificate of the authority, for tls://.", seldom=True
-    )
-    tls_cert: Path | None = option(
-        "--tls-cert", "FILE", "Own certificate, for tls://.", seldom=True
-    )
-    tls_key: Path | None = option("--tls-key", "FILE", "Its key, for tls://.", seldom=True)
-
-
-class ResumeOptions(Bundle):
+class ResumeOptions(opt.Bundle):
     """Which logs are done, in a second run and at all."""
 
-    limit: int | None = option("--limit", "N", "Only the first N logs.", seldom=True, min=1)
-    retry_failed: bool = flag("--retry-failed", "Also logs that failed in an earlier run.")
-    max_failures: int | None = option(
-        "--max-failures", "N", "Stop when so many logs failed.", seldom=True, min=1
-    )
+    limit: Annotated[
+        int | None, Option("--limit", "N", "Only the first N logs.", seldom=True, least=1)
+    ]
+    retry_failed: Annotated[
+        bool, Option("--retry-failed", "", "Also logs that failed in an earlier run.")
+    ]
+    max_failures: Annotated[
+        int | None,
+        Option("--max-failures", "N", "Stop when so many logs failed.", seldom=True, least=1),
+    ]
 
 
-@taken_apart
+@opt.command
 def batch(
-    logs: Places,
-    output: opt.Folder,
-    do: Annotated[
-        str,
-        typer.Option(
-            "--do",
-            metavar="COMMAND",
-            help="estimate, compare, report or contacts.",
-        ),
+    logs: Annotated[
+        list[Path],
+        Option("", "LOG|FOLDER...", "Logs, folders, data sets; an episode is a log."),
     ],
-    workers: WorkerOptions,
+    output: opt.Folder,
+    do: Annotated[str, Option("--do", "COMMAND", "estimate, compare, report or contacts.")],
+    workers: opt.Typed[WorkersChoice],
     resume: ResumeOptions,
-    reference: opt.ReferenceOptions,
+    reference: opt.Typed[ReferenceChoice],
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
-    force: opt.Force = False,
+    force: opt.Force,
 ) -> None:
     """Ask many logs the same, on every core or on a cluster.
 
@@ -124,9 +80,9 @@ def batch(
     choice = narrowed[do](choice) if do in narrowed else choice
     # These are of each worker.
     choice = replace(choice, library=Library(), examiner=Examiner(), progress=no_stage)
-    job = LogJob(do=do, choice=choice, anyway=analysis.anyway.anyway, written=also.choice())
+    job = LogJob(do=do, choice=choice, anyway=analysis.anyway, written=also.choice())
     engine = workers.choice()
-    engine.check_closed(anyway=analysis.anyway.anyway)
+    engine.check_closed(anyway=analysis.anyway)
     collection = LogCollection(choice.read, output)
     found = list(collection.find(logs))[: resume.limit]
     say_passed([path.name for path in collection.passed])

@@ -1,45 +1,44 @@
 """`vftcli bench`: Table II on this machine."""
 
 from dataclasses import replace
+from typing import Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, option, taken_apart
-from vftcli.cli.log_options import ROBOT
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import Option
 
 
-class BenchOptions(Bundle):
-    """What is measured, and how often."""
-
-    robot: str = option(*ROBOT, "ur5")
-    samples: int = option("--samples", "N", "Length of the log.", 30_060, min=100)
-    rounds: int = option("--rounds", "N", "Interleaved repetitions.", 7, min=1)
-    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).")
-
-
-@taken_apart
-def bench(measured: BenchOptions, json: opt.Json = False) -> None:
+@opt.command
+def bench(
+    *,
+    robot: Annotated[str, RobotChoice.option("robot")] = "ur5",
+    samples: Annotated[int, Option("--samples", "N", "Length of the log.", least=100)] = 30_060,
+    rounds: Annotated[int, Option("--rounds", "N", "Interleaved repetitions.", least=1)] = 7,
+    latex: Annotated[bool, opt.LATEX],
+    json: opt.Json,
+) -> None:
     """Time the observers.
 
     Example: vftcli bench --rounds 3
     """
     from vftcli.cli.console import say_json
-    from vftcli.outputs.grid import latex, terminal
+    from vftcli.outputs import grid
     from vftcli.outputs.listings import bench_grid
     from vftcli.reproduction.timing import benchmark
 
-    result = benchmark(measured.robot, measured.samples, measured.rounds)
+    result = benchmark(robot, samples, rounds)
     if json:
         say_json(result)
         return
     title = (
-        f"{result['robot']}, {measured.samples} samples, median of {measured.rounds} rounds, "
+        f"{result['robot']}, {samples} samples, median of {rounds} rounds, "
         f"NumPy with {result['simd']}"
     )
-    if measured.latex:
-        grid = replace(bench_grid(result), title=f"Computing time: {title}")
-        typer.echo(latex(grid), nl=False)
+    if latex:
+        table = replace(bench_grid(result), title=f"Computing time: {title}")
+        typer.echo(grid.latex(table), nl=False)
         return
     typer.echo(title)
-    typer.echo(terminal(bench_grid(result)))
+    typer.echo(grid.terminal(bench_grid(result)))

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, option, taken_apart
-from vftcli.cli.help import COMPARE, OUTPUT
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.signals.option import COMPARE, OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
     import polars as pl
@@ -17,39 +17,41 @@ if TYPE_CHECKING:
 MORE = "Intervals, lags and significance: --details"  #: What the tables on the terminal leave out.
 
 
-class TableOptions(Bundle):
+class TableOptions(opt.Bundle):
     """The form of the table; one at most."""
 
-    GROUP = OUTPUT
-
-    json: opt.Json = False
-    csv: bool = flag("--csv", "Print one row per observer and joint.")
-    markdown: bool = flag("--markdown", "Print a Markdown table.")
-    latex: bool = flag("--latex", "Print a LaTeX table (booktabs).")
+    json: opt.Json
+    csv: Annotated[bool, Option("--csv", "", "Print one row per observer and joint.", group=OUTPUT)]
+    markdown: Annotated[bool, Option("--markdown", "", "Print a Markdown table.", group=OUTPUT)]
+    latex: Annotated[bool, opt.LATEX._replace(group=OUTPUT)]
 
     @property
     def form(self) -> str:
         """The one form that is asked for, or "terminal"."""
-        asked = [name for name, wanted in self.words().items() if wanted]
+        asked = [name for name, wanted in vars(self).items() if wanted]
         if len(asked) > 1:
             raise typer.BadParameter(f"choose one of {', '.join(f'--{name}' for name in asked)}")
         return asked[0] if asked else "terminal"
 
 
-class DrawnErrors(opt.FigureOptions):
+class DrawnErrors(opt.Bundle):
     """The figure of the errors, and where it goes."""
 
-    output: Path | None = option("-o/--output", "DIR", "Folder for --figures.")
-    force: opt.Force = False
+    figures: opt.Figures
+    output: Annotated[
+        Path | None, Option("-o/--output", "DIR", "Folder for --figures.", group=WRITE)
+    ]
+    force: opt.Force
 
     def folder(self) -> "OutputFolder | None":
         """Where the figure goes, None where none is asked for."""
-        form = self.form()
+        from vftcli.outputs.figures.paper import checked_form, figure_files
+
+        form = checked_form(self.figures)
         if (form is None) != (self.output is None):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
         if self.output is None:
             return None
-        from vftcli.outputs.figures.paper import figure_files
         from vftcli.outputs.files import OutputFolder
         from vftcli.outputs.log.figures import ERROR_FIGURES
 
@@ -69,21 +71,22 @@ class DrawnErrors(opt.FigureOptions):
             say(f"wrote {self.output}: figures/errors-single.{self.figures}, errors-double")
 
 
-@taken_apart
+@opt.command
 def compare(
     logs: opt.Logs,
-    reference: opt.RequiredReferenceOptions,
+    reference: opt.Needed[ReferenceChoice],
     analysis: opt.AnalysisOptions,
     table: TableOptions,
     drawn: DrawnErrors,
     significance: Annotated[
         bool,
-        typer.Option(
+        Option(
             "--significance",
-            help="Every pair of observers: difference, interval, p.",
-            rich_help_panel=COMPARE,
+            "",
+            "Every pair of observers: difference, interval, p.",
+            group=COMPARE,
         ),
-    ] = False,
+    ],
 ) -> None:
     """Print every observer's error against a reference, and its floor.
 

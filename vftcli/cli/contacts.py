@@ -1,14 +1,15 @@
 """`vftcli contacts`: what touched the arm, when, how hard, where."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, taken_apart
-from vftcli.cli.help import OUTPUT
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.readers.reader import ReadChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import OUTPUT, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -16,24 +17,22 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
 
 
-class ListOptions(Bundle):
+class ListOptions(opt.Bundle):
     """The form of the list."""
 
-    GROUP = OUTPUT
-
-    json: opt.Json = False
-    csv: bool = flag("--csv", "Print one row per contact.")
-    all: bool = flag("--all", "Every row, not only the 20 hardest.")
+    json: opt.Json
+    csv: Annotated[bool, Option("--csv", "", "Print one row per contact.", group=OUTPUT)]
+    all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.", group=OUTPUT)]
 
 
-@taken_apart
+@opt.command
 def list_contacts(
     logs: opt.Logs,
-    reading: ReadOptions,
-    robot: RobotOptions,
-    free: opt.FreeOptions,
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    free: opt.Typed[FreeChoice],
     form: ListOptions,
-    anyway: opt.AnywayOptions,
+    anyway: opt.Anyway,
     talk: opt.TalkOptions,
 ) -> None:
     """List what touched the arm: when, how hard, where, how sure.
@@ -50,7 +49,7 @@ def list_contacts(
     from vftcli.readers.estimates import stored_observers
     from vftcli.readers.library import Library
 
-    if len(logs) == 1 and reading.columns is None and stored_observers(logs[0]):
+    if len(logs) == 1 and reading.words["columns"] is None and stored_observers(logs[0]):
         print_stored(logs[0], form)
         return
     library = Library(logs)
@@ -60,7 +59,7 @@ def list_contacts(
         free=free.choice(),
         library=library,
         progress=stages(),
-        examiner=health_of(library, anyway=anyway.anyway, on_screen=not (form.json or form.csv)),
+        examiner=health_of(library, anyway=anyway, on_screen=not (form.json or form.csv)),
     )
     left_out = LeftOut(library, logs)
     found = []

@@ -4,31 +4,21 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import ReadOptions
+from vftcli.readers.reader import ReadChoice
+from vftcli.signals.option import WRITE, Option
 
 
-@taken_apart
+@opt.command
 def convert_log(
     log: opt.Log,
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE",
-            help="x.parquet, x.mcap or x.csv.",
-            rich_help_panel=WRITE,
-        ),
+        Path, Option("-o/--output", "FILE", "x.parquet, x.mcap or x.csv.", group=WRITE)
     ],
-    reading: ReadOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    json: opt.Json = False,
-    force: opt.Force = False,
+    reading: opt.Typed[ReadChoice],
+    _talk: opt.TalkOptions,
+    json: opt.Json,
+    force: opt.Force,
 ) -> None:
     """Convert any readable log into Parquet, CSV or MCAP.
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.help import WRITE
+from vftcli.signals.option import WRITE, Option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,21 +17,17 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
 
 
-@taken_apart
+@opt.command
 def estimate(
     log: opt.Log,
     output: opt.Folder,
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
-    csv: Annotated[
-        bool, typer.Option("--csv", help="Also write estimates.csv.", rich_help_panel=WRITE)
-    ] = False,
-    rrd: Annotated[
-        bool, typer.Option("--rrd", help="Also write recording.rrd.", rich_help_panel=WRITE)
-    ] = False,
-    json: opt.Json = False,
-    force: opt.Force = False,
-    show: opt.Open = False,
+    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.", group=WRITE)],
+    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.", group=WRITE)],
+    json: opt.Json,
+    force: opt.Force,
+    show: opt.Open,
 ) -> None:
     """Estimate the external joint torques along a log.
 
@@ -55,9 +50,9 @@ def estimate(
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
-    causal = analysis.observers.causal or analysis.contacts.no_contacts
-    signals = EXAMINED if causal and not (analysis.wrench.asks or written.extras) else None
-    if analysis.reading.columns is None:
+    causal = analysis.observers.words["causal"] or analysis.no_contacts
+    signals = EXAMINED if causal and not (analysis.asks_wrench or written.extras) else None
+    if analysis.reading.words["columns"] is None:
         refuse_estimates(log)
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
     # What needs no complete log comes in blocks, so that memory does not grow with it.

@@ -6,7 +6,7 @@ Nothing here loads more than the command line itself, so that help comes at once
 import shutil
 import textwrap
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,16 +14,13 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
-from vftcli.cli.bundles import SELDOM
+from vftcli.cli import options
 from vftcli.cli.commands import COMMANDS
 from vftcli.cli.config import config_option, forget, is_configured, settle
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
 from vftcli.signals.parsing import did_you_mean, nearest
 
-#: Headings of the options that commands share, in their order.
-LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
-    "The log", "How to estimate", "How to compare", "The wrench", "What to write", "Output"
-)  # fmt: skip
 OWN = "This command"  #: Heading of the options that only one command has.
 NARROWEST, WIDEST, LEFT = 72, 100, 33  #: Columns of a help text, and of its left half at most.
 SHORT = 3  #: Lines of a paragraph that the short help shows.
@@ -54,6 +51,11 @@ class GroupedCommand(TyperCommand):
         if is_configured(self):
             settle(ctx)
         return rest
+
+    def option(self, param: Any) -> Option:  # noqa: ANN401
+        """What a parameter was made of; of those of every command, what is not in their help."""
+        own: Option | None = vars(self.callback).get("options", {}).get(param.name)
+        return own or Option("", "", "", group=OUTPUT)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write the short help."""
@@ -111,27 +113,29 @@ def command_help(ctx: Any, *, every: bool) -> str:  # noqa: ANN401
         # What it is and an example always; what takes long to say only in full.
         if every or k in {0, len(paragraphs) - 1} or len(wrapped) <= SHORT:
             lines += wrapped
-    for group, rows in grouped(command.get_params(ctx), ctx, every=every):
+    for group, rows in grouped(command, ctx, every=every):
         lines += ["", group] if every else [group + ":"]
         lines += list(two_columns(rows, width))
-    if not every and any(is_seldom(p) for p in command.get_params(ctx)):
+    if not every and any(command.option(p).seldom for p in command.get_params(ctx)):
         lines.append("Further options: --help-all. Topics: vftcli help")
     return "\n".join(lines) + "\n"
 
 
 def grouped(
-    params: Iterable[Any],
+    command: GroupedCommand,
     ctx: Any,  # noqa: ANN401
     *,
     every: bool,
 ) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """The options of each heading that has any, as they are typed and what they mean."""
     found: dict[str, list[tuple[str, str]]] = {}
-    for param in params:
-        if (record := row_of(param, ctx)) is None or (is_seldom(param) and not every):
+    for param in command.get_params(ctx):
+        option = command.option(param)
+        if (record := row_of(param, ctx)) is None or (option.seldom and not every):
             continue
         text = record[1] if every else first_sentence(record[1])
-        found.setdefault(group_of(param), []).append((record[0], text))
+        group = LOG if param.param_type_name == "argument" else option.group or OWN
+        found.setdefault(group, []).append((record[0], text))
     others = [group for group in found if group not in GROUPS]
     for group in (LOG, *others, *GROUPS[1:]):
         if group in found:
@@ -144,20 +148,6 @@ def row_of(param: Any, ctx: Any) -> tuple[str, str] | None:  # noqa: ANN401
         return (param.metavar or param.name.upper(), param.help) if param.help else None
     record: tuple[str, str] | None = param.get_help_record(ctx)
     return record
-
-
-def is_seldom(param: Any) -> bool:  # noqa: ANN401
-    """Whether only `--help-all` shows an option."""
-    return str(getattr(param, "rich_help_panel", None) or "").endswith(SELDOM)
-
-
-def group_of(param: Any) -> str:  # noqa: ANN401
-    """The heading under which an option stands."""
-    if param.name in {"help", "help_all", "config"}:
-        return OUTPUT
-    if param.param_type_name == "argument":
-        return LOG
-    return str(param.rich_help_panel or "").removesuffix(SELDOM) or OWN
 
 
 def first_sentence(text: str) -> str:
@@ -204,11 +194,10 @@ def topics() -> Mapping[str, Mapping[str, str]]:
     return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
 
 
+@options.command
 def show_help(
     ctx: typer.Context,
-    topic: Annotated[
-        str | None, typer.Argument(metavar="[TOPIC]", help="A topic or a command; none: the list.")
-    ] = None,
+    topic: Annotated[str | None, Option("", "[TOPIC]", "A topic or a command; none: the list.")],
 ) -> None:
     """Explain a topic, as columns or frames, or a command.
 
@@ -222,9 +211,9 @@ def show_help(
         typer.echo(found[topic]["text"].rstrip())
     elif topic in COMMANDS:
         root: Any = ctx.find_root()
-        command = root.command.commands[topic]
-        of_command = command.make_context(topic, [], parent=root, resilient_parsing=True)
-        typer.echo(command.get_help(of_command))
+        asked = root.command.commands[topic]
+        of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
+        typer.echo(asked.get_help(of_command))
     else:
         near = did_you_mean(topic, [*found, *COMMANDS])
         raise ParameterError(f"no topic {topic!r}; there is {', '.join(found)}.{near}")

@@ -1,36 +1,47 @@
 """`vftcli identify`: logs become a robot."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, flag, option, taken_apart
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import ReadOptions, RobotOptions, Words
+from vftcli.readers.reader import ReadChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import WRITE, Option
+from vftcli.signals.parsing import interval
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
-    from vftcli.readers.reader import ReadChoice
     from vftcli.signals.recording import Recording
 
 
-class TaskOptions(Bundle):
+class TaskOptions(opt.Bundle):
     """What is identified, and how."""
 
-    method: str | None = option(
-        "--method",
-        "METHOD",
-        "friction, base, targets or auto. Default: auto, friction but base where the robot's links "
-        "are wrong; none with --find-payload.",
-    )
-    find_payload: bool = flag(
-        "--find-payload",
-        "Find a load on the flange: two LOGs of one motion, --free, poses, or motion.",
-    )
-    fit_constants: bool = flag("--fit-constants", "Friction method: drive constants K too.")
-    cutoff: float = option("--cutoff", "HZ", "Cutoff of the zero-phase filter.", 8.0)
+    method: Annotated[
+        str | None,
+        Option(
+            "--method",
+            "METHOD",
+            "friction, base, targets or auto. Default: auto, friction but base where the robot's "
+            "links are wrong; none with --find-payload.",
+        ),
+    ]
+    find_payload: Annotated[
+        bool,
+        Option(
+            "--find-payload",
+            "",
+            "Find a load on the flange: two LOGs of one motion, --free, poses, or motion.",
+        ),
+    ]
+    fit_constants: Annotated[
+        bool, Option("--fit-constants", "", "Friction method: drive constants K too.")
+    ]
+    cutoff: Annotated[float, Option("--cutoff", "HZ", "Cutoff of the zero-phase filter.")] = 8.0
 
     def task(self, name: str, friction: bool = True) -> "Task":
         """What shall be identified, for a robot of this name whose joints rub or not."""
@@ -47,56 +58,43 @@ class TaskOptions(Bundle):
         )
 
 
-class ValidationOptions(Bundle):
-    """Which logs the new robot is scored on besides those it is made from."""
+def logs_without_load(free: list[str] | None, find_payload: bool) -> tuple[Path, ...]:
+    """The logs of the same motion without the load that is sought, one at most."""
+    from vftcli.signals.errors import ParameterError
 
-    validate: list[Path] | None = option("--validate", "LOG", "Score on this log too. Repeatable.")
-    interval: str | None = option(
-        "--validate-interval", "A:B", "Use only this span of the --validate logs."
-    )
-
-
-class WithoutLoad(Bundle):
-    """The same motion without the load that is sought."""
-
-    free: Words = option(*opt.FREE)
-
-    def logs(self, find_payload: bool) -> tuple[Path, ...]:
-        """The logs that are given, one at most."""
-        from vftcli.repetition.choice import FreeChoice
-        from vftcli.signals.errors import ParameterError
-
-        chosen = FreeChoice.parsed(free=self.free)
-        if chosen.spans or len(chosen.logs) > 1:
-            raise ParameterError(
-                "a load is found from one pair of logs: give --free the log without it, once"
-            )
-        if chosen.logs and not find_payload:
-            raise ParameterError(
-                "--free is the motion without the load that --find-payload seeks; free motion to "
-                "identify the arm from is given as LOG"
-            )
-        return chosen.logs
+    chosen = FreeChoice.parsed(free=free)
+    if chosen.spans or len(chosen.logs) > 1:
+        raise ParameterError(
+            "a load is found from one pair of logs: give --free the log without it, once"
+        )
+    if chosen.logs and not find_payload:
+        raise ParameterError(
+            "--free is the motion without the load that --find-payload seeks; free motion to "
+            "identify the arm from is given as LOG"
+        )
+    return chosen.logs
 
 
-@taken_apart
+@opt.command
 def identify_robot(
     logs: opt.Logs,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="FILE.toml", help="The new robot file.", rich_help_panel=WRITE
-        ),
-    ],
-    reading: ReadOptions,
-    robot: RobotOptions,
+    output: Annotated[Path, Option("-o/--output", "FILE.toml", "The new robot file.", group=WRITE)],
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
     asked: TaskOptions,
-    validation: ValidationOptions,
-    free: WithoutLoad,
+    validate: Annotated[
+        list[Path] | None,
+        Option("--validate", "LOG", "Score on this log too. Repeatable."),
+    ],
+    span: Annotated[
+        str | None,
+        Option("--validate-interval", "A:B", "Use only this span of the --validate logs."),
+    ],
+    free: Annotated[list[str] | None, FreeChoice.option("free")],
     made: opt.MadeOptions,
-    anyway: opt.AnywayOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    show: opt.Open = False,
+    anyway: opt.Anyway,
+    _talk: opt.TalkOptions,
+    show: opt.Open,
 ) -> None:
     """Make a robot file from logs: friction, inertias, payload.
 
@@ -121,19 +119,19 @@ def identify_robot(
     from vftcli.outputs.identification.tables import tables_text
     from vftcli.readers.library import Library
 
-    task = asked.task(output.stem, friction=robot.friction != "none")
+    task = asked.task(output.stem, friction=robot.words["friction"] != "none")
     form = made.form()
     OutputFolder(output.parent, made.force, files_beside(output, form)).check()
     choice, chosen = reading.choice(), robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
-    held_out_choice = reading.changed(interval=validation.interval, episode=None).choice()
-    unloaded_choice = reading.changed(episode=None).choice()
-    validated, without_load = validation.validate or [], free.logs(asked.find_payload)
+    held_out_choice = replace(choice.whole, interval=None if span is None else interval(span))
+    unloaded_choice = replace(choice.whole, interval=choice.interval)
+    validated, without_load = validate or [], logs_without_load(free, asked.find_payload)
     library = Library([*logs, *validated, *without_load])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links, and the default begins with it.
     keeps = task.method in {"friction", "auto"}
-    examiner = health_of(library, anyway=anyway.anyway, fitting=keeps)
+    examiner = health_of(library, anyway=anyway, fitting=keeps)
     profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
 
     def opened(

@@ -4,29 +4,25 @@ import os
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
 from vftcli.cli.config import NAME
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import WRITE, Option
 
 
-@taken_apart
+@opt.command
 def write_config(
+    *,
     logs: opt.Logs,
-    reading: ReadOptions,
-    robot: RobotOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    _talk: opt.TalkOptions,
     output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="FILE", help="The file of options.", rich_help_panel=WRITE
-        ),
+        Path, Option("-o/--output", "FILE", "The file of options.", group=WRITE)
     ] = Path(NAME),
-    json: opt.Json = False,
-    force: opt.Force = False,
+    json: opt.Json,
+    force: opt.Force,
 ) -> None:
     """Write vftcli.toml: the options that a log calls for.
 
@@ -42,7 +38,7 @@ def write_config(
     from vftcli.readers.library import Library
 
     check_file(output, force)
-    words = {**reading.words(), **robot.words()}
+    words = {**reading.words, **robot.words}
     given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
     library = Library(logs)
     choice = AnalysisChoice(

@@ -5,20 +5,19 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import Option
 
 
-@taken_apart
+@opt.command
 def inspect_log(
     log: opt.Log,
-    reading: ReadOptions,
-    robot: RobotOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
-    strict: Annotated[
-        bool, typer.Option("--strict", help="Exit with 1 if there is any warning, for CI.")
-    ] = False,
-    json: opt.Json = False,
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    _talk: opt.TalkOptions,
+    strict: Annotated[bool, Option("--strict", "", "Exit with 1 if there is any warning, for CI.")],
+    json: opt.Json,
 ) -> None:
     """Examine a log: format, signals, clock, and what looks wrong.
 

@@ -5,24 +5,16 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, option, taken_apart
-from vftcli.cli.log_options import ROBOT_ARG, TIP, Words
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import Option
 
 
-class DescriptionOptions(Bundle):
-    """Which arm of a description is shown."""
-
-    tip: str | None = option(*TIP)
-    robot_arg: Words = option(*ROBOT_ARG)
-
-
-@taken_apart
+@opt.command
 def robots(
-    described: DescriptionOptions,
-    name: Annotated[
-        str | None, typer.Argument(metavar="[NAME|FILE]", help="Show one robot in full.")
-    ] = None,
-    json: opt.Json = False,
+    tip: Annotated[str | None, RobotChoice.option("tip", seldom=False)],
+    robot_arg: Annotated[list[str] | None, RobotChoice.option("robot_arg", seldom=False)],
+    name: Annotated[str | None, Option("", "[NAME|FILE]", "Show one robot in full.")],
+    json: opt.Json,
 ) -> None:
     """List the robot profiles, or show one and its sources.
 
@@ -32,7 +24,6 @@ def robots(
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import robot_row, robot_text, robots_grid
     from vftcli.robots import MAKERS, load_robot
-    from vftcli.robots.choice import RobotChoice
 
     if name is None:
         rows = {m: [robot_row(load_robot(p)) for p in names] for m, names in MAKERS.items()}
@@ -42,14 +33,15 @@ def robots(
         for maker, each in rows.items():
             typer.echo(f"{maker}\n{terminal(robots_grid(each))}", nl=False)
         return
-    robot = RobotChoice.parsed(robot=name, **described.words()).named()
+    robot = RobotChoice.parsed(robot=name, tip=tip, robot_arg=robot_arg).named()
     if json:
         say_json(robot.document or robot_row(robot))
     else:
         typer.echo(robot_text(robot))
 
 
-def observers(json: opt.Json = False) -> None:
+@opt.command
+def observers(json: opt.Json) -> None:
     """List the observers, their equations and their parameters.
 
     Example: vftcli observers
@@ -76,9 +68,9 @@ def observers(json: opt.Json = False) -> None:
         typer.echo(f"{'':<8} {row['summary']}; --set {', '.join(row['parameters'])}")
 
 
+@opt.command
 def list_formats(
-    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Show one format.")] = None,
-    json: opt.Json = False,
+    name: Annotated[str | None, Option("", "[NAME]", "Show one format.")], json: opt.Json
 ) -> None:
     """List the log formats, or show how to record one.
 

@@ -6,19 +6,18 @@ import webbrowser
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from vftcli.cli.options import command
+from vftcli.signals.option import Option
 
 PAGE, RECORDING = ".html", ".rrd"  #: Endings of what can be opened, the one that goes before first.
 
-Made = Annotated[
-    Path,
-    typer.Argument(
-        metavar="DIR", help="A folder that a command wrote, or one page or recording in it."
-    ),
-]
 
-
-def open_folder(folder: Made) -> None:
+@command
+def open_folder(
+    folder: Annotated[
+        Path, Option("", "DIR", "A folder that a command wrote, or one page or recording in it.")
+    ],
+) -> None:
     """Open the page of a folder that a command wrote.
 
     How to open its recording is said; without a page its recording is opened in the Rerun viewer.

@@ -1,362 +1,212 @@
-"""The options of the commands, each declared once, in one bundle a choice.
+"""The options of the commands: what typer is given, made of the rooms' choices.
 
-A room says what its words mean and checks them, in the `parsed` of its choice; here stands how
-they are typed and what `--help` says of them.
+An option is an `Option` beside a field of a room's choice, or beside an argument of the one command
+that has it. A command is handed one object for all options of a choice::
+
+    @command
+    def convert_log(log: Log, reading: Typed[ReadChoice], force: Force) -> None: ...
 """
 
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from types import NoneType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    Generic,
+    NamedTuple,
+    TypeVar,
+    get_args,
+    get_origin,
+)
 
 import typer
 
-from vftcli.cli import help as headings
-from vftcli.cli.bundles import REQUIRED, Bundle, ChoiceBundle, flag, option
-from vftcli.cli.log_options import ReadOptions, RobotOptions, Words
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.outputs.log.choice import OutputChoice
+from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import LOG, OUTPUT, WRENCH, WRITE, Choice, Option
+from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
-    from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.observers.choice import ObserverChoice
-    from vftcli.outputs.log.choice import OutputChoice
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
-    from vftcli.refinement.choice import RefinementChoice
-    from vftcli.repetition.choice import FreeChoice
-    from vftcli.virtual_sensor.choice import WrenchChoice
 
-Log = Annotated[
-    Path,
-    typer.Argument(metavar="LOG", help="A log file or a bag directory; recognised by content."),
-]
+C = TypeVar("C", bound=Choice)
+EMPTY = inspect.Parameter.empty
+
+Log = Annotated[Path, Option("", "LOG", "A log file or a bag directory; recognised by content.")]
 Logs = Annotated[
-    list[Path],
-    typer.Argument(metavar="LOG...", help="Log files or bag directories; recognised by content."),
+    list[Path], Option("", "LOG...", "Log files or bag directories; recognised by content.")
 ]
-Folder = Annotated[
-    Path,
-    typer.Option(
-        "-o",
-        "--output",
-        metavar="DIR",
-        help="Folder to write into.",
-        rich_help_panel=headings.WRITE,
-    ),
-]
-Force = Annotated[
-    bool,
-    typer.Option("--force", help="Overwrite what exists.", rich_help_panel=headings.WRITE),
-]
+Folder = Annotated[Path, Option("-o/--output", "DIR", "Folder to write into.", group=WRITE)]
+Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
 Json = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--json",
-        help="JSON on stdout. It is what the command makes: rows, a run record, a summary.",
-        rich_help_panel=headings.OUTPUT,
+        "",
+        "JSON on stdout. It is what the command makes: rows, a run record, a summary.",
+        group=OUTPUT,
     ),
 ]
 Open = Annotated[
     bool,
-    typer.Option(
+    Option(
         "--open",
-        help="Open what was made. The page in the browser, else the recording (--rrd).",
-        rich_help_panel=headings.OUTPUT,
+        "",
+        "Open what was made. The page in the browser, else the recording (--rrd).",
+        group=OUTPUT,
     ),
 ]
-ANYWAY = (
-    "--anyway",
-    "Go on where a finding makes results meaningless. The outputs say so.",
-)
-FREE = (
-    "--free",
-    "LOG|A:B",
-    "Motion that nobody touched: another log, or a span. Repeatable: two free runs of the same "
-    "trajectory measure the floor.",
-)
-SEED = ("--seed", "N", "Seed of everything drawn; the scenario's own if not given.")
-REFERENCE = ("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
-REFERENCE_COLUMNS = (
-    "--reference-columns",
-    "SPEC",
-    "Columns of a reference file, as --columns: 't,tau_ext:6'.",
-)
-
-
-class ObserverOptions(ChoiceBundle["ObserverChoice"]):
-    """Which observers run, and with which gains."""
-
-    GROUP = headings.ESTIMATE
-    HOME = "observers.choice:ObserverChoice"
-
-    observer: Words = option(
-        "--observer",
-        "NAME",
-        "Which observers, repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: "
-        "kfo-fe; of annotate: kfo-zoh.",
-    )
-    causal: bool = flag(
-        "--causal", "Only what could run online. It leaves out best, and smoothers."
-    )
-    assignments: Words = option(
-        "--set",
-        "OBSERVER.PARAMETER=VALUE",
-        "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
+Anyway = Annotated[
+    bool,
+    Option(
+        "--anyway",
+        "",
+        "Go on where a finding makes results meaningless. The outputs say so.",
         seldom=True,
-    )
-    gains: str | None = option(
-        "--gains",
-        "auto|paper|FILE",
-        "Gains of all but best (vftcli help gains). Those the log's spectra call for, the robot "
-        "file's (default), or those that `vftcli tune` wrote; --set goes before them.",
-    )
-    gains_file: Path | None = option(
-        "--set-file", "FILE", "The old name of --gains FILE.", seldom=True
-    )
-    match: str | None = option(
-        "--match",
-        "delay=S|bandwidth=HZ",
-        "Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
-        seldom=True,
-    )
-    as_printed: bool = flag(
-        "--as-printed", "The paper's printed formulas, errata and all.", seldom=True
-    )
+        group=LOG,
+    ),
+]
+Wrench = Annotated[
+    bool, Option("--wrench", "", "Also the wrench, as force on the robot.", group=WRENCH)
+]
+Figures = Annotated[
+    str | None,
+    Option(
+        "--figures",
+        "pdf|svg|png",
+        "Also figures for a paper, one and two columns wide.",
+        group=WRITE,
+    ),
+]
+LATEX = Option("--latex", "", "Print a LaTeX table (booktabs).")
+SEED = Option("--seed", "N", "Seed of everything drawn; the scenario's own if not given.", least=0)
 
 
-class FreeOptions(ChoiceBundle["FreeChoice"]):
-    """What nobody touched, and how it is laid under the log."""
+class Typed(Generic[C]):
+    """The words that a user typed of the options of a choice."""
 
-    GROUP = headings.LOG
-    HOME = "repetition.choice:FreeChoice"
+    def __init__(self, kind: type[C], words: dict[str, Any]) -> None:
+        self._kind, self.words = kind, words
 
-    free: Words = option(*FREE)
-    free_part: str | None = option(
-        "--free-part",
-        "A:B",
-        "The same as --free A:B; without either, the log's own free cycles are found.",
-        seldom=True,
-    )
-    period: float | None = option(
-        "--period", "S", "Commanded period of a repeated motion; found if not given.", seldom=True
-    )
-    free_cycles: str | None = option(
-        "--free-cycles", "1|1,2|1-3", "Cycles free of contact; found if not given.", seldom=True
-    )
-    alignment: str = option(
-        "--alignment",
-        "auto|commanded|period|phase|model",
-        "How the two-cycle difference lays free and loaded motion over one another; auto takes "
-        "what has the smallest error on this log.",
-        "auto",
-        seldom=True,
-    )
-    low_pass: str = option(
-        "--low-pass", "auto|none|HZ", "Zero-phase low-pass of that difference.", "auto", seldom=True
-    )
-
-
-class BiasOptions(ChoiceBundle["RefinementChoice"]):
-    """What is taken off the estimates once the whole log is known."""
-
-    GROUP = headings.ESTIMATE
-    HOME = "refinement.choice:RefinementChoice"
-
-    remove_bias: str | None = option(
-        "--remove-bias",
-        "auto|whole-log|none",
-        "Whether the bias fitted to the whole log comes off; auto: for best alone.",
-        seldom=True,
-    )
-
-
-class WrenchOptions(ChoiceBundle["WrenchChoice | None"]):
-    """The Cartesian wrench."""
-
-    GROUP = headings.WRENCH
-    HOME = "virtual_sensor.choice:WrenchChoice"
-
-    wrench: bool = flag("--wrench", "Also the wrench, as force on the robot.")
-    frame: str | None = option(
-        "--frame",
-        "flange|base|tool|sensor",
-        "Its frame; default flange. See vftcli help frames. base: base axes, moment about the "
-        "flange point. Implies --wrench.",
-    )
-    solver: str | None = option(
-        "--solver",
-        "smoother|pinv|map",
-        "How torques become a wrench: smoothed over the whole log with a band in every pose "
-        "(default for best: zero outside of the listed contacts), least squares (default for the "
-        "others), or with a prior of 50 N and 10 N·m. Implies --wrench.",
-        seldom=True,
-    )
-    tool: str | None = option(
-        "--tool",
-        "POSE|NAME",
-        "The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
-        "file.",
-        seldom=True,
-    )
-    sensor_pose: str | None = option(
-        "--sensor-pose",
-        "POSE|NAME|fit",
-        "The force/torque sensor on the flange, likewise; fit estimates it from the log.",
-        seldom=True,
-    )
-    zero: Words = option(
-        "--zero",
-        "A:B|start",
-        "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
-        "drift between spans. Implies --wrench.",
-    )
-    torque_sd: str | None = option(
-        "--torque-sd",
-        "own|NUMBER(S)",
-        "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
-        seldom=True,
-    )
+    def choice(self, **others: Any) -> C:  # noqa: ANN401 - words are texts, numbers and lists
+        """The choice that they state, checked, with other words for some of them."""
+        return self._kind.parsed(**{**self.words, **others})
 
     @property
-    def asks(self) -> bool:
-        """Whether any of the options is given: each asks for a wrench."""
-        return any(self.words().values())
-
-    def choice(self) -> "WrenchChoice | None":
-        """The choice that the options state, None where none of them asks for a wrench."""
-        # What nobody asks for is not even imported.
-        return super().choice() if self.asks else None
+    def is_asked(self) -> bool:
+        """Whether any of them is given."""
+        return any(self.words.values())
 
 
-class ReferenceOptions(ChoiceBundle["ReferenceChoice | None"]):
-    """What the estimates are compared with."""
-
-    GROUP = headings.COMPARE
-    HOME = "evaluation.reference_choice:ReferenceChoice"
-
-    reference: str | None = option(*REFERENCE)
-    reference_columns: str | None = option(*REFERENCE_COLUMNS, seldom=True)
-    contacts: bool = flag(
-        "--contacts",
-        "Judge the listed contacts. Also detection delay, false alarms per hour and missed "
-        "contacts of the observers against the reference, with the free part of --free.",
-    )
-
-    def choice(self) -> "ReferenceChoice | None":
-        """The choice that the options state, None where no reference is named."""
-        return super().choice() if self.reference is not None else None
+class Needed(Typed[C]):
+    """The same where the fields without a default have to be given."""
 
 
-class ExtraOptions(Bundle):
-    """What else is written for other programs."""
+class Bundle:
+    """Options that several commands share, each an attribute."""
 
-    GROUP = headings.WRITE
-
-    mcap: bool = flag("--mcap", "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.")
-    layouts: bool = flag(
-        "--layouts",
-        "Also write its layouts for Foxglove and PlotJuggler; implies --mcap.",
-        seldom=True,
-    )
-
-    rrd_detail: str = option(
-        "--rrd-detail",
-        "full|levels|none",
-        "How much of a long log recording.rrd holds. Levels, unless another is given: the lowest "
-        "and highest samples of 5000 stretches, every sample where the strongest contacts begin.",
-        "levels",
-        seldom=True,
-    )
-
-    def choice(self, **others: bool) -> "OutputChoice":
-        """What is written, with what the command's own options ask for."""
-        from vftcli.outputs.log.choice import OutputChoice
-
-        asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
-        extras = [name for name, wanted in asked.items() if wanted]
-        return OutputChoice.parsed(extras=extras, rrd_detail=self.rrd_detail)
+    def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
+        vars(self).update(values)
 
 
-class FigureOptions(Bundle):
-    """Figures for a paper."""
+class MadeOptions(Bundle):
+    """What is made: figures too, JSON in place of words, over what is there."""
 
-    GROUP = headings.WRITE
-    figures: str | None = option(
-        "--figures", "pdf|svg|png", "Also figures for a paper, one and two columns wide."
-    )
+    figures: Figures
+    json: Json
+    force: Force
 
     def form(self) -> str | None:
-        """What they are written as, checked; None where none are asked for."""
+        """What figures are written as, checked; None where none are asked for."""
         from vftcli.outputs.figures.paper import checked_form
 
         return checked_form(self.figures)
 
 
-class MadeOptions(FigureOptions):
-    """What is made: figures too, JSON in place of words, over what is there."""
+class ExtraOptions(Bundle):
+    """What else is written for other programs."""
 
-    json: Json = False
-    force: Force = False
+    mcap: Annotated[
+        bool,
+        Option(
+            "--mcap",
+            "",
+            "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.",
+            group=WRITE,
+        ),
+    ]
+    layouts: Annotated[
+        bool,
+        Option(
+            "--layouts",
+            "",
+            "Also write its layouts for Foxglove and PlotJuggler; implies --mcap.",
+            seldom=True,
+            group=WRITE,
+        ),
+    ]
+    written: Typed[OutputChoice]
 
-
-class NamedReferenceOptions(Bundle):
-    """What is taken for true where nothing else is asked of it."""
-
-    GROUP = headings.COMPARE
-    reference: str | None = option(*REFERENCE)
-    reference_columns: str | None = option(*REFERENCE_COLUMNS, seldom=True)
-
-    def choice(self) -> "ReferenceChoice | None":
-        """The choice that the options state, None where no reference is named."""
-        return ReferenceOptions(**self.words(), contacts=False).choice()
-
-
-class RequiredReferenceOptions(ReferenceOptions):
-    """The same where nothing can be shown without a reference."""
-
-    reference: str = option(*REFERENCE, REQUIRED)
-
-
-class ListingOptions(Bundle):
-    """Whether contacts are listed."""
-
-    GROUP = headings.WRITE
-
-    no_contacts: bool = flag("--no-contacts", "Leave the list of contacts out.")
-
-
-class AnywayOptions(Bundle):
-    """Whether results are wanted that mean little."""
-
-    GROUP = headings.LOG
-    anyway: bool = flag(*ANYWAY, seldom=True)
+    def choice(self, **others: bool) -> OutputChoice:
+        """What is written, with what the command's own options ask for."""
+        asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
+        extras = tuple(name for name, wanted in asked.items() if wanted)
+        return replace(self.written.choice(), extras=extras)
 
 
 class TalkOptions(Bundle):
-    """How much a command says."""
+    """How much a command says; heard before it runs."""
 
-    GROUP = headings.OUTPUT
-
-    details: bool = flag("-v/--details", "Everything that is known.")
-    quiet: bool = flag("-q/--quiet", "Errors only, and the table or JSON that is asked for.")
+    details: Annotated[bool, Option("-v/--details", "", "Everything that is known.", group=OUTPUT)]
+    quiet: Annotated[
+        bool,
+        Option(
+            "-q/--quiet",
+            "",
+            "Errors only, and the table or JSON that is asked for.",
+            group=OUTPUT,
+        ),
+    ]
 
 
 class AnalysisOptions(Bundle):
     """All that can be asked of a log but what it is compared with."""
 
-    reading: ReadOptions
-    robot: RobotOptions
-    observers: ObserverOptions
-    free: FreeOptions
-    refinement: BiasOptions
-    wrench: WrenchOptions
-    contacts: ListingOptions
-    anyway: AnywayOptions
+    reading: Typed[ReadChoice]
+    robot: Typed[RobotChoice]
+    observers: Typed[ObserverChoice]
+    free: Typed[FreeChoice]
+    refinement: Typed[RefinementChoice]
+    also_wrench: Wrench
+    wrench: Typed[WrenchChoice]
+    no_contacts: Annotated[
+        bool, Option("--no-contacts", "", "Leave the list of contacts out.", group=WRITE)
+    ]
+    anyway: Anyway
     talk: TalkOptions
+
+    @property
+    def asks_wrench(self) -> bool:
+        """Whether an option asks for a wrench."""
+        return self.also_wrench or self.wrench.is_asked
 
     def choice(
         self,
         library: "Library",
-        reference: ReferenceOptions | None = None,
+        reference: Typed[ReferenceChoice] | None = None,
         *,
         on_screen: bool = False,
+        **observers: Any,  # noqa: ANN401 - words in place of those that are typed
     ) -> "AnalysisChoice":
         """The choice that the options state, a reference's with it where there is one."""
         from vftcli.cli.console import health_of, stages
@@ -364,16 +214,129 @@ class AnalysisOptions(Bundle):
         from vftcli.pipeline import AnalysisChoice
 
         give_back()
+        compared = reference is not None and reference.words["reference"]
         return AnalysisChoice(
             read=self.reading.choice(),
             robot=self.robot.choice(),
-            observers=self.observers.choice(),
+            observers=self.observers.choice(**observers),
             free=self.free.choice(),
             refinement=self.refinement.choice(),
-            wrench=self.wrench.choice(),
-            reference=reference.choice() if reference is not None else None,
-            contacts=not self.contacts.no_contacts,
+            wrench=self.wrench.choice() if self.asks_wrench else None,
+            reference=reference.choice() if reference is not None and compared else None,
+            contacts=not self.no_contacts,
             library=library,
             progress=stages(),
-            examiner=health_of(library, anyway=self.anyway.anyway, on_screen=on_screen),
+            examiner=health_of(library, anyway=self.anyway, on_screen=on_screen),
         )
+
+
+def command(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a command as typer wants it: every option of its choices a parameter of its own.
+
+    Its `options` are the option of every parameter by name.
+    """
+    arguments = inspect.signature(function).parameters.values()
+    parts = {a.name: taken_apart(a.name, a.annotation, a.default) for a in arguments}
+
+    def called(**values: Any) -> None:  # noqa: ANN401
+        from vftcli.cli.config import taken
+        from vftcli.cli.console import speaking
+        from vftcli.outputs.files import protected
+
+        kept = taken().path
+        inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
+        # How much it says: what its -v and -q ask, as usual where it has none.
+        asked = {name.rpartition("_")[2]: value for name, value in values.items()}
+        loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
+        with protected(inputs), loud:
+            function(**{name: part.made(values) for name, part in parts.items()})
+
+    flat = [one for part in parts.values() for one in part.parameters]
+    called.__name__, called.__doc__ = function.__name__, function.__doc__
+    # typer asks for the signature; without annotations of its own it finds nothing else.
+    vars(called)["__signature__"] = inspect.Signature([parameter for parameter, _ in flat])
+    vars(called)["options"] = {parameter.name: option for parameter, option in flat}
+    called.__annotations__ = {}
+    return called
+
+
+class Part(NamedTuple):
+    """One argument of a command, taken apart."""
+
+    parameters: list[tuple[inspect.Parameter, Option]]  #: What typer sees.
+    made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.
+
+
+def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 - an annotation
+    """One argument of a command as parameters: itself, or every option of what it is."""
+    if isinstance(kind, type) and issubclass(kind, Bundle):
+        parts = {
+            own: taken_apart(f"{name}_{own}", what, getattr(kind, own, EMPTY))
+            for own, what in inspect.get_annotations(kind).items()
+        }
+        flat = [one for part in parts.values() for one in part.parameters]
+        return Part(flat, lambda values: kind(**{n: p.made(values) for n, p in parts.items()}))
+    if (typed := get_origin(kind)) in {Typed, Needed}:
+        (choice,) = get_args(kind)
+        found = choice.options().items()
+        flat = [
+            parameter_of(
+                f"{name}_{word}",
+                typed_kind(what, option),
+                default_of(getattr(choice, field, EMPTY), option, needed=typed is Needed),
+                option._replace(group=choice.GROUP),
+            )
+            for word, (field, what, option) in found
+        ]
+        return Part(flat, lambda v: typed(choice, {word: v[f"{name}_{word}"] for word, _ in found}))
+    if get_origin(kind) is not Annotated:  # typer's own context
+        plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
+        return Part([(plain, Option("", "", ""))], lambda values: values[name])
+    what, option = get_args(kind)
+    if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
+        default = None if option.metavar else False
+    return Part([parameter_of(name, what, default, option)], lambda values: values[name])
+
+
+def typed_kind(kind: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
+    """What typer makes of the typed text of a field of a kind."""
+    if not option.metavar:
+        return bool
+    among = (kind, *get_args(kind))
+    one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
+    return list[one] | None if option.several else one | None  # type: ignore[valid-type]
+
+
+def default_of(default: object, option: Option, *, needed: bool) -> object:
+    """What typer gives where an option of a choice is not typed: mostly nothing, the room knows."""
+    if default is EMPTY and needed:
+        return EMPTY
+    return (default if option.shows_default else None) if option.metavar else False
+
+
+def parameter_of(
+    name: str,
+    kind: Any,  # noqa: ANN401 - an annotation
+    default: object,
+    option: Option,
+) -> tuple[inspect.Parameter, Option]:
+    """A parameter as typer reads it, beside its option."""
+    how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
+    how["metavar"] = option.metavar or None
+    info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
+    annotation = Annotated[kind, info]
+    where = inspect.Parameter.KEYWORD_ONLY
+    return inspect.Parameter(name, where, default=default, annotation=annotation), option
+
+
+def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:
+    """Every file and folder that the options name, but the output: nothing may write over these."""
+    for name, value in values.items():
+        for word in value if isinstance(value, list | tuple) else (value,):
+            path = Path(word.removeprefix("file:")) if isinstance(word, str) else word
+            # A word without an ending is a name of ours, as of a robot, where no log is asked for.
+            named = (
+                path is word or (isinstance(path, Path) and path.suffix) or name.endswith("free")
+            )
+            if name != "output" and isinstance(path, Path) and named:
+                yield path

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.help import COMPARE
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.signals.option import COMPARE, Option
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -18,26 +18,21 @@ if TYPE_CHECKING:
     from vftcli.pipeline import AnalysisChoice
 
 
-@taken_apart
+@opt.command
 def report(
     logs: opt.Logs,
     output: opt.Folder,
-    reference: opt.ReferenceOptions,
+    reference: opt.Typed[ReferenceChoice],
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
-    drawn: opt.FigureOptions,
+    figures: opt.Figures,
     published: Annotated[
         str | None,
-        typer.Option(
-            "--published",
-            metavar="table1",
-            help="Set the paper's table beside the errors.",
-            rich_help_panel=COMPARE,
-        ),
-    ] = None,
-    json: opt.Json = False,
-    force: opt.Force = False,
-    show: opt.Open = False,
+        Option("--published", "table1", "Set the paper's table beside the errors.", group=COMPARE),
+    ],
+    json: opt.Json,
+    force: opt.Force,
+    show: opt.Open,
 ) -> None:
     """Write a page, a recording, tables and estimates into one folder.
 
@@ -50,6 +45,7 @@ def report(
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published
+    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
     from vftcli.pipeline import WRITING
@@ -57,13 +53,12 @@ def report(
     from vftcli.readers.table import JacobianError
 
     library = Library(logs)
-    written, form = also.choice(), drawn.form()
+    written, form = also.choice(), checked_form(figures)
     names = report_files([library.label(log) for log in logs], written.extras, form)
     OutputFolder(output, force, names).check()
-    choice = analysis.choice(library, reference, on_screen=not json)
-    choice = replace(choice, spares_memory=True)
+    choice = replace(analysis.choice(library, reference, on_screen=not json), spares_memory=True)
     if published is not None:
-        check_published(published, reference.reference)
+        check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
     left_out = LeftOut(library, logs)
     try:

@@ -1,36 +1,29 @@
 """`vftcli reproduce`: a paper's experiments run again, beside what it prints."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import flag, option, taken_apart
-from vftcli.cli.help import WRITE
+from vftcli.signals.option import WRITE, Option
 
 
-class ReproduceOptions(opt.FigureOptions):
-    """Which tables and figures, and how thoroughly."""
-
-    only: str | None = option(
-        "--only", "NAME,…", "Only these: table1…table4, fig1…fig13, guidelines."
-    )
-    fast: bool = flag("--fast", "One seed a scenario rather than five.")
-    force: opt.Force = False
-
-
-@taken_apart
+@opt.command
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="Which: huang2025.")],
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="DIR", help="Folder to write into.", rich_help_panel=WRITE
+    paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
+    output: opt.Folder,
+    figures: opt.Figures,
+    only: Annotated[
+        str | None,
+        Option(
+            "--only", "NAME,…", "Only these: table1…table4, fig1…fig13, guidelines.", group=WRITE
         ),
     ],
-    chosen: ReproduceOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    fast: Annotated[
+        bool, Option("--fast", "", "One seed a scenario rather than five.", group=WRITE)
+    ],
+    force: opt.Force,
+    _talk: opt.TalkOptions,
 ) -> None:
     """Run a paper's experiments again, beside what it prints.
 
@@ -41,6 +34,7 @@ def reproduce(
     Example: vftcli reproduce huang2025 --only table3 -o paper
     """
     from vftcli.cli.console import command_line, say, show, stages
+    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
@@ -49,11 +43,11 @@ def reproduce(
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli reproduce")
-    wanted, form = paper_of(paper), chosen.form()
-    names = wanted.chosen(chosen.only)
-    folder = OutputFolder(output, chosen.force, files_of(wanted, names, form))
+    wanted, form = paper_of(paper), checked_form(figures)
+    names = wanted.chosen(only)
+    folder = OutputFolder(output, force, files_of(wanted, names, form))
     folder.check()
-    jobs, progress = jobs_of(wanted, names, chosen.fast), stages()
+    jobs, progress = jobs_of(wanted, names, fast), stages()
     progress(f"{len(jobs)} runs", 0.0, 0.0)
 
     def told(done: int, of: int, what: str) -> None:

@@ -8,52 +8,41 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, option, taken_apart
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import Words
-
-Scenario = Annotated[
-    str,
-    typer.Argument(
-        metavar="SCENARIO", help="Name of a scenario (`vftcli simulate list`) or a FILE.toml."
-    ),
-]
-LogPath = Annotated[
-    Path,
-    typer.Option(
-        "-o", "--output", metavar="PATH", help="The log file or bag folder.", rich_help_panel=WRITE
-    ),
-]
-
-
-class ExperimentOptions(Bundle):
-    """How the experiment is run, and written."""
-
-    seed: int | None = option(*opt.SEED, min=0)
-    log_format: str = option(
-        "--as",
-        "FORMAT",
-        "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own, else parquet.",
-        "",
-    )
-    settings: Words = option(
-        "--set",
-        "KEY=VALUE",
-        "Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
-    )
-
+from vftcli.signals.option import WRITE, Option
 
 WIDTH = 30  #: Width of the progress bar. [characters]
 QUICK = 1.0  #: Runs shorter than this show no bar. [s]
 
 
-@taken_apart
+@opt.command
 def simulate_log(
-    scenario: Scenario,
-    experiment: ExperimentOptions,
-    output: LogPath = Path(),
-    json: opt.Json = False,
-    force: opt.Force = False,
+    *,
+    scenario: Annotated[
+        str, Option("", "SCENARIO", "Name of a scenario (`vftcli simulate list`) or a FILE.toml.")
+    ],
+    seed: Annotated[int | None, opt.SEED],
+    log_format: Annotated[
+        str,
+        Option(
+            "--as",
+            "FORMAT",
+            "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own, else "
+            "parquet.",
+        ),
+    ] = "",
+    settings: Annotated[
+        list[str] | None,
+        Option(
+            "--set",
+            "KEY=VALUE",
+            "Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
+        ),
+    ],
+    output: Annotated[
+        Path, Option("-o/--output", "PATH", "The log file or bag folder.", group=WRITE)
+    ] = Path(),
+    json: opt.Json,
+    force: opt.Force,
 ) -> None:
     """Simulate an experiment: the log, and the truth beside it.
 
@@ -75,13 +64,13 @@ def simulate_log(
             typer.echo(f"{name:<{width}} {title}")
         return
     check_installed("pinocchio", "vftcli simulate")
-    setup = load_scenario(scenario, experiment.settings or ())
+    setup = load_scenario(scenario, settings or ())
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
-    usual_format(setup, load_robot(setup.robot), experiment.log_format)  # refused before the run
-    runs = simulate_pair(setup, experiment.seed, progress_bar())
+    usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
+    runs = simulate_pair(setup, seed, progress_bar())
     places = dict(zip(paths, runs, strict=True))
-    files = [str(f) for f in save(places, experiment.log_format, force, command_line())]
+    files = [str(f) for f in save(places, log_format, force, command_line())]
     say_left_out(files)
     if json:
         about = {"scenario": setup.name, "seed": runs[0].seed, "files": files}

@@ -6,42 +6,41 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
+from vftcli.readers.reader import ReadChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import COMPARE, Option
 
 if TYPE_CHECKING:
-    from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.robots.run import Run
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
     from vftcli.signals.wrench import Wrench
 
 
-@taken_apart
+@opt.command
 def contact_thresholds(
     logs: opt.Logs,
-    reading: ReadOptions,
-    robot: RobotOptions,
-    reference: opt.NamedReferenceOptions,
-    anyway: opt.AnywayOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    reference: Annotated[str | None, ReferenceChoice.option("reference", group=COMPARE)],
+    columns: Annotated[str | None, ReferenceChoice.option("reference_columns", group=COMPARE)],
+    anyway: opt.Anyway,
+    _talk: opt.TalkOptions,
     check: Annotated[
         Path | None,
-        typer.Option(
+        Option(
             "--check",
-            metavar="LOG",
-            help="A log with contacts: which of them they would have caught, how late, how hard. "
+            "LOG",
+            "A log with contacts: which of them they would have caught, how late, how hard. "
             "Where they are says --reference, else the truth beside a simulated log, else its "
             "sensor; else the alarms are listed.",
         ),
-    ] = None,
+    ],
+    json: opt.Json,
     rate: Annotated[
-        float,
-        typer.Option(
-            "--rate", metavar="PER_HOUR", help="False alarms per hour of all joints, or axes."
-        ),
+        float, Option("--rate", "PER_HOUR", "False alarms per hour of all joints, or axes.")
     ] = 1.0,
-    json: opt.Json = False,
 ) -> None:
     """Learn from free motion the thresholds that a robot is given.
 
@@ -63,7 +62,7 @@ def contact_thresholds(
     from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 
-    asked = reference.choice()
+    asked = None if reference is None else ReferenceChoice(name=reference, columns=columns)
     if asked is not None and check is None:
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
     library = Library([*logs, *([check] if check else [])])
@@ -71,12 +70,12 @@ def contact_thresholds(
         read=reading.choice(),
         robot=robot.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway.anyway),
+        examiner=health_of(library, anyway=anyway),
     )
     models = Runs()
     opened = library.open_logs(logs, choice.read)
     free = [modelled(*prepared(log, choice), choice, models) for log in opened]
-    shown = [remark for run in free for remark in touched(run, anyway=anyway.anyway)]
+    shown = [remark for run in free for remark in touched(run, anyway=anyway)]
     signals = [compared_signals(run) for run in free]
     thresholds = find_thresholds(signals, rate)
     counted = left_out(signals, rate)
@@ -105,7 +104,7 @@ def truth_of(
     run: "Run", asked: "ReferenceChoice | None"
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
     """The torque and the wrench that are taken for true along a log, None where nothing says."""
-    from vftcli.evaluation.reference_choice import make_reference
+    from vftcli.evaluation.references import make_reference
     from vftcli.repetition.free_motion import FreeMotion
 
     if asked is None:
@@ -116,8 +115,6 @@ def truth_of(
 
 def settled_reference(recording: "Recording") -> "ReferenceChoice | None":
     """What says where a log is touched without being named: its truth beside it, or its sensor."""
-    from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
-
     truth = Path(f"{recording.source.path}.truth.parquet")
     if truth.exists():
         return ReferenceChoice(name=f"{FILE}{truth}")

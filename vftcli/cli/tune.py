@@ -6,43 +6,37 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import taken_apart
-from vftcli.cli.help import WRITE
-from vftcli.cli.log_options import ReadOptions, RobotOptions
+from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import WRITE, Option
 
 
-@taken_apart
+@opt.command
 def tune_gains(
+    *,
     log: opt.Log,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o", "--output", metavar="FILE.toml", help="The gains file.", rich_help_panel=WRITE
-        ),
-    ],
-    reading: ReadOptions,
-    robot: RobotOptions,
-    free: opt.FreeOptions,
-    bias: opt.BiasOptions,
+    output: Annotated[Path, Option("-o/--output", "FILE.toml", "The gains file.", group=WRITE)],
+    reading: opt.Typed[ReadChoice],
+    robot: opt.Typed[RobotChoice],
+    free: opt.Typed[FreeChoice],
+    bias: opt.Typed[RefinementChoice],
     made: opt.MadeOptions,
-    anyway: opt.AnywayOptions,
-    talk: opt.TalkOptions,  # noqa: ARG001 - heard before the command runs
+    anyway: opt.Anyway,
+    _talk: opt.TalkOptions,
     goal: Annotated[
         str,
-        typer.Option(
-            "--goal",
-            metavar="rmse|delay=S|bandwidth=HZ|false-alarms=PER_HOUR",
-            help="What the gains are for.",
+        Option(
+            "--goal", "rmse|delay=S|bandwidth=HZ|false-alarms=PER_HOUR", "What the gains are for."
         ),
     ] = "rmse",
     threshold: Annotated[
         str | None,
-        typer.Option(
-            "--threshold",
-            metavar="NUMBER(S)",
-            help="Torque that raises an alarm [N·m], one or one a joint.",
+        Option(
+            "--threshold", "NUMBER(S)", "Torque that raises an alarm [N·m], one or one a joint."
         ),
-    ] = None,
+    ],
 ) -> None:
     """Find gains on a log for a stated goal, for --gains.
 
@@ -75,7 +69,7 @@ def tune_gains(
         observers=ObserverChoice(gains=LOG_GAINS, causal=True),
         refinement=bias.choice(),
         library=library,
-        examiner=health_of(library, anyway=anyway.anyway),
+        examiner=health_of(library, anyway=anyway),
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     motion = read(recording, arm, choice, Runs())

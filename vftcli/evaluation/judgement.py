@@ -8,7 +8,8 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import evaluate, joint_means
-from vftcli.evaluation.reference_choice import ReferenceChoice, ReferenceLoad, make_reference
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation.references import ReferenceLoad, make_reference
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER

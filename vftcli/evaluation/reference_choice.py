@@ -1,201 +1,57 @@
-"""ReferenceLoad and ReferenceChoice: torque that estimates are judged by, and its sources."""
+"""What a user may choose of the reference that estimates are judged by."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, ClassVar
 
-import numpy as np
-
-from vftcli.evaluation.obvious_contacts import touched_remarks
-from vftcli.readers.references import read_reference
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.two_cycle import two_cycle_reference
-from vftcli.robots.drive import check_joints
-from vftcli.robots.kinematics import flange_jacobian
-from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import resample_columns
-from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.virtual_sensor.frames import NOTHING, Mounting
-from vftcli.virtual_sensor.log_wrench import in_base_axes, logged_wrench
+from vftcli.signals.option import COMPARE, Choice, Option
 
 FILE = "file:"  #: Head of the one reference with a path in its name.
+NAMES = ("zero", "vendor", "two-cycle", "sensor")  #: The references that are made from the log.
 
 
 @dataclass(frozen=True, kw_only=True)
-class ReferenceLoad:
-    """Torque and wrench that estimates are judged by, on the log's clock."""
-
-    torque: ExternalTorque  #: The reference torque of every joint.
-    #: The wrench it was made from, in base axes about the flange point, as force on the robot; None
-    #: where the reference is a torque to begin with.
-    wrench: Wrench | None = None
-
-
-@dataclass(frozen=True, kw_only=True)
-class ReferenceChoice:
+class ReferenceChoice(Choice):
     """The reference a user asks for, checked before any log is read.
 
     Raises:
         ReferenceTorqueError: If there is no such reference.
     """
 
-    name: str  #: A key of `REFERENCES`, or ``file:PATH``.
+    GROUP: ClassVar[str] = COMPARE
+
+    #: One of `NAMES`, or ``file:PATH``.
+    name: Annotated[
+        str, Option("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
+    ]
     #: The column description of a reference file, None to recognise its columns.
-    columns: str | None = None
-    contacts: bool = False  #: Whether each observer's contacts are judged by the reference's too.
+    columns: Annotated[
+        str | None,
+        Option(
+            "--reference-columns",
+            "SPEC",
+            "Columns of a reference file, as --columns: 't,tau_ext:6'.",
+            seldom=True,
+        ),
+    ] = None
+    #: Whether each observer's contacts are judged by the reference's too.
+    contacts: Annotated[
+        bool,
+        Option(
+            "--contacts",
+            "",
+            "Judge the listed contacts. Also detection delay, false alarms per hour and missed "
+            "contacts of the observers against the reference, with the free part of --free.",
+        ),
+    ] = False
 
     def __post_init__(self) -> None:
-        if self.path is None and self.name not in REFERENCES:
-            there = ", ".join((*REFERENCES, f"{FILE}PATH"))
+        if self.path is None and self.name not in NAMES:
+            there = ", ".join((*NAMES, f"{FILE}PATH"))
             raise ReferenceTorqueError(f"no reference {self.name!r}; there is {there}")
-
-    @classmethod
-    def parsed(
-        cls, *, reference: str, reference_columns: str | None = None, contacts: bool = False
-    ) -> "ReferenceChoice":
-        """The choice that ``--reference``, ``--reference-columns`` and ``--contacts`` state."""
-        return cls(name=reference, columns=reference_columns, contacts=contacts)
 
     @property
     def path(self) -> Path | None:
         """The file of ``file:PATH``, None for a reference that is made from the log."""
         return Path(self.name.removeprefix(FILE)) if self.name.startswith(FILE) else None
-
-
-def zero_reference(log: Run) -> ReferenceLoad:
-    """No contact at all: the reference of a free motion.
-
-    How free it was cannot be known from the log alone, so neither can its error; where the log
-    shows contact a warning says so.
-    """
-    recording = log.recording
-    return ReferenceLoad(
-        torque=ExternalTorque(
-            name="zero",
-            t=recording.t,
-            tau=np.zeros(recording.q.shape),
-            remarks=(caution("reference-zero"), *touched_remarks(log)),
-        )
-    )
-
-
-def vendor_reference(recording: Recording) -> ReferenceLoad:
-    """The vendor's own estimate in the log, torque on the robot; its error is not known."""
-    tau = recording.require("tau_ext")
-    remarks = (caution("reference-vendor"),)
-    return ReferenceLoad(
-        torque=ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
-    )
-
-
-def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
-    """τ_ext = J_Fᵀ w of the wrench that the log holds."""
-    check_joints(recording, robot)
-    wrench = logged_wrench(recording, robot.chain, mounting)
-    return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
-
-
-def load_of(
-    wrench: Wrench, recording: Recording, robot: Robot, name: str, remark: Remark
-) -> ReferenceLoad:
-    """A wrench in base axes about the flange point, and its joint torque."""
-    J = flange_jacobian(robot.chain, recording.q)
-    tau, remarks = np.einsum("tij,ti->tj", J, wrench.values), (remark, *wrench.remarks)
-    torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=remarks)
-    return ReferenceLoad(torque=torque, wrench=wrench)
-
-
-def file_reference(
-    path: Path,
-    recording: Recording,
-    robot: Robot,
-    mounting: Mounting,
-    columns: str | None = None,
-) -> ReferenceLoad:
-    """External torque, wrench or both from a table on the log's own clock.
-
-    A file without torques gives those of its wrench, Jᵀ w. A wrench is read as one in base axes
-    about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
-    """
-    table = read_reference(path, columns)
-    # The recording counts from its first sample, a reference file from the same zero as the log.
-    t = table.t - recording.source.t0
-    name = f"file:{path.name}"
-    wrench = None
-    if table.wrench is not None:
-        values = on_the_logs_clock(t, table.wrench, recording, path)
-        frame = table.wrench_frame or WrenchFrame("base", "flange")
-        given = replace(recording, wrench=values, wrench_frame=frame)
-        # Zero throughout is an answer here: a truth of a log that nobody touched.
-        wrench = in_base_axes(given, robot.chain, mounting)
-    if table.tau is None:
-        if wrench is None:
-            raise ReferenceTorqueError(f"{path}: it holds neither a torque nor a wrench")
-        remark = caution("reference-wrench-file", file=path.name)
-        return load_of(wrench, recording, robot, name, remark)
-    if table.tau.shape[1] != recording.joints:
-        raise ReferenceTorqueError(
-            f"{path}: {table.tau.shape[1]} torque columns for a log of {recording.joints} joints"
-        )
-    tau = on_the_logs_clock(t, table.tau, recording, path)
-    covered = int(np.count_nonzero(np.isfinite(tau[:, 0])))
-    remark = caution("reference-file", file=path.name, covered=covered, samples=recording.samples)
-    torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=(remark,))
-    return ReferenceLoad(torque=torque, wrench=wrench)
-
-
-def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
-    """Columns interpolated linearly to the log's samples, NaN beyond the file. (T, k)
-
-    Args:
-        t: The file's time, from the log's first sample. (M,) [s]
-        columns: Its values. (M, k)
-        recording: The log.
-        path: The file, for the error.
-    """
-    # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
-    slack = 0.5 * recording.median_step
-    inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
-    if not np.any(inside):
-        start = recording.source.t0
-        raise ReferenceTorqueError(
-            f"{path}: its clock ({t[0] + start:g} to {t[-1] + start:g} s) does not overlap the "
-            f"log's ({recording.t[0] + start:g} to {recording.t[-1] + start:g} s); both must be "
-            "the log's own clock"
-        )
-    there = resample_columns(recording.t, t, columns)
-    return np.where(inside[:, None], there, np.nan)
-
-
-#: Name at the command line → what makes it of a log, its free motion, and where tool and sensor
-#: sit; ``file:PATH`` is the one name with a path in it.
-REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
-    "zero": lambda motion, _: zero_reference(motion.log),
-    "vendor": lambda motion, _: vendor_reference(motion.log.recording),
-    "two-cycle": lambda motion, _: ReferenceLoad(torque=two_cycle_reference(motion)),
-    "sensor": lambda motion, mounting: sensor_reference(
-        motion.log.recording, motion.log.robot, mounting
-    ),
-}
-
-
-def make_reference(
-    motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
-) -> ReferenceLoad:
-    """The reference that is asked for, on the log's clock.
-
-    Args:
-        motion: The log that is compared, its robot, and its free motion.
-        choice: Which reference.
-        mounting: Where tool and sensor sit on the flange.
-    """
-    if choice.path is not None:
-        log = motion.log
-        return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)
-    return REFERENCES[choice.name](motion, mounting)

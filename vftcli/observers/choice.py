@@ -3,69 +3,122 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
-from vftcli.observers.lead import estimate_from_rest
-from vftcli.observers.observer import Observer
-from vftcli.observers.settings import (
-    Gains,
-    Settings,
-    check_gains,
-    load_gains,
-    overlay_gains,
-    parse_settings,
-)
-from vftcli.observers.table import (
-    BEST,
-    DEFAULT,
-    NOT_SHOWN,
-    OBSERVERS,
-    PAPER,
-    LogSpectra,
-    Setup,
-    build_observers,
-    read_as,
-    sections,
-)
-from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.option import ESTIMATE, Choice, Option
 from vftcli.signals.parsing import check_known
-from vftcli.signals.remarks import Remark, caution
 
 if TYPE_CHECKING:
     from vftcli.observers.matching import Goal
+    from vftcli.observers.observer import Observer
+    from vftcli.observers.settings import Gains, Settings
+    from vftcli.observers.table import LogSpectra
+    from vftcli.robots.robot import Robot
+    from vftcli.robots.terms import DynamicsTerms
+    from vftcli.signals.external_torque import ExternalTorque
+    from vftcli.signals.remarks import Remark
 
 PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
 
 
+def settings_of(words: Sequence[str]) -> "Settings":
+    """The parameters of ``OBSERVER.PARAMETER=VALUE`` words.
+
+    Raises:
+        ParameterError: If there is no such parameter, or a value is malformed.
+    """
+    from vftcli.observers.settings import parse_settings
+    from vftcli.observers.table import sections
+
+    return parse_settings(words, sections())
+
+
+def goal_of(text: str) -> "Goal":
+    """What ``delay=S`` or ``bandwidth=HZ`` asks of every observer alike."""
+    from vftcli.observers.matching import parse_target
+
+    return parse_target(text)
+
+
 @dataclass(frozen=True, kw_only=True)
-class ObserverChoice:
+class ObserverChoice(Choice):
     """Which observers run, and what their gains are.
 
     Raises:
         ParameterError: If there is no such observer, or none of those named could run online.
     """
 
+    GROUP: ClassVar[str] = ESTIMATE
+
     #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None given:
     #: `DEFAULT`, or the paper's four where their own formulas or one footing for all of them is
     #: asked for.
-    names: tuple[str, ...] = ()
+    names: Annotated[
+        tuple[str, ...],
+        Option(
+            "--observer",
+            "NAME",
+            "Which observers, repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: "
+            "kfo-fe; of annotate: kfo-zoh.",
+            several=True,
+        ),
+    ] = ()
+    #: Whether to leave out what could not run while the log is being written.
+    causal: Annotated[
+        bool,
+        Option("--causal", "", "Only what could run online. It leaves out best, and smoothers."),
+    ] = False
     #: Parameters the user sets, which go before every file's.
-    settings: Settings = field(default_factory=dict)
-    #: Whose gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
-    gains: str = PAPER_GAINS
-    gains_file: Path | None = None  #: A file of gains that go before the robot's own, or None.
+    settings: Annotated[
+        "Settings",
+        Option(
+            "--set",
+            "OBSERVER.PARAMETER=VALUE",
+            "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
+            settings_of,
+            several=True,
+            seldom=True,
+        ),
+    ] = field(default_factory=dict)
+    #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
+    gains: Annotated[
+        str,
+        Option(
+            "--gains",
+            "auto|paper|FILE",
+            "Gains of all but best (vftcli help gains). Those the log's spectra call for, the "
+            "robot file's (default), or those that `vftcli tune` wrote; --set goes before them.",
+        ),
+    ] = PAPER_GAINS
+    #: A file of gains that go before the robot's own, or None.
+    gains_file: Annotated[
+        Path | None,
+        Option("--set-file", "FILE", "The old name of --gains FILE.", seldom=True),
+    ] = None
     #: What every observer is to have alike on every joint, or None.
-    match: "Goal | None" = None
-    as_printed: bool = False  #: Whether the paper's printed formulas run, and its numeric dynamics.
-    causal: bool = False  #: Whether to leave out what could not run while the log is being written.
+    match: Annotated[
+        "Goal | None",
+        Option(
+            "--match",
+            "delay=S|bandwidth=HZ",
+            "Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
+            goal_of,
+            seldom=True,
+        ),
+    ] = None
+    #: Whether the paper's printed formulas run, and its numeric dynamics.
+    as_printed: Annotated[
+        bool,
+        Option("--as-printed", "", "The paper's printed formulas, errata and all.", seldom=True),
+    ] = False
     #: Whether estimates start at the static residual of the first sample, not at zero.
     from_rest: bool = False
 
     def __post_init__(self) -> None:
+        from vftcli.observers.table import BEST, DEFAULT, OBSERVERS, PAPER
+
         alike = self.as_printed or self.match is not None
         names = tuple(dict.fromkeys(self.names)) or (PAPER if alike else DEFAULT)
         for name in names:
@@ -86,51 +139,29 @@ class ObserverChoice:
     def parsed(
         cls,
         *,
-        observer: Sequence[str] | None = None,
-        assignments: Sequence[str] | None = None,
         gains: str | Path | None = None,
-        gains_file: Path | None = None,
-        match: str | None = None,
-        as_printed: bool = False,
-        causal: bool = False,
-    ) -> "ObserverChoice":
-        """The choice that the options of a command state.
+        set_file: Path | None = None,
+        **words: Any,  # noqa: ANN401 - texts and lists of them
+    ) -> Self:
+        """The choice that the options of a command state, each the word after its option.
 
-        Args:
-            observer: The names of every ``--observer``; the default if none.
-            assignments: ``observer.parameter=VALUE`` of every ``--set``.
-            gains: `PAPER_GAINS`, `LOG_GAINS`, or a file of gains.
-            gains_file: The file under the old name of the option.
-            match: ``delay=S`` or ``bandwidth=HZ``.
-            as_printed: See the attribute.
-            causal: See the attribute.
+        `gains` is `PAPER_GAINS`, `LOG_GAINS`, or a file of gains; `set_file` is that file under the
+        old name of the option.
 
         Raises:
             ParameterError: If a name or parameter does not exist, or a value is malformed.
         """
-        target = None
-        if match is not None:
-            from vftcli.observers.matching import parse_target
-
-            target = parse_target(match)
-        if gains is not None and gains_file is not None:
+        if gains is not None and set_file is not None:
             raise ParameterError("--set-file is the old name of --gains FILE; give one of them")
-        word = str(gains) if gains is not None else PAPER_GAINS
-        if word not in {PAPER_GAINS, LOG_GAINS}:
-            word, gains_file = PAPER_GAINS, Path(word)
-        return cls(
-            names=tuple(observer or ()),
-            settings=parse_settings(assignments or (), sections()),
-            gains=word,
-            gains_file=gains_file,
-            match=target,
-            as_printed=as_printed,
-            causal=causal,
-        )
+        if gains in {None, PAPER_GAINS, LOG_GAINS}:
+            return super().parsed(gains=gains, set_file=set_file, **words)
+        return super().parsed(set_file=Path(str(gains)), **words)
 
     @property
     def from_spectra(self) -> bool:
         """Whether an observer takes its gains from what the complete log shows."""
+        from vftcli.observers.table import OBSERVERS
+
         return self.gains_of_log or any(OBSERVERS[name].from_spectra for name in self.names)
 
     @property
@@ -146,22 +177,29 @@ class ObserverChoice:
 
     def beside_print(self) -> "ObserverChoice":
         """The choice beside a printed table: without `best` where that is there by default."""
+        from vftcli.observers.table import DEFAULT, PAPER
+
         return replace(self, names=PAPER) if self.names == DEFAULT else self
 
     def build(
-        self, robot: Robot, step: float, shown: LogSpectra = NOT_SHOWN
-    ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
+        self, robot: "Robot", step: float, shown: "LogSpectra | None" = None
+    ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
         """Build the observers for one robot and sample time, with remarks on gains nobody gave.
 
         Args:
             robot: The arm, whose file gives the gains that are not set here.
             step: Sample time. [s]
-            shown: What the complete log shows of noise and contact, nothing where its free part is
+            shown: What the complete log shows of noise and contact, None where its free part is
                 not known.
 
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
         """
+        from vftcli.observers.settings import check_gains
+        from vftcli.observers.table import NOT_SHOWN, Setup, build_observers, read_as, sections
+        from vftcli.signals.remarks import caution
+
+        shown = shown or NOT_SHOWN
         check_gains(robot.gains, sections(), str(robot.path or robot.name))
         setup = Setup(
             gains=self.gains_over(robot.gains, shown),
@@ -183,13 +221,18 @@ class ObserverChoice:
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
 
-    def run(self, observer: Observer, terms: DynamicsTerms) -> ExternalTorque:
+    def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
         """Run one of the observers over a log, from where it is to start."""
+        from vftcli.observers.lead import estimate_from_rest
+
         return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
 
-    def gains_over(self, gains: Gains, shown: LogSpectra = NOT_SHOWN) -> Gains:
+    def gains_over(self, gains: "Gains", shown: "LogSpectra | None" = None) -> "Gains":
         """A robot's gains with those of the log or of the gains file put over them."""
-        if self.gains_of_log and shown.gains is not None:
+        from vftcli.observers.settings import load_gains, overlay_gains
+        from vftcli.observers.table import sections
+
+        if self.gains_of_log and shown is not None and shown.gains is not None:
             return overlay_gains(gains, shown.gains)
         if self.gains_file is None:
             return gains

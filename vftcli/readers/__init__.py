@@ -1,15 +1,22 @@
 """Readers: a log in any known format becomes a Recording. The content decides, never the name."""
 
-from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
-from vftcli.readers.reading import (
-    episode_numbers,
-    holds_episodes,
-    read,
-    read_chosen,
-    read_first_recording,
-    recognise,
-)
+from typing import TYPE_CHECKING
+
+from vftcli.signals.packages import door
+
+if TYPE_CHECKING:
+    from vftcli.readers.formats import FORMATS, LogFormat
+    from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+    from vftcli.readers.reading import (
+        episode_numbers,
+        holds_episodes,
+        read,
+        read_chosen,
+        read_first_recording,
+        recognise,
+    )
+else:
+    __getattr__ = door(__name__, "formats", "reader", "reading")
 
 __all__ = [
     "FORMATS",

@@ -7,17 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
 from vftcli.readers.columns import ColumnSpec, parse_columns
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array, Indices
-from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import LogError, ParameterError
-from vftcli.signals.recording import Recording
+from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.remarks import Remark, caution, warning
-from vftcli.signals.wrench import WrenchFrame
+
+if TYPE_CHECKING:
+    from vftcli.signals.arrays import Array, Indices
+    from vftcli.signals.recording import Recording
+    from vftcli.signals.wrench import WrenchFrame
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,15 +93,15 @@ class LogFile:
 class RawLog:
     """What a reader found, in SI units, before the clock is cleaned."""
 
-    stamps: Array  #: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
+    stamps: "Array"  #: Time stamps in ticks of `tick`; whole numbers stay whole. (T,)
     tick: float = 1.0  #: Length of one tick. [s]
     origin: float = 0.0  #: What has to be added to the stamps to be on the log's own clock. [s]
     clock: str  #: Which clock the stamps are from, in words.
     #: Which of several recordings in the file is wanted, from 1; None for all.
     segment: int | None = None
-    signals: Mapping[str, Array]  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
+    signals: "Mapping[str, Array]"  #: Field of Recording → (T, n), `wrench` → (T, 6), in SI units.
     first_row: int = 1  #: Number in the file of the first sample, counted from 1, for messages.
-    wrench_frame: WrenchFrame | None = None  #: What the log states of its wrench.
+    wrench_frame: "WrenchFrame | None" = None  #: What the log states of its wrench.
     joint_names: tuple[str, ...] = ()  #: The joints' names, base to tip, or empty.
     robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.
     degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
@@ -116,9 +118,9 @@ class RawLog:
     #: is all.
     rest: "Iterator[RawLog] | None" = None
     #: Which rows of the file these are, counted from 0; None for all. (T,)
-    rows: Indices | None = None
+    rows: "Indices | None" = None
     #: Rows of the file that were left out because a value is no number.
-    unknown: Indices | None = None
+    unknown: "Indices | None" = None
 
     def told_payload(self, constants: tuple[float, ...]) -> Self:
         """The log with the payload that its controller was told of last.
@@ -148,31 +150,92 @@ EFFORT = {
 DERIVE = ("dq", "none")
 
 
+def episode_number(text: str) -> int:
+    """The number of ``--episode``, counted as the file counts."""
+    if not re.fullmatch(r"[0-9]{1,9}", text):
+        raise ParameterError(f"--episode {text!r} is neither a number, as in 0, nor all")
+    return int(text)
+
+
 @dataclass(frozen=True, kw_only=True)
-class ReadChoice:
+class ReadChoice(Choice):
     """How a log is read, and which part of it is used.
 
     Raises:
         ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
+    GROUP: ClassVar[str] = LOG
+
     #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
-    format: str | None = None
-    columns: str | None = None  #: The text of ``--columns``, or None.
-    #: The signals that are wanted; None for all. Others may be left unread.
-    signals: frozenset[str] | None = None
+    format: Annotated[
+        str | None,
+        Option(
+            "--format", "NAME", "Skip recognition; `vftcli formats` lists the names.", seldom=True
+        ),
+    ] = None
+    columns: Annotated[
+        str | None,
+        Option(
+            "--columns",
+            "SPEC",
+            "Columns of a table (vftcli help columns). 't,q:6,dq:6,current:6' in file order, or "
+            "'q=joint_pos_{i},tau=eff_{i}' by header.",
+        ),
+    ] = None
     #: The span that is used, from the first sample, None for all of it. [s]
-    interval: tuple[float, float] | None = None
+    interval: Annotated[
+        tuple[float, float] | None,
+        Option(
+            "--interval",
+            "A:B",
+            "Only this span, in seconds from the first sample.",
+            parsing.interval,
+        ),
+    ] = None
     #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the robot; None
     #: to take what it is called.
-    effort: str | None = None
+    effort: Annotated[
+        str | None,
+        Option(
+            "--effort",
+            "auto|current|torque|torque-without-gravity",
+            "What the log's effort is, whatever it is called; auto takes what the robot's model "
+            "explains best, and says so.",
+            seldom=True,
+        ),
+    ] = None
+    #: Number of the episode of a file that holds several, None to leave it to the reader.
+    episode: Annotated[
+        int | None,
+        Option(
+            "--episode",
+            "K|all",
+            "Of a file that holds several: which, or each as a log of its own.",
+            episode_number,
+            seldom=True,
+        ),
+    ] = None
+    #: Which arm of a log of two, a member of `ARMS`; None for the only one.
+    arm: Annotated[
+        str | None,
+        Option("--arm", "left|right", "Of a log of two arms: which.", seldom=True),
+    ] = None
     #: "dq" to derive the velocities even where the log has some, "none" never to; None to do so
     #: where it has none and is fast enough.
-    derive: str | None = None
-    #: Number of the episode of a file that holds several, None to leave it to the reader.
-    episode: int | None = None
+    derive: Annotated[
+        str | None,
+        Option(
+            "--derive",
+            "dq|none",
+            "Velocities from the positions over the complete log, in place of logged ones; where "
+            "the log has none, from 50 Hz on, they are derived unasked, and that is said.",
+            seldom=True,
+        ),
+    ] = None
+    #: The signals that are wanted; None for all. Others may be left unread.
+    signals: frozenset[str] | None = None
     all_episodes: bool = False  #: Whether each episode is wanted, as a log of its own.
-    arm: str | None = None  #: Which arm of a log of two, a member of `ARMS`; None for the only one.
     #: Whether the log is only looked at, where a part and a word say more than a refusal.
     examining: bool = False
     blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
@@ -180,44 +243,21 @@ class ReadChoice:
     skips_unknown: bool = False
 
     def __post_init__(self) -> None:
-        if self.arm is not None:
-            parsing.check_known(self.arm, ARMS, f"--arm {self.arm!r}")
-        if self.derive is not None:
-            parsing.check_known(self.derive, DERIVE, f"--derive {self.derive!r}")
-        if self.effort is not None:
-            parsing.check_known(self.effort, tuple(EFFORT), f"--effort {self.effort!r}")
+        known = {"arm": ARMS, "derive": DERIVE, "effort": tuple(EFFORT)}
+        for name, there in known.items():
+            if (word := getattr(self, name)) is not None:
+                parsing.check_known(word, there, f"--{name} {word!r}")
 
     @classmethod
-    def parsed(
-        cls,
-        *,
-        format: str | None = None,
-        columns: str | None = None,
-        interval: str | None = None,
-        effort: str | None = None,
-        derive: str | None = None,
-        episode: str | None = None,
-        arm: str | None = None,
-    ) -> "ReadChoice":
+    def parsed(cls, *, episode: str | None = None, **words: Any) -> Self:  # noqa: ANN401
         """The choice that ``--format``, ``--columns``, ``--interval A:B``, … state.
 
         Raises:
             ParameterError: If the interval or the episode is malformed.
         """
-        span = parsing.interval(interval) if interval is not None else None
-        number = None if episode in {None, "all"} else str(episode)
-        if number is not None and not re.fullmatch(r"[0-9]{1,9}", number):
-            raise ParameterError(f"--episode {episode!r} is neither a number, as in 0, nor all")
-        return cls(
-            format=format,
-            columns=columns,
-            interval=span,
-            effort=effort,
-            derive=derive,
-            episode=int(number) if number is not None else None,
-            all_episodes=episode == "all",
-            arm=arm,
-        )
+        if episode == "all":
+            return replace(super().parsed(**words), all_episodes=True)
+        return super().parsed(episode=episode, **words)
 
     @property
     def spec(self) -> ColumnSpec:
@@ -229,12 +269,14 @@ class ReadChoice:
         """The same without its interval and episode: a free run is a log of its own, read whole."""
         return replace(self, interval=None, episode=None, all_episodes=False)
 
-    def taken(self, recording: Recording) -> Recording:
+    def taken(self, recording: "Recording") -> "Recording":
         """A recording with its effort taken for what it is said to be, its velocities derived.
 
         Raises:
             MissingSignalError: If the log has no such effort.
         """
+        from vftcli.signals.derivation import is_fast, with_velocity
+
         kind = EFFORT[self.effort] if self.effort is not None else None
         if kind is not None:
             recording = recording.with_effort(kind)
@@ -244,7 +286,7 @@ class ReadChoice:
             recording = with_velocity(recording)
         return recording
 
-    def within(self, recording: Recording) -> Recording:
+    def within(self, recording: "Recording") -> "Recording":
         """The part of a recording that lies in the interval.
 
         Raises:

@@ -1,10 +1,12 @@
 """What a user may choose of free motion, read from the command line and checked once."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated, Any, ClassVar, Self
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.parsing import interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
@@ -12,8 +14,38 @@ AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 
+#: Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day.
+DIGITS = 5
+
+
+def cycle_numbers(text: str) -> tuple[int, ...]:
+    """Cycle numbers, counted from 1, of ``1`` or ``1,2`` or ``1-3``."""
+    found: list[int] = []
+    for part in text.split(","):
+        first, dash, last = part.strip().partition("-")
+        short = max(len(first), len(last)) <= DIGITS
+        if not short or not first.isdecimal() or (dash and not last.isdecimal()):
+            raise ReferenceTorqueError(
+                f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
+            )
+        found += range(int(first), int(last or first) + 1)
+    if not found or min(found) < 1:
+        raise ReferenceTorqueError(f"--free-cycles {text!r} names no cycle; they count from 1")
+    return tuple(dict.fromkeys(found))
+
+
+def cutoff(text: str) -> float | str | None:
+    """Cutoff of ``--low-pass``: a number [Hz], None for "none", any other word as it is."""
+    if text == "none":
+        return None
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
 @dataclass(frozen=True, kw_only=True)
-class FreeChoice:
+class FreeChoice(Choice):
     """The motion that nobody touched, and how the two-cycle difference lays it under the log.
 
     With nothing chosen the free cycles of a repeated motion are found.
@@ -23,14 +55,75 @@ class FreeChoice:
             is not positive, or cycles are named beside other logs.
     """
 
-    logs: tuple[Path, ...] = ()  #: Free runs in other logs.
-    spans: tuple[tuple[float, float], ...] = ()  #: Free spans of the log itself, from and to. [s]
+    GROUP: ClassVar[str] = LOG
+
+    #: Free runs in other logs.
+    logs: Annotated[
+        tuple[Path, ...],
+        Option(
+            "--free",
+            "LOG|A:B",
+            "Motion that nobody touched: another log, or a span. Repeatable: two free runs of the "
+            "same trajectory measure the floor.",
+            str,
+            several=True,
+        ),
+    ] = ()
+    #: Free spans of the log itself, from and to. [s]
+    spans: Annotated[
+        tuple[tuple[float, float], ...],
+        Option(
+            "--free-part",
+            "A:B",
+            "The same as --free A:B; without either, the log's own free cycles are found.",
+            str,
+            seldom=True,
+        ),
+    ] = ()
     #: The commanded period of a repeated motion, None to go by the positions alone. [s]
-    period: float | None = None
-    cycles: tuple[int, ...] = ()  #: Its free cycles, counted from 1; none to find them.
-    alignment: str = AUTOMATIC  #: One of `ALIGNMENTS`, or "auto" for the best for the log at hand.
+    period: Annotated[
+        float | None,
+        Option(
+            "--period",
+            "S",
+            "Commanded period of a repeated motion; found if not given.",
+            seldom=True,
+        ),
+    ] = None
+    #: Its free cycles, counted from 1; none to find them.
+    cycles: Annotated[
+        tuple[int, ...],
+        Option(
+            "--free-cycles",
+            "1|1,2|1-3",
+            "Cycles free of contact; found if not given.",
+            cycle_numbers,
+            seldom=True,
+        ),
+    ] = ()
+    alignment: Annotated[
+        str,
+        Option(
+            "--alignment",
+            "auto|commanded|period|phase|model",
+            "How the two-cycle difference lays free and loaded motion over one another; auto takes "
+            "what has the smallest error on this log.",
+            seldom=True,
+            shows_default=True,
+        ),
+    ] = AUTOMATIC
     #: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
-    low_pass: float | str | None = AUTOMATIC
+    low_pass: Annotated[
+        float | str | None,
+        Option(
+            "--low-pass",
+            "auto|none|HZ",
+            "Zero-phase low-pass of that difference.",
+            cutoff,
+            seldom=True,
+            shows_default=True,
+        ),
+    ] = AUTOMATIC
 
     def __post_init__(self) -> None:
         if self.alignment not in {AUTOMATIC, *ALIGNMENTS}:
@@ -71,11 +164,8 @@ class FreeChoice:
         *,
         free: Sequence[str | Path] | None = None,
         free_part: str | None = None,
-        period: float | None = None,
-        free_cycles: str | None = None,
-        alignment: str = AUTOMATIC,
-        low_pass: str = AUTOMATIC,
-    ) -> "FreeChoice":
+        **words: Any,  # noqa: ANN401 - texts and numbers
+    ) -> Self:
         """The choice that the options of a command state, each the word after its option.
 
         A word of `free` is a log or a span ``A:B``, as `free_part` is.
@@ -91,41 +181,4 @@ class FreeChoice:
                 spans.append(interval(str(word)))
             except ParameterError:
                 logs.append(Path(word))
-        return cls(
-            logs=tuple(logs),
-            spans=tuple(spans),
-            period=period,
-            cycles=cycle_numbers(free_cycles) if free_cycles is not None else (),
-            alignment=alignment,
-            low_pass=cutoff(low_pass),
-        )
-
-
-#: Most digits of a cycle's number: at a second each, a log of 99 999 cycles takes a day.
-DIGITS = 5
-
-
-def cycle_numbers(text: str) -> tuple[int, ...]:
-    """Cycle numbers, counted from 1, of ``1`` or ``1,2`` or ``1-3``."""
-    found: list[int] = []
-    for part in text.split(","):
-        first, dash, last = part.strip().partition("-")
-        short = max(len(first), len(last)) <= DIGITS
-        if not short or not first.isdecimal() or (dash and not last.isdecimal()):
-            raise ReferenceTorqueError(
-                f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
-            )
-        found += range(int(first), int(last or first) + 1)
-    if not found or min(found) < 1:
-        raise ReferenceTorqueError(f"--free-cycles {text!r} names no cycle; they count from 1")
-    return tuple(dict.fromkeys(found))
-
-
-def cutoff(text: str) -> float | str | None:
-    """Cutoff of ``--low-pass``: a number [Hz], None for "none", any other word as it is."""
-    if text == "none":
-        return None
-    try:
-        return float(text)
-    except ValueError:
-        return text
+        return replace(super().parsed(**words), logs=tuple(logs), spans=tuple(spans))

@@ -65,10 +65,10 @@ def looped(
     """A scenario with Table III's controller in the loop, and its force through all controllers."""
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
-    alone = ControlChoice.parsed(as_printed=variant == AS_PRINTED)
+    alone = ControlChoice(as_printed=variant == AS_PRINTED)
     parameters = alone.parameters(arm)
     observers = ObserverChoice.parsed(
-        observer=["kfo-fe"], assignments=[f"kfo.noise_convention={CONVENTIONS[variant]}"]
+        observer=["kfo-fe"], set=[f"kfo.noise_convention={CONVENTIONS[variant]}"]
     )
     observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     assert isinstance(observer, KalmanObserver)
@@ -176,7 +176,7 @@ def released(
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
     for variant, xi in ((CORRECTED, None), ("ξ = 1", "1")):
-        control = replace(ControlChoice.parsed(xi=xi), alphas=tuple(alphas))
+        control = replace(ControlChoice(xi=xi), alphas=tuple(alphas))
         parameters = control.parameters(arm)
         laws = control.controllers(parameters)
         motion = release(laws, x, settling(laws, x))

@@ -39,7 +39,7 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 VARIANTS: dict[str, dict[str, Any]] = {
     AS_PRINTED: {"as_printed": True},
     CORRECTED: {},
-    DENSITY: {"assignments": ["kfo.noise_convention=density"]},
+    DENSITY: {"set": ["kfo.noise_convention=density"]},
     "at 1.59 Hz": {"match": "bandwidth=1.59"},
 }
 #: Variant → its observer, the one that the paper's virtual sensor takes.
@@ -200,7 +200,7 @@ def replay_bearing(
 ) -> Replay:
     """The same force through the traditional and the variable controller of Table IV."""
     words = [] if period is None else [f"admittance.period={period}"]
-    control = ControlChoice.parsed(assignments=words, as_printed=as_printed)
+    control = ControlChoice(assignments=tuple(words), as_printed=as_printed)
     parameters = control.parameters(made.robot)
     laws = control.controllers(parameters)
     source = fact("force-of-observer", observer=wrench.name)

@@ -3,12 +3,17 @@
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from vftcli.robots.chain import Chain, Payload
-from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import DESCRIPTIONS
 from vftcli.signals.errors import RobotError
+from vftcli.signals.packages import door
 from vftcli.signals.parsing import did_you_mean
+
+if TYPE_CHECKING:
+    from vftcli.robots.chain import Chain, Payload
+    from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+else:
+    __getattr__ = door(__name__, "chain", "robot")
 
 #: Maker → its built-in profiles.
 MAKERS = {
@@ -48,14 +53,14 @@ def same_model(name: str) -> list[str]:
 
 
 @cache
-def built_in(path: Path) -> Robot:
+def built_in(path: Path) -> "Robot":
     """The robot of a built-in profile, made once: it does not change."""
     from vftcli.robots.profile import load_profile
 
     return load_profile(path)
 
 
-def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
+def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> "Robot":
     """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
 
     Args:
@@ -68,6 +73,8 @@ def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = (
     """
     if not isinstance(robot, str | Path):
         raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
+    from vftcli.robots.robot_file import DESCRIPTIONS
+
     path = PROFILES.get(plain_name(str(robot)), Path(robot))
     ending = path.suffix.lower()
     if ending == ".toml":

@@ -1,14 +1,17 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-import numpy as np
-
-from vftcli.robots import PROFILES, Payload, Robot, load_robot
+from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import RobotError
+from vftcli.signals.option import LOG, Choice, Option
 from vftcli.signals.parsing import assignment, check_known
-from vftcli.signals.recording import Recording
+
+if TYPE_CHECKING:
+    from vftcli.robots.chain import Payload
+    from vftcli.robots.robot import Robot
+    from vftcli.signals.recording import Recording
 
 #: Values of ``--friction``: the robot file's, none at all, or that of a simulator's description.
 FRICTION = ("profile", "none", "model")
@@ -16,48 +19,65 @@ DECLARED = "log"  #: Value of ``--payload``: what the log says that the controll
 
 
 @dataclass(frozen=True, kw_only=True)
-class RobotChoice:
+class RobotChoice(Choice):
     """Which arm made a log, and how it is modelled.
 
     Raises:
         ParameterError: If friction is none of these, or an argument no NAME=VALUE.
     """
 
+    GROUP: ClassVar[str] = LOG
+
     #: Profile name, robot file or description, None to take what the log settles.
-    name: str | None = None
-    friction: str = "profile"  #: "profile", "none" or "model".
-    #: Name of a ``[payload.NAME]`` of the robot file to mount, "log" for the payload that the log
-    #: says the controller was told of, or None.
-    payload: str | None = None
-    #: The link or joint at the arm's end in a description, "" where that is not said.
-    tip: str = ""
-    arguments: tuple[str, ...] = ()  #: Arguments of a xacro, each ``NAME=VALUE``.
+    name: Annotated[
+        str | None,
+        Option("--robot", "NAME|FILE", "Profile, FILE.toml, or a URDF, xacro or MJCF."),
+    ] = None
+    friction: Annotated[
+        str,
+        Option(
+            "--friction",
+            "profile|none|model",
+            "The robot file's friction (default), none, or what an MJCF gives for simulation.",
+            seldom=True,
+        ),
+    ] = "profile"
+    payload: Annotated[
+        str | None,
+        Option(
+            "--payload",
+            "NAME",
+            "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
+            seldom=True,
+        ),
+    ] = None
+    tip: Annotated[
+        str,
+        Option(
+            "--tip",
+            "FRAME",
+            "Link or joint at the arm's end, in a description with hands or several arms; the "
+            "wrench stands at a link that is fixed to the last one.",
+            seldom=True,
+        ),
+    ] = ""
+    arguments: Annotated[
+        tuple[str, ...],
+        Option(
+            "--robot-arg",
+            "NAME=VALUE",
+            "An argument of a xacro, which is a program. Repeatable.",
+            several=True,
+            seldom=True,
+        ),
+    ] = ()
 
     def __post_init__(self) -> None:
         check_known(self.friction, FRICTION, f"--friction {self.friction!r}")
         for word in self.arguments:
             assignment(word, "--robot-arg", "NAME=VALUE")
 
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        robot: str | None = None,
-        friction: str | None = None,
-        payload: str | None = None,
-        tip: str | None = None,
-        robot_arg: Sequence[str] | None = None,
-    ) -> "RobotChoice":
-        """The choice that ``--robot`` and what goes with it state."""
-        return cls(
-            name=robot,
-            friction=friction or "profile",
-            payload=payload,
-            tip=tip or "",
-            arguments=tuple(robot_arg or ()),
-        )
-
-    def load(self, recording: Recording, otherwise: str | None = None) -> Robot:
+    def load(self, recording: "Recording", otherwise: str | None = None) -> "Robot":
         """Load the robot that is chosen, or the one that the log says.
 
         Args:
@@ -90,7 +110,7 @@ class RobotChoice:
         if self.name is not None:
             self.named().with_payload(None if self.payload == DECLARED else self.payload)
 
-    def named(self) -> Robot:
+    def named(self) -> "Robot":
         """The robot of the name, as it is described; it must have one.
 
         Raises:
@@ -99,7 +119,7 @@ class RobotChoice:
         return load_robot(self.name or "", tip=self.tip, arguments=self.arguments)
 
 
-def choices_for(recording: Recording) -> str:
+def choices_for(recording: "Recording") -> str:
     """What may be given with ``--robot`` for a log, in words."""
     fitting = [p for p in PROFILES if load_robot(p).joints == recording.joints]
     return (
@@ -108,8 +128,12 @@ def choices_for(recording: Recording) -> str:
     )
 
 
-def declared_payload(recording: Recording) -> Payload:
+def declared_payload(recording: "Recording") -> "Payload":
     """The payload that the controller was told of; nobody tells it an inertia."""
+    import numpy as np
+
+    from vftcli.robots.chain import Payload
+
     mass, com = recording.payload_mass, recording.payload_com
     if mass is None:
         raise RobotError(

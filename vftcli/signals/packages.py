@@ -5,6 +5,7 @@ none of them; docs/outputs.md tells what each is for.
 """
 
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
@@ -54,3 +55,19 @@ def needed(
         absent = isinstance(failure, ModuleNotFoundError) and failure.name == root
         why = "is not installed here" if absent else f"cannot be loaded ({failure})"
         raise error(f"{what} needs {package}, which {why}: {install}{otherwise}") from None
+
+
+def door(room: str, *files: str) -> Callable[[str], Any]:
+    """The `__getattr__` of a room that loads these files once a name of its `__all__` is used.
+
+    So a room's choice can be loaded, which `--help` needs, without numpy.
+    """
+
+    def attribute(name: str) -> Any:  # noqa: ANN401 - the names are of every kind
+        if name in sys.modules[room].__all__:
+            for file in files:
+                if hasattr(found := import_module(f"{room}.{file}"), name):
+                    return getattr(found, name)
+        raise AttributeError(f"module {room!r} has no attribute {name!r}")
+
+    return attribute

@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import WRENCH, Choice, Option
 from vftcli.signals.parsing import check_known, interval
-from vftcli.virtual_sensor.frames import Mounting, check_frame, read_pose
-from vftcli.virtual_sensor.solvers import LEAST_SQUARES, SOLVERS
+
+if TYPE_CHECKING:
+    from vftcli.robots.robot import Robot
+    from vftcli.virtual_sensor.frames import Mounting
 
 FIT = "fit"  #: The word for a sensor pose that is to be estimated from the log.
 START = "start"  #: The word for the unloaded start of the log.
@@ -54,26 +57,87 @@ class ZeroChoice:
 
 
 @dataclass(frozen=True, kw_only=True)
-class WrenchChoice:
+class WrenchChoice(Choice):
     """What a user asks of the virtual sensor.
 
     Raises:
         ParameterError: If there is no such frame or solver.
     """
 
-    frame: str = "flange"  #: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
+    GROUP: ClassVar[str] = WRENCH
+
+    #: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
+    frame: Annotated[
+        str,
+        Option(
+            "--frame",
+            "flange|base|tool|sensor",
+            "Its frame; default flange. See vftcli help frames. base: base axes, moment about the "
+            "flange point. Implies --wrench.",
+        ),
+    ] = "flange"
     #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the smoother where
     #: it is the observer's own, and least squares for the others.
-    solver: str | None = None
+    solver: Annotated[
+        str | None,
+        Option(
+            "--solver",
+            "smoother|pinv|map",
+            "How torques become a wrench: smoothed over the whole log with a band in every pose "
+            "(default for best: zero outside of the listed contacts), least squares (default for "
+            "the others), or with a prior of 50 N and 10 N·m. Implies --wrench.",
+            seldom=True,
+        ),
+    ] = None
     #: The tool's pose as text or a name in the robot file, None for the file's own.
-    tool: str | None = None
-    sensor_pose: str | None = None  #: The sensor's pose likewise, or "fit".
-    zero: ZeroChoice = field(default_factory=ZeroChoice)  #: What is taken as the zero.
+    tool: Annotated[
+        str | None,
+        Option(
+            "--tool",
+            "POSE|NAME",
+            "The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
+            "file.",
+            seldom=True,
+        ),
+    ] = None
+    #: The sensor's pose as text or a name in the robot file, "fit", or None for the file's own.
+    sensor_pose: Annotated[
+        str | None,
+        Option(
+            "--sensor-pose",
+            "POSE|NAME|fit",
+            "The force/torque sensor on the flange, likewise; fit estimates it from the log.",
+            seldom=True,
+        ),
+    ] = None
+    #: What is taken as the zero.
+    zero: Annotated[
+        ZeroChoice,
+        Option(
+            "--zero",
+            "A:B|start",
+            "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
+            "drift between spans. Implies --wrench.",
+            ZeroChoice.parsed,
+            several=True,
+        ),
+    ] = field(default_factory=ZeroChoice)
     #: Torque error the covariance starts from: "own", a number or one a joint as text, or None for
     #: the best that is known. [N·m]
-    torque_sd: str | None = None
+    torque_sd: Annotated[
+        str | None,
+        Option(
+            "--torque-sd",
+            "own|NUMBER(S)",
+            "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
+            seldom=True,
+        ),
+    ] = None
 
     def __post_init__(self) -> None:
+        from vftcli.virtual_sensor.frames import check_frame
+        from vftcli.virtual_sensor.solvers import SOLVERS
+
         check_frame(self.frame)
         if self.solver is not None:
             there = (SMOOTHER, *SOLVERS)
@@ -82,6 +146,8 @@ class WrenchChoice:
     @property
     def by_pose(self) -> str:
         """The solver that takes each pose by itself: the one asked for, else least squares."""
+        from vftcli.virtual_sensor.solvers import LEAST_SQUARES
+
         return LEAST_SQUARES if self.solver in {None, SMOOTHER} else str(self.solver)
 
     @property
@@ -93,47 +159,17 @@ class WrenchChoice:
         """Whether the wrench of the observer of this name is the smoother's."""
         return self.solver == SMOOTHER or (self.solver is None and name in SMOOTHED)
 
-    def mounting(self, robot: Robot) -> Mounting:
+    def mounting(self, robot: "Robot") -> "Mounting":
         """Where tool and sensor sit: as asked, else as the robot file says.
 
         Raises:
             ParameterError: If a pose is malformed or names nothing there is.
         """
+        from vftcli.virtual_sensor.frames import Mounting, read_pose
+
         tool, sensor = robot.tools.get(""), robot.sensors.get("")
         if self.tool is not None:
             tool = read_pose(self.tool, robot, "tool", "--tool")
         if self.sensor_pose is not None and self.sensor_pose != FIT:
             sensor = read_pose(self.sensor_pose, robot, "sensor", "--sensor-pose")
         return Mounting(tool, sensor)
-
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        wrench: bool = False,
-        frame: str | None = None,
-        solver: str | None = None,
-        tool: str | None = None,
-        sensor_pose: str | None = None,
-        zero: Sequence[str] | None = None,
-        torque_sd: str | None = None,
-    ) -> "WrenchChoice | None":
-        """The choice that the options of a command state, None where none of them asks for one.
-
-        `wrench` says whether ``--wrench`` was given, `zero` holds the words of every ``--zero``;
-        the others are fields. Any of them asks for a wrench.
-
-        Raises:
-            ParameterError: If a frame or solver does not exist, or a zero is malformed.
-        """
-        options = (frame, solver, tool, sensor_pose, zero or None, torque_sd)
-        if not wrench and all(option is None for option in options):
-            return None
-        return cls(
-            frame=frame or "flange",
-            solver=solver,
-            tool=tool,
-            sensor_pose=sensor_pose,
-            zero=ZeroChoice.parsed(zero or ()),
-            torque_sd=torque_sd,
-        )

@@ -8,7 +8,7 @@ from vftcli.signals.errors import ParameterError
 
 def test_a_report_has_its_recording_unless_none_is_asked_for() -> None:
     assert OutputChoice.parsed() == OutputChoice(extras=(), rrd_detail=LEVELS)
-    assert OutputChoice.parsed(extras=["rrd"], rrd_detail=FULL).writes_recording
+    assert OutputChoice(extras=("rrd",), rrd_detail=FULL).writes_recording
     assert not OutputChoice.parsed(rrd_detail=NONE).writes_recording
 
 
@@ -16,4 +16,4 @@ def test_words_that_mean_nothing_are_refused() -> None:
     with pytest.raises(ParameterError, match="--rrd-detail much is none of full, levels and none"):
         OutputChoice.parsed(rrd_detail="much")
     with pytest.raises(ParameterError, match="writes no recording"):
-        OutputChoice.parsed(extras=["rrd"], rrd_detail=NONE)
+        OutputChoice(extras=("rrd",), rrd_detail=NONE)

@@ -1,9 +1,10 @@
 """What a user may choose of the files that are written of a log."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, ClassVar
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import WRITE, Choice, Option
 
 #: How much of a log its recording holds: every sample, of a long one its levels, or no recording.
 #:
@@ -13,23 +14,33 @@ FULL, LEVELS, NONE = "full", "levels", "none"
 
 
 @dataclass(frozen=True, kw_only=True)
-class OutputChoice:
+class OutputChoice(Choice):
     """What is written of a log besides what always is."""
+
+    GROUP: ClassVar[str] = WRITE
 
     extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
     #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
-    rrd_detail: str = LEVELS
+    rrd_detail: Annotated[
+        str,
+        Option(
+            "--rrd-detail",
+            f"{FULL}|{LEVELS}|{NONE}",
+            "How much of a long log recording.rrd holds. Levels, unless another is given: the "
+            "lowest and highest samples of 5000 stretches, every sample where the strongest "
+            "contacts begin.",
+            seldom=True,
+            shows_default=True,
+        ),
+    ] = LEVELS
 
-    @classmethod
-    def parsed(cls, *, extras: Sequence[str] = (), rrd_detail: str = LEVELS) -> "OutputChoice":
-        """The choice that a user's words state."""
-        if rrd_detail not in (FULL, LEVELS, NONE):
+    def __post_init__(self) -> None:
+        if self.rrd_detail not in (FULL, LEVELS, NONE):
             raise ParameterError(
-                f"--rrd-detail {rrd_detail} is none of {FULL}, {LEVELS} and {NONE}"
+                f"--rrd-detail {self.rrd_detail} is none of {FULL}, {LEVELS} and {NONE}"
             )
-        if rrd_detail == NONE and "rrd" in extras:
+        if self.rrd_detail == NONE and "rrd" in self.extras:
             raise ParameterError("--rrd-detail none writes no recording; leave --rrd or it away")
-        return cls(extras=tuple(extras), rrd_detail=rrd_detail)
 
     @property
     def writes_recording(self) -> bool:

@@ -1,0 +1,137 @@
+"""Options once: a choice's fields say how they are typed, commands are handed what was typed."""
+
+from dataclasses import MISSING, dataclass, fields
+from typing import Annotated, ClassVar
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from vftcli.admittance.choice import ControlChoice
+from vftcli.batch.choice import WorkersChoice
+from vftcli.cli.options import AnalysisOptions, Bundle, Needed, Typed, command
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.observers.choice import ObserverChoice
+from vftcli.outputs.log.choice import OutputChoice
+from vftcli.readers.library import Library
+from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.choice import RobotChoice
+from vftcli.signals.option import Choice, Option
+from vftcli.virtual_sensor.choice import FIT, WrenchChoice
+
+EVERY = (
+    ReadChoice, RobotChoice, ObserverChoice, FreeChoice, RefinementChoice, WrenchChoice,
+    OutputChoice, ControlChoice, WorkersChoice,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizeChoice(Choice):
+    GROUP: ClassVar[str] = "Sizes"
+
+    word: Annotated[str, Option("--word", "W", "Which word.")]
+    size: Annotated[int, Option("--size", "N", "How large.", least=1, shows_default=True)] = 3
+    loud: Annotated[bool, Option("-l/--loud", "", "Whether loud.")] = False
+    each: Annotated[tuple[int, ...], Option("--each", "N", "Repeatable.", len, several=True)] = ()
+
+
+class Outer(Bundle):
+    sizes: Typed[SizeChoice]
+    csv: Annotated[bool, Option("--csv", "", "A table.")]
+
+
+def called(*words: str) -> tuple[int, dict[str, object]]:
+    """Run a command with bundles; return its exit code and what it was handed."""
+    seen: dict[str, object] = {}
+
+    @command
+    def work(
+        name: Annotated[str, Option("", "NAME", "Who.")],
+        outer: Outer,
+        *,
+        times: Annotated[int, Option("--times", "N", "How often.")] = 1,
+        at: Annotated[float | None, Option("--at", "S", "When.")],
+    ) -> None:
+        """Do something."""
+        seen.update(name=name, outer=outer, times=times, at=at)
+
+    app = typer.Typer()
+    app.command()(work)
+    return CliRunner().invoke(app, words).exit_code, seen
+
+
+def test_a_command_is_handed_what_was_typed() -> None:
+    code, seen = called("me", "--size", "7", "-l", "--csv", "--times", "2", "--each", "a")
+    assert code == 0
+    assert seen["outer"].sizes.words == {"word": None, "size": 7, "loud": True, "each": ["a"]}
+    choice = seen["outer"].sizes.choice(word="w")
+    assert choice == SizeChoice(word="w", size=7, loud=True, each=1)
+    assert (seen["outer"].csv, seen["name"], seen["times"], seen["at"]) == (True, "me", 2, None)
+
+
+def test_what_is_not_typed_has_its_default_and_limits_hold() -> None:
+    assert called("me")[1]["outer"].sizes.choice(word="w") == SizeChoice(word="w")
+    assert called()[0] == 2  # the argument is missing
+    assert called("me", "--size", "0")[0] == 2
+
+
+def test_a_field_without_default_is_asked_for_where_the_choice_is_needed() -> None:
+    @command
+    def work(sizes: Needed[SizeChoice]) -> None:
+        """Do something."""
+
+    app = typer.Typer()
+    app.command()(work)
+    assert CliRunner().invoke(app, []).exit_code == 2
+    assert CliRunner().invoke(app, ["--word", "w"]).exit_code == 0
+
+
+@pytest.mark.parametrize("choice", EVERY)
+def test_a_choice_of_nothing_typed_is_the_choice_s_default(choice: type[Choice]) -> None:
+    """What is not given is decided by the room, not a second time by the command line."""
+    assert choice.parsed() == choice()
+    nothing = dict.fromkeys(choice.options())
+    assert choice.parsed(**nothing) == choice()
+    shown = {f.name: f.default for f in fields(choice)}
+    for field, _, option in choice.options().values():
+        assert not option.shows_default or shown[field] is not MISSING
+
+
+@pytest.mark.parametrize(
+    "typed",
+    [
+        {"also_wrench": True},
+        {"frame": "base"},
+        {"solver": "map"},
+        {"tool": "0,0,0.1"},
+        {"sensor_pose": FIT},
+        {"zero": ["1:2"]},
+        {"torque_sd": "own"},
+        {},
+    ],
+)
+def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, object]) -> None:
+    words = {"zero": [], **typed}
+    also = bool(words.pop("also_wrench", False))
+    nothing = {
+        name: Typed(choice, {})
+        for name, choice in (
+            ("reading", ReadChoice),
+            ("robot", RobotChoice),
+            ("observers", ObserverChoice),
+            ("free", FreeChoice),
+            ("refinement", RefinementChoice),
+        )
+    }
+    asked = AnalysisOptions(
+        **nothing, also_wrench=also, wrench=Typed(WrenchChoice, words), no_contacts=False,
+        anyway=False,
+    ).choice(Library())  # fmt: skip
+    assert (asked.wrench is not None) == bool(typed)
+
+
+def test_a_reference_s_options_are_those_of_its_choice() -> None:
+    made = ReferenceChoice.parsed(reference="zero", reference_columns=None, contacts=True)
+    assert made == ReferenceChoice(name="zero", contacts=True)
