@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance.tables import (
+from vftcli.outputs.admittance_tables import (
     COLUMNS,
     comparison_csv,
     comparison_grid,
