@@ -365,7 +365,7 @@ def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> Non
         latex_text,
         parameter_text,
     )
-    from vftcli.outputs.plain_rows import json_rows
+    from vftcli.outputs.grid import json_rows
 
     if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))

@@ -29,12 +29,11 @@ from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.lines import NARROW, line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.grid import html
+from vftcli.outputs.grid import html, json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.page import shell
 from vftcli.outputs.page.charts import DASHES, Chart, ChartLine, large, multiples
 from vftcli.outputs.palette import SPARE
-from vftcli.outputs.plain_rows import json_rows
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
-from vftcli.outputs.grid import Column, Grid
-from vftcli.outputs.plain_rows import csv_rows
+from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
 

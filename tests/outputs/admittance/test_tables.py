@@ -16,7 +16,7 @@ from vftcli.outputs.admittance_tables import (
     position_rotation,
     stability_grid,
 )
-from vftcli.outputs.plain_rows import json_rows
+from vftcli.outputs.grid import json_rows
 
 
 def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:
