@@ -436,7 +436,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
     monkeypatch.chdir(tmp_path)
     said = told("effort-offset", printed(planted("offset_J3_20pct")(tmp_path))[1])
     assert said is not None
-    (shift,) = re.findall(r"is shifted by (\S+) ", said)
+    (shift,) = re.findall(r"has an offset of (\S+) ", said)
     (how,) = re.findall("identify --interval A:B --method (friction) -o FILE.toml", said)
     search = ("identify", "--interval", "0.3:4", "--method", how, "-o", "own.toml")
     code, text = printed(planted("offset_J3_20pct", *search)(tmp_path))
