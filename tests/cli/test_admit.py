@@ -12,7 +12,7 @@ import pytest
 from vftcli.cli import main
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_bearing.csv"
-FILES = {"index.html", "recording.rrd", "motion.parquet", "comparison.csv", "comparison.json"}
+FILES = {"index.html", "motion.parquet", "comparison.csv", "comparison.json"}
 
 Run = Callable[..., tuple[int, str, str]]
 

@@ -75,7 +75,9 @@ def test_the_largest_cause_of_each_joint_is_named() -> None:
     assert stuck.values["size_Nm"][0] == 9.0
     # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
     np.testing.assert_allclose(stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)])
-    assert str(stuck).startswith("gmo: largest error per joint, from J1: stiction at rest, bandwidth")
+    assert str(stuck).startswith(
+        "gmo: largest error per joint, from J1: stiction at rest, bandwidth"
+    )
 
 
 def test_a_joint_at_rest_without_known_friction_is_not_limited_by_stiction() -> None:
