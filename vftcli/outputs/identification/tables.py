@@ -5,7 +5,8 @@ from math import isfinite
 import polars as pl
 
 from vftcli.identification.result import Identification
-from vftcli.outputs.grid import DASH, Column, Entry, Grid, joint_columns, signed, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
+from vftcli.outputs.quantity import DASH, signed
 
 
 def tables_text(found: Identification) -> str:

@@ -11,8 +11,8 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.observers.table import BEST
+from vftcli.outputs.answer import beginning
 from vftcli.outputs.arm import ArmPoses
-from vftcli.outputs.contacts import beginning
 from vftcli.outputs.palette import COLOURS, PLACES, REFERENCE, SPARE
 from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints
 from vftcli.outputs.rerun_arm import PaintedSpan, send_force

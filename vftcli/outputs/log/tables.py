@@ -14,7 +14,6 @@ from vftcli.outputs.grid import (
     joint_columns,
     latex,
     markdown,
-    significant,
     terminal,
 )
 from vftcli.outputs.log.rmse_tables import (
@@ -32,6 +31,7 @@ from vftcli.outputs.log.wrench_tables import (
     nothing_to_compare,
 )
 from vftcli.outputs.plain_rows import csv_rows, json_rows
+from vftcli.outputs.quantity import significant
 from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:
