@@ -15,9 +15,9 @@ from vftcli.batch.log_work import LogJob, LogTask, work_on_log
 from vftcli.batch.outcome import Effort, Failure, Outcome
 from vftcli.batch.rows import SCHEMA
 from vftcli.outputs.batch_folder import BatchFolder
+from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
 from vftcli.outputs.page.batch_page import batch_lines, render_batch
-from vftcli.outputs.page.index_page import IndexLine
 from vftcli.readers.collection import LogEntry
 from vftcli.readers.library import absolute, labelled
 
@@ -205,7 +205,7 @@ class Batch:
             orient="row",
         )
         count = self.count()._replace(done=len(finished) - self.before)
-        pages, lines = self.pages(finished), list[IndexLine]()
+        pages, lines = self.pages(finished), list[LogSummary]()
 
         def noted() -> "Iterator[pl.DataFrame]":
             for piece in self.folder.gather(logs, SCHEMA):

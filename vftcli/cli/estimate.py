@@ -119,7 +119,7 @@ def write_estimates(
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:
     """Print what was found in short, and what was written."""
     from vftcli.cli.console import canvas, say_analysis, show
-    from vftcli.outputs.short_screen import short_screen, written_lines
+    from vftcli.outputs.screen import short_screen, written_lines
 
     say_analysis(made)
     screen = canvas()

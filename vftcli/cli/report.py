@@ -131,8 +131,7 @@ def show_report(
     from vftcli.outputs.log.report import FILES, SUMMARY_FILES
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
-    from vftcli.outputs.screen import log_screen, logs_screen
-    from vftcli.outputs.short_screen import written_lines
+    from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))

@@ -34,6 +34,7 @@ from vftcli.outputs.log.run_record import input_record, log_remarks, robot_recor
 from vftcli.outputs.page import shell
 from vftcli.outputs.page.charts import DASHES, Chart, ChartLine, large, multiples
 from vftcli.outputs.palette import SPARE
+from vftcli.outputs.quantity import counted
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
@@ -181,8 +182,7 @@ def render_admittance(
     examinations: Sequence[Examination] = (),
 ) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
-    drawn, count = charts(replay, run), len(replay.controllers)
-    t, p = replay.motion.t, replay.parameters
+    drawn, t, p = charts(replay, run), replay.motion.t, replay.parameters
     lost = int(np.count_nonzero(~replay.path.reached))
     eyebrow = (
         title,
@@ -193,11 +193,11 @@ def render_admittance(
         f"threshold {p.threshold_mode}",
         f"{lost} poses out of reach" if lost else "",
     )
-    headline = f"The same force through {count} admittance controller{'s' * (count > 1)}."
+    controllers = counted(len(replay.controllers), "admittance controller")
     warnings = [sentence(remark) for remark in replay.remarks if remark.level == "warning"]
     parts = (
         shell.alarms(examinations),
-        shell.top(eyebrow, headline, shell.lead(*warnings)),
+        shell.top(eyebrow, f"The same force through {controllers}.", shell.lead(*warnings)),
         closed_loop_section(run),
         comparison_section(replay),
         "<h2>Force and motion over time</h2>",

@@ -10,12 +10,13 @@ from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
+from vftcli.outputs.quantity import minus
 from vftcli.signals.arrays import Array
 
 
 def number_form(form: str) -> Callable[[float], str]:
     """How a number is printed with a true minus sign."""
-    return lambda value: format(value, form).replace("-", "−")
+    return lambda value: minus(format(value, form))
 
 
 #: Key of a row → its column.

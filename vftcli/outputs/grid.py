@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.letters import printable
 
-DASH = "–"  #: What stands where nothing is known.
 #: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
 #: What stands, unseen, where a number has fewer decimals than others of its column.
@@ -40,24 +40,6 @@ class GridCell(NamedTuple):
 
 
 Entry = GridCell | str | float | None
-
-
-def significant(value: float, digits: int = 3) -> str:
-    """A number with three significant digits and no exponent where one can do without."""
-    if not np.isfinite(value):
-        return DASH
-    if value == 0.0:
-        return "0"
-    # Rounding comes first: 9.996 has its three digits as 10.0.
-    exponent = int(np.floor(np.log10(abs(float(f"{value:.{digits - 1}e}")))))
-    if exponent < -4:
-        return f"{value:.{digits - 1}e}"
-    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
-
-
-def signed(value: float) -> str:
-    """Three significant digits with a true minus sign, for the page."""
-    return significant(value).replace("-", "−")
 
 
 class Column(NamedTuple):
@@ -329,7 +311,7 @@ def escape_latex(text: str) -> str:
     """Text that LaTeX prints as it is."""
     text = printable(text)
     if text.startswith("-") and NUMBER.fullmatch(text):
-        text = f"−{text[1:]}"
+        text = minus(text)
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
     text = "".join(LATEX_LETTERS.get(letter, letter) for letter in text)
     return text.replace("$<$ ", r"$<$\,")

@@ -17,7 +17,7 @@ from vftcli.outputs.figures.dots import DotPlot, DotRow, dot_figure
 from vftcli.outputs.figures.lines import line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import DASH, Column, Entry, Grid, html, joint_columns, signed, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns, terminal
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     file_sha256,
@@ -31,6 +31,7 @@ from vftcli.outputs.page import figures, shell
 from vftcli.outputs.page.charts import Chart, ChartLine, families_of, large, multiples
 from vftcli.outputs.page.torque_part import joint_panels
 from vftcli.outputs.palette import SPARE
+from vftcli.outputs.quantity import DASH, counted, signed
 from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
@@ -114,7 +115,7 @@ def render_identification(
     """The page as text: self-contained, nothing is loaded from anywhere."""
     logs = list(dict.fromkeys(t.motion.recording.name for t in found.traces))
     title, charts = found.robot.title or found.robot.name, torque_charts(found)
-    source = f" from {len(logs)} log{'s' * (len(logs) > 1)}" if logs else ""
+    source = f" from {counted(len(logs), 'log')}" if logs else ""
     grids = {
         "residuals": residual_grid(found),
         "Identified numbers": parameter_grid(found),

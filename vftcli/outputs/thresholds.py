@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
-from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
+from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
+from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.writing import lines_of
 
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre.
@@ -112,7 +113,7 @@ def check_line(check: ContactCheck) -> str:
     if check.reference is None:
         count = len(check.contacts)
         least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
-        return f"{check.log}: {count} alarm{'s' * (count != 1)}{least}"
+        return f"{check.log}: {counted(count, 'alarm')}{least}"
     caught, all_of_them = len(check.caught), len(check.contacts)
     words = [f"{check.log}: {caught} of {all_of_them} contacts caught"]
     if caught:

@@ -10,10 +10,11 @@ import numpy as np
 from vftcli.outputs.figures.lines import line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, markdown, significant
+from vftcli.outputs.grid import Column, Grid, GridCell, html, markdown
 from vftcli.outputs.log.run_record import seal, versions
 from vftcli.outputs.page.charts import large, multiples
 from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
+from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
@@ -46,7 +47,7 @@ def spread(values: Sequence[float | None]) -> str:
 def signed(value: float) -> str:
     """Three significant digits, a whole number as it is, with a true minus sign."""
     text = f"{value:.0f}" if value == round(value) else significant(value)
-    return text.replace("-", "−")
+    return minus(text)
 
 
 def item_grid(shown: ShownItem) -> Grid:
@@ -59,7 +60,7 @@ def item_grid(shown: ShownItem) -> Grid:
         (
             line.label,
             line.unit or DASH,
-            line.printed.replace("-", "−") or DASH,
+            minus(line.printed) or DASH,
             *(spread(values.get(line.key, {}).get(kind, [])) for kind in kinds),
         )
         for line in item.lines

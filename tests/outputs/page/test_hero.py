@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
-from vftcli.outputs.page.hero import WIDE, caption, content, free_spans, hero, highest, told
+from vftcli.outputs.page.hero import WIDE, caption, content, free_spans, hero, highest
 
 
 def listed(analysis: Analysis) -> ContactList:
@@ -45,7 +45,7 @@ def test_the_axis_holds_every_peak_with_its_band(pushed: Analysis) -> None:
     found = listed(pushed)
     tops = [(c.peak_force or 0.0) + (c.peak_band or 0.0) for c in found.contacts]
     assert highest(found) > max(tops)
-    assert highest(replace(found, contacts=())) == 2.5 * (told(found) or 0.0)
+    assert highest(replace(found, contacts=())) == 2.5 * (found.told_force or 0.0)
     assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
 
 
@@ -73,7 +73,7 @@ def test_only_what_is_there_is_explained(pushed: Analysis, without_reference: An
     assert "Hatched: motion known to be free." in words
     assert "stopped" not in words
     stopped = replace(listed(pushed), stops=(3.0,), contacts=(), smallest_force=float("nan"))
-    assert told(stopped) is None
+    assert stopped.told_force is None
     words = caption(without_reference, stopped)
     assert "Dashed: the arm stopped abruptly." in words
     assert "Grey" not in words

@@ -1,19 +1,8 @@
 from dataclasses import replace
 
-import pytest
-
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import Ground
-from vftcli.outputs.page import index_page
-from vftcli.outputs.page.index_page import (
-    headline,
-    index_line,
-    index_row,
-    link,
-    page_in,
-    rank,
-    render_index,
-)
+from vftcli.outputs.believability import MARKS
+from vftcli.outputs.page.index_page import headline, index_line, index_row, render_index
 
 
 def test_the_index_links_every_report(pushed: Analysis, without_reference: Analysis) -> None:
@@ -31,31 +20,30 @@ def test_a_log_that_is_left_out_is_named(pushed: Analysis) -> None:
 
 
 def test_a_line_says_how_many_how_hard_and_how_sound(pushed: Analysis) -> None:
-    sound = Ground(standing="good", subject="clock", sentence="no gap")
-    log, robot, span, contacts, hardest, least, error, state = index_row(
-        index_line("a", pushed, sound)
-    )
+    line = index_line("a b", pushed)
+    log, robot, span, contacts, hardest, least, error, state = index_row(line)
     assert (log.text, robot, span) == ("ur5_circle.csv", "ur5", "20.0 s")
+    assert log.html == '<a href="a%20b/index.html">ur5_circle.csv</a>'
     assert (contacts, hardest, least) == ("12", "95 ± 9 N at 11.3 s", "4 N")
     assert error == "0.273 N·m (best)"  # without J5, which rests
-    assert state.text == "✓ sound"
-    bad = Ground(standing="bad", subject="load", sentence="heavy <b>")
-    assert "load: heavy &lt;b&gt;" in index_row(index_line("a", pushed, bad))[-1].html
+    assert state.text == f"{MARKS[line.standing]} {line.words}"
+    bad = line._replace(standing="bad", words="load: heavy <b>", name="<i>")
+    assert "load: heavy &lt;b&gt;" in index_row(bad)[-1].html
+    assert index_row(bad)[0].html == '<a href="a%20b/index.html">&lt;i&gt;</a>'
     assert (
-        index_row(index_line("a", replace(pushed, contacts=None, errors=None), bad))[3:7]
-        == ("–",) * 4
+        index_row(index_line("a", replace(pushed, contacts=None, errors=None)))[3:7] == ("–",) * 4
     )
 
 
-def test_the_worst_comes_first(pushed: Analysis, monkeypatch: pytest.MonkeyPatch) -> None:
-    bare = replace(pushed, contacts=None)
-    good, bad = (Ground(standing=s, subject="s", sentence="x") for s in ("good", "bad"))
-    lines = [("a", bare, good), ("b", pushed, good), ("c", bare, bad)]
-    worst = sorted((index_line(*line) for line in lines), key=rank)
-    assert [line.page for line in worst] == ["c/index.html", "b/index.html", "a/index.html"]
-    found = iter([good, bad])
-    monkeypatch.setattr(index_page, "health", lambda _: next(found))
-    html = render_index([("first", pushed), ("second", bare)])
+def test_the_worst_comes_first(pushed: Analysis) -> None:
+    hard = index_line("b", pushed)._replace(standing="good")
+    lines = [hard._replace(page="a", force=0.0), hard, hard._replace(page="c", standing="bad")]
+    assert [line.page for line in sorted(lines, key=lambda line: line.rank)] == [
+        "c",
+        "b/index.html",
+        "a",
+    ]
+    html = render_index([("first", replace(pushed, contacts=None)), ("second", pushed)])
     assert html.index("second/index.html") < html.index("first/index.html")
 
 
@@ -74,7 +62,3 @@ def test_the_headline_counts_logs(pushed: Analysis) -> None:
     assert (title, words) == ("Nothing pushed the arm, as far as these logs can tell.", "")
     none = replace(pushed, contacts=None)
     assert headline([("a", none)]) == ("External joint torques from 1 logs.", "")
-
-
-def test_a_link_may_hold_any_letter() -> None:
-    assert link(page_in("a b"), "<i>") == '<a href="a%20b/index.html">&lt;i&gt;</a>'

@@ -109,7 +109,8 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
     text = page.text
     order = (
         "ur5_circle.csv · Universal Robots UR5",
-        "Something pushed the arm 12 times, hardest with 95 ± 9 N.",
+        "12 contacts. The hardest of known size, at 11.3 s: 95 ± 9 N on the wrist.",
+        "Nothing else above 4 N. Weaker pushes would not show.",
         "The contacts",
         "Can it be believed?",
         "vftcli identify",
@@ -130,7 +131,7 @@ def test_without_contacts_the_torques_are_open(
     reason = caution("contacts-not-told", reason="a hostile <b>")
     bare = replace(pushed, contacts=None, remarks=(*pushed.remarks, reason))
     page = Page(render(bare))
-    assert "External torques of the 6 joints." in page.text
+    assert "External torque of 6 joints by " in page.text
     assert "a hostile <b>" in page.text
     opened = [a.get("id") for tag, a in page.elements if tag == "details" and "open" in a]
     assert opened == ["torques"]

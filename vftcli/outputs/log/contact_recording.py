@@ -11,7 +11,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.observers.table import BEST
-from vftcli.outputs.contacts import beginning
+from vftcli.outputs.answer import beginning
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.palette import COLOURS, PLACES, SPARE
 from vftcli.outputs.palette import REFERENCE as GREY

@@ -19,7 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.contacts import beginning, contact_name, contacts_record
+from vftcli.outputs.answer import beginning, contact_name
+from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.log.run_record import jsonable
 from vftcli.readers.bags.ros_messages import (
     Value,

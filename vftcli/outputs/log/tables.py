@@ -16,7 +16,6 @@ from vftcli.outputs.grid import (
     json_rows,
     latex,
     markdown,
-    significant,
     terminal,
 )
 from vftcli.outputs.log.rmse_tables import (
@@ -33,6 +32,7 @@ from vftcli.outputs.log.wrench_tables import (
     contact_grids,
     nothing_to_compare,
 )
+from vftcli.outputs.quantity import significant
 from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:

@@ -5,8 +5,9 @@ from html import escape
 from vftcli.analysis import Analysis
 from vftcli.evaluation.print_table import Comparison
 from vftcli.evaluation.selection import Facts, advice, facts
-from vftcli.outputs.grid import DASH, Column, Grid, html
+from vftcli.outputs.grid import Column, Grid, html
 from vftcli.outputs.page.shell import bullets, section, soft
+from vftcli.outputs.quantity import DASH
 
 #: Headings of the table of what was computed on the log.
 HEADS = (

@@ -1,131 +1,18 @@
-"""What touched the arm, on the page: headline, lead, the table of contacts and its details."""
+"""What touched the arm, on the page: the table of contacts and its details."""
 
-from collections.abc import Sequence
 from html import escape
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.contacts import answer, direction, force_size, place_words, unknown_size
-from vftcli.outputs.grid import Column, Entry, Grid, html, significant
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.answer import direction, force_size, place_words, reason
+from vftcli.outputs.grid import Column, Entry, Grid, html
 from vftcli.outputs.page.arm_drawing import arm_drawing
-from vftcli.outputs.page.hero import told
-from vftcli.signals.remarks import sentence
+from vftcli.outputs.quantity import banded, significant, vector
 
-#: How often, in words.
-TIMES = ("once", "twice", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
-#: How far a contact's begin may be off: nine in ten of simulated contacts are nearer. [s]
-ONSET = 0.1
-FEW = 6  #: Of more contacts the lead tells how many were where, not which.
 #: Heads of the table.
 HEADS = ("", "When", "How hard (95 %)", "Direction, base axes", "Where", "Trust")
-
-
-def headline(found: ContactList) -> str:
-    """The answer as a headline. Plain text."""
-    contacts = found.contacts
-    if not contacts:
-        return answer(found)
-    hardest = found.hardest
-    if contacts[0].is_load and hardest is not None:
-        how = f"of {size(hardest)}"
-        if not hardest.size_known:
-            how = f"below {(hardest.peak_force or 0.0) + (hardest.peak_band or 0.0):.0f} N"
-        return f"The arm bears a load {how}, or its payload or its model is wrong."
-    count = len(contacts)
-    often = TIMES[count - 1] if count <= len(TIMES) else str(count)
-    often += "" if count < 3 else " times"
-    pushed = "Something pushed"
-    if hardest is not None and all(contact.trust == "weak" for contact in contacts):
-        pushed = "Something may have pushed"
-    if hardest is None:
-        return f"{pushed} the arm {often}."
-    if not hardest.size_known:
-        return f"{pushed} the arm {often}. {unknown_size(hardest)}"
-    weak = " (weak)" if hardest.trust == "weak" else ""
-    return f"{pushed} the arm {often}, {'hardest ' * (count > 1)}with {size(hardest)}{weak}."
-
-
-def size(contact: Contact) -> str:
-    """|F| with its band or its range; "" where no force is known."""
-    return "" if contact.peak_force is None else force_size(contact)
-
-
-def lead(found: ContactList) -> str:
-    """Where it was and what else, then how far it may be believed."""
-    paragraphs = [where_words(found.contacts), belief_words(found)]
-    return "".join(f'<p class="lead">{text}</p>' for text in paragraphs if text)
-
-
-def where_words(contacts: Sequence[Contact]) -> str:
-    """Where the contacts were, the contacts of each part of the arm together. HTML."""
-    if not contacts:
-        return ""
-    first = contacts[0]
-    if first.is_load and first.mean_force is not None:
-        # Adding a nought takes the minus from one.
-        x, y, z = (f"{value + 0.0:.0f}".replace("-", "−") for value in np.round(first.mean_force))
-        return (
-            f"What is read lasts from {first.start:.1f} to {first.stop:.1f} s, with a mean of "
-            f"<b>({x}, {y}, {z}) N</b> in base axes. A push would not last so long; what touched "
-            "the arm beside it cannot be told."
-        )
-    by_part: dict[str, list[int]] = {}
-    for contact in contacts:
-        by_part.setdefault(contact.where, []).append(contact.number)
-    untold = by_part.pop("cannot tell", [])
-    said = [f"{which(n, len(contacts))} the <b>{escape(part)}</b>" for part, n in by_part.items()]
-    text = "; ".join(said)
-    if untold:
-        text += f"{'; ' if text else ''}{touched(untold, len(contacts))}"
-    return f"{text[:1].upper()}{text[1:]}."
-
-
-def which(numbers: list[int], count: int) -> str:
-    """Which contacts were at a place, up to its name."""
-    if len(numbers) == count:
-        return "it touched" if count == 1 else "all touched"
-    if count > FEW:
-        return f"{len(numbers)} of {count} touched"
-    return f"{'contact' if len(numbers) == 1 else 'contacts'} {listed(numbers)} touched"
-
-
-def touched(numbers: list[int], count: int) -> str:
-    """Which contacts' places are unknown."""
-    if len(numbers) == count:
-        subject = "it" if count == 1 else "they"
-    elif count > FEW:
-        subject = f"the other {len(numbers) if len(numbers) > 1 else 'one'}"
-    else:
-        subject = f"{'contact' if len(numbers) == 1 else 'contacts'} {listed(numbers)}"
-    return f"where {subject} touched is unknown, since several places fit"
-
-
-def listed(numbers: Sequence[int]) -> str:
-    """Numbers in bold with commas and a last "and"."""
-    words = [f"<b>{number}</b>" for number in numbers]
-    return " and ".join(filter(None, [", ".join(words[:-1]), words[-1]]))
-
-
-def belief_words(found: ContactList) -> str:
-    """How far times and sizes may be believed, and what would not be seen. HTML."""
-    parts = []
-    bands = [c.peak_band or 0.0 for c in found.contacts if c.size_known and not c.is_load]
-    if bands:
-        parts.append(
-            f"Believe times to about ±{ONSET:g} s and sizes to about "
-            f"±{float(np.median(bands)):.0f} N."
-        )
-    if (least := told(found)) is not None and not any(c.is_load for c in found.contacts):
-        fainter = any(c.peak_force is not None and c.peak_force < least for c in found.contacts)
-        seen = "is seen only where the arm feels it best" if fainter else "would not be seen"
-        parts.append(f"A touch below <b>{least:.0f} N</b> {seen}.")
-    weak = [c.number for c in found.contacts if c.trust == "weak" and not c.is_load]
-    if weak and len(weak) < len(found.contacts) <= FEW:
-        verb = "Contact {} is weak" if len(weak) == 1 else "Contacts {} are weak"
-        parts.append(f"{verb.format(listed(weak))}.")
-    return " ".join(filter(None, parts))
 
 
 def contact_table(analysis: Analysis, found: ContactList) -> str:
@@ -138,7 +25,7 @@ def contact_table(analysis: Analysis, found: ContactList) -> str:
     notes = (
         "Force on the robot. The bar: the size with its band, and in grey the range over every "
         "place that fits. The arm as it stood, seen from its side; orange: the places that fit; "
-        "the arrow: the force as far as it lies in the drawing."
+        "the arrow: the force as far as it lies in the drawing. Times are good to about ±0.1 s."
     )
     title = "The load" if found.contacts[0].is_load else "The contacts"
     return (
@@ -150,7 +37,9 @@ def contact_table(analysis: Analysis, found: ContactList) -> str:
 def contact_row(analysis: Analysis, contact: Contact, most: float) -> str:
     """One contact; its number leads to the chart."""
     number, lasts = contact.number, contact.stop - contact.start
-    hard = "unknown" if contact.peak_force is None else size(contact) + range_bar(contact, most)
+    hard = (
+        "unknown" if contact.peak_force is None else force_size(contact) + range_bar(contact, most)
+    )
     pushed = "–" if contact.wrench is None else direction(contact.wrench[:3])
     mark = (
         f'<a class="n" href="#mark-{number}" title="show in the chart" '
@@ -210,29 +99,10 @@ SIGNS = {"good": "✓", "fair": "○", "weak": "△"}
 
 def trust(contact: Contact) -> str:
     """The word, its sign and its reason."""
+    word = f'<span class="trust {contact.trust}">{SIGNS[contact.trust]} {contact.trust}</span>'
     if contact.is_load:
-        return '<span class="trust">load</span><small>lasts for most of the log</small>'
-    return (
-        f'<span class="trust {contact.trust}">{SIGNS[contact.trust]} {contact.trust}</span>'
-        f"<small>{escape(reason(contact))}</small>"
-    )
-
-
-def reason(contact: Contact) -> str:
-    """What a contact's trust rests on, the worst first."""
-    if contact.remarks:
-        return sentence(next(iter(contact.remarks)))
-    if contact.evidence is None or contact.evidence < SURE_NATS:
-        return "little evidence: friction explains nearly as much"
-    if contact.peak_force is None or contact.peak_band is None:
-        return "no force can be told with so few joints"
-    share = contact.peak_band / max(contact.peak_force, 1e-9)
-    text = f"the band is {share:.0%} of the force"
-    if contact.trust == "good" and share <= TIGHT and contact.anywhere is not None:
-        low, high = contact.anywhere
-        if high > 2.0 * max(low, 1.0):
-            text += "; the size depends on the place"
-    return text
+        word = '<span class="trust">load</span>'
+    return f"{word}<small>{escape(reason(contact))}</small>"
 
 
 def contact_details(found: ContactList) -> str:
@@ -254,7 +124,7 @@ def contact_details(found: ContactList) -> str:
             (
                 str(c.number),
                 *(
-                    f"{tau:.2f} ± {sd:.2f}".replace("-", "−")
+                    banded(tau, sd, ".2f", "")
                     for tau, sd in zip(c.joint_torque, c.joint_torque_sd, strict=True)
                 ),
                 "yes" if c.at_rest else "no",
@@ -279,11 +149,6 @@ def wrench_row(contact: Contact) -> tuple[Entry, ...]:
         contact.vendor_force,
         contact.sensor_force,
     )
-
-
-def vector(values: np.ndarray) -> str:
-    """Three numbers."""
-    return ", ".join(f"{x + 0.0:.1f}" for x in np.round(values, 1)).replace("-", "−")
 
 
 def model_pairs(found: ContactList) -> dict[str, str]:

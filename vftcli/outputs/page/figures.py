@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.outputs.decimation import decimated
+from vftcli.outputs.quantity import minus
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
 
@@ -91,7 +92,7 @@ def decades(span: Span) -> list[float]:
 
 def label(value: float) -> str:
     """A tick's number without an exponent where one can do without."""
-    return f"{value + 0.0:.6g}".replace("-", "−")
+    return minus(f"{value + 0.0:.6g}")
 
 
 def ends_of(values: Iterable[Array], *, zero: bool = False) -> Span:

@@ -10,6 +10,7 @@ from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.page import figures
 from vftcli.outputs.page.figures import Box, Scales, Span
+from vftcli.outputs.quantity import banded
 from vftcli.signals.errors import VftError
 from vftcli.signals.intervals import runs_of
 
@@ -38,18 +39,13 @@ def caption(analysis: Analysis, found: ContactList) -> str:
     else:
         words = ["Size of the force on the robot, at the place that each contact names."]
         words.append("Blue: 95 % band. Yellow: contact.")
-    if (least := told(found)) is not None:
+    if (least := found.told_force) is not None:
         words.append(f"Grey: below {least:.0f} N, what this log cannot tell from none.")
     if free_spans(analysis):
         words.append("Hatched: motion known to be free.")
     if found.stops:
         words.append("Dashed: the arm stopped abruptly.")
     return escape(" ".join(words))
-
-
-def told(found: ContactList) -> float | None:
-    """The smallest force that the log can tell, None where that is not known. [N]"""
-    return found.told_force
 
 
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
@@ -67,7 +63,7 @@ def content(analysis: Analysis, found: ContactList, box: Box) -> str:
     """Everything inside of the drawing."""
     t = analysis.t
     scales = Scales(box, Span(float(t[0]), float(t[-1])), Span(0.0, highest(found)))
-    force = found.hardest is not None or told(found) is not None
+    force = found.hardest is not None or found.told_force is not None
     hatch = f"free-{box.width:g}"  # named by the chart: two may stand on one page
     parts = [
         f'<defs><pattern id="{hatch}" width="7" height="7" '
@@ -77,7 +73,7 @@ def content(analysis: Analysis, found: ContactList, box: Box) -> str:
     fill = f'fill="url(#{hatch})"'
     parts += [figures.stripe(scales, *span, fill) for span in free_spans(analysis)]
     parts += [stripe_of(scales, contact) for contact in found.contacts]
-    if (least := told(found)) is not None:
+    if (least := found.told_force) is not None:
         parts.append(limit(scales, least))
     parts.append(figures.axes(scales, "s", (10 if box is WIDE else 4, 4 if force else 0)))
     if force:
@@ -90,7 +86,7 @@ def content(analysis: Analysis, found: ContactList, box: Box) -> str:
 
 def highest(found: ContactList) -> float:
     """Upper end of the axis: every peak with its band, what cannot be told, and room. [N]"""
-    tops = [2.5 * (told(found) or 0.0)]
+    tops = [2.5 * (found.told_force or 0.0)]
     for contact in found.contacts:
         if contact.peak_force is not None and contact.peak_band is not None:
             tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))
@@ -161,7 +157,7 @@ def peaks(scales: Scales, contacts: Sequence[Contact]) -> list[str]:
         parts.append(f'<circle class="peak" cx="{x:.1f}" cy="{y:.1f}" r="3.5"/>')
         if not contact.size_known:
             continue
-        text = f"{contact.peak_force:.0f} ± {contact.peak_band:.0f}"
+        text = banded(contact.peak_force, contact.peak_band, unit="")
         half = 0.5 * LETTER * len(text)
         middle = min(max(x, scales.box.left + half), scales.side - half)
         above = max(float(scales.up(contact.peak_force + contact.peak_band)), scales.box.top + 8)

@@ -3,15 +3,17 @@
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from types import MappingProxyType
-from typing import NamedTuple
 from urllib.parse import quote
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import MARKS, SEVERITY, Ground, Standing, grounds, health
-from vftcli.outputs.contacts import by_force, hardest_words
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, significant
+from vftcli.evaluation.errors import JointMeans
+from vftcli.outputs.answer import hardest_words
+from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
+from vftcli.outputs.contacts import by_force
+from vftcli.outputs.grid import Column, Grid, GridCell, html
 from vftcli.outputs.log.rmse_tables import blocks, rmse_grid
 from vftcli.outputs.page.shell import alarms, document, lead, section, soft, top
+from vftcli.outputs.quantity import DASH, significant
 
 #: Heads of the overview.
 HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
@@ -19,32 +21,15 @@ HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean 
 WORST_FIRST = "The worst first: by the health of the log, then by the hardest contact."
 
 
-class IndexLine(NamedTuple):
-    """One log in the overview."""
-
-    name: str  #: What it is called.
-    page: str  #: Its own page, relative to the index; "" without one.
-    robot: str  #: Its arm.
-    duration: float  #: How long it is. [s]
-    contacts: str  #: How many, or that they are a load, or `DASH`.
-    hardest: str  #: The hardest contact in words, or `DASH`.
-    force: float  #: Its force, 0 without one. [N]
-    least: float | None  #: The force below which nothing is told, None where that is not known. [N]
-    error: str  #: The least mean RMSE and its observer, or `DASH`.
-    standing: Standing  #: How healthy the log is.
-    words: str  #: Why.
-
-
 def render_index(
     analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = MappingProxyType({})
 ) -> str:
-    """The page over several reports."""
-    lines = [(folder, analysis, health(grounds(analysis))) for folder, analysis in analyses]
-    lines.sort(key=lambda line: rank(index_line(*line)))
+    """The page over several reports, each with its folder."""
+    lines = [(index_line(*each), each[1]) for each in analyses]
+    lines.sort(key=lambda line: line[0].rank)
     tables = "".join(
-        f"<h3>{link(page_in(folder), analysis.recording.name)}</h3>"
-        f"{''.join(html(rmse_grid(block)) for block in blocks(analysis.errors))}"
-        for folder, analysis, _ in lines
+        f"<h3>{link(line)}</h3>{''.join(map(html, map(rmse_grid, blocks(analysis.errors))))}"
+        for line, analysis in lines
         if analysis.errors is not None
     )
     found = [one for _, analysis in analyses for one in analysis.examinations]
@@ -53,7 +38,7 @@ def render_index(
     parts = (
         alarms(found),
         top((f"{len(analyses) + len(failed)} logs", ", ".join(robots)), title, lead(words)),
-        overview(index_line(*line) for line in lines),
+        overview(line for line, _ in lines),
         *(soft(escape(f"✗ {name} is left out: {reason}")) for name, reason in failed.items()),
         soft(WORST_FIRST),
         section("Errors against a reference", tables),
@@ -61,9 +46,22 @@ def render_index(
     return document(title, "".join(parts), scripts=["sort.js"])
 
 
-def overview(lines: Iterable[IndexLine]) -> str:
+def index_line(folder: str, analysis: Analysis) -> LogSummary:
+    """One log's line, with its page in a sub-folder and its least error."""
+    line = log_line(analysis, grounds(analysis))._replace(page=f"{folder}/index.html")
+    for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
+        line = line._replace(error=least_error(block.means))
+    return line
+
+
+def least_error(means: JointMeans) -> str:
+    """The least mean RMSE and its observer."""
+    return DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
+
+
+def overview(lines: Iterable[LogSummary]) -> str:
     """The table of all logs, the worst first; a click on a head sorts by it."""
-    rows = tuple(map(index_row, sorted(lines, key=rank)))
+    rows = tuple(map(index_row, sorted(lines, key=lambda line: line.rank)))
     return html(Grid(columns=tuple(Column(head, words=True) for head in HEADS), rows=rows))
 
 
@@ -87,45 +85,12 @@ def headline(analyses: Sequence[tuple[str, Analysis]]) -> tuple[str, str]:
     return title, words.strip()
 
 
-def rank(line: IndexLine) -> tuple[int, float]:
-    """Where a log stands: the worst health first, then the hardest contact."""
-    return SEVERITY.index(line.standing), -line.force
-
-
-def index_line(folder: str, analysis: Analysis, ground: Ground) -> IndexLine:
-    """One log's entries in the overview."""
-    found, contacts, hardest = analysis.contacts, DASH, DASH
-    if found is not None:
-        is_load = bool(found.contacts) and found.contacts[0].is_load
-        contacts = "load" if is_load else str(len(found.contacts))
-        hardest = hardest_words(found)
-    best, errors = DASH, blocks(analysis.errors) if analysis.errors is not None else ()
-    if errors:
-        lead = errors[0].means.least
-        best = DASH if lead is None else f"{significant(lead[1])} N·m ({lead[0]})"
-    most = None if found is None else found.hardest
-    return IndexLine(
-        name=analysis.recording.name,
-        page=page_in(folder),
-        robot=analysis.robot.name,
-        duration=analysis.recording.duration,
-        contacts=contacts,
-        hardest=hardest,
-        force=(most and most.peak_force) or 0.0,
-        least=None if found is None else found.told_force,
-        error=best,
-        standing=ground.standing,
-        words=f"{ground.subject}: {ground.sentence}" if ground.standing != "good" else "sound",
-    )
-
-
-def index_row(line: IndexLine) -> tuple[GridCell | str, ...]:
+def index_row(line: LogSummary) -> tuple[GridCell | str, ...]:
     """A line of the overview: the log's name links to its own page, where it has one."""
     mark = MARKS[line.standing]
     sign = f'<b class="{line.standing}">{mark}</b> {escape(line.words)}'
-    name = link(line.page, line.name) if line.page else ""
     return (
-        GridCell(line.name, html=name),
+        GridCell(line.name, html=link(line) if line.page else ""),
         line.robot,
         f"{line.duration:.1f} s",
         line.contacts,
@@ -136,11 +101,6 @@ def index_row(line: IndexLine) -> tuple[GridCell | str, ...]:
     )
 
 
-def page_in(folder: str) -> str:
-    """The page in a report's sub-folder, relative to the index."""
-    return f"{folder}/index.html"
-
-
-def link(page: str, name: str) -> str:
+def link(line: LogSummary) -> str:
     """HTML of a link to a log's page; both texts may hold any letter."""
-    return f'<a href="{escape(quote(page))}">{escape(name)}</a>'
+    return f'<a href="{escape(quote(line.page))}">{escape(line.name)}</a>'

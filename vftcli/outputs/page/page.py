@@ -6,7 +6,8 @@ from html import escape
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.believability import Ground, grounds, load_doubt
+from vftcli.outputs.answer import headline, otherwise
+from vftcli.outputs.believability import Ground, grounds
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import comparisons, contacts_part, sections
 from vftcli.outputs.page.charts import Chart, observer_lines
@@ -62,21 +63,13 @@ def answer_part(analysis: Analysis, torques: Chart) -> str:
         words = [f"What touched the arm is unknown: {sentence(r)}." for r in reasons]
         first = top(eyebrow(analysis), headline(analysis), lead(*words))
         return first + torque_section(torques, opened=True)
-    doubt = lead(load_doubt(analysis))
     return "".join(
         (
-            top(eyebrow(analysis), headline(analysis), doubt + contacts_part.lead(found)),
+            top(eyebrow(analysis), headline(analysis), lead(otherwise(found))),
             hero(analysis, found),
             contacts_part.contact_table(analysis, found),
         )
     )
-
-
-def headline(analysis: Analysis) -> str:
-    """The answer in one sentence."""
-    if analysis.contacts is not None:
-        return contacts_part.headline(analysis.contacts)
-    return f"External torques of the {analysis.recording.joints} joints."
 
 
 def eyebrow(analysis: Analysis) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.observers import OBSERVERS
-from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
+from vftcli.outputs.grid import Column, Grid, GridCell, html
 from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
@@ -22,6 +22,7 @@ from vftcli.outputs.page.charts import legend, pictures_of
 from vftcli.outputs.page.comparisons import selection_guide
 from vftcli.outputs.page.shell import section, soft
 from vftcli.outputs.page.torque_part import response_charts
+from vftcli.outputs.quantity import signed, significant
 from vftcli.signals.arrays import Array
 
 

@@ -13,6 +13,7 @@ from typing import Any
 from vftcli.doctor import Examination, in_words
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.page.charts import INK, Chart, LineStyle, packed_charts
+from vftcli.outputs.quantity import counted
 from vftcli.signals.remarks import Remark, explanation
 
 HERE = Path(__file__).parent
@@ -126,7 +127,7 @@ def health(examinations: Sequence[Examination], *, opened: bool = False) -> str:
         head = f"<h3>{escape(one.recording.name)}</h3>" if named else ""
         found = "".join(map(finding_block, (*warnings, *notes)))
         parts.append(head + (found or soft("Nothing was found.")))
-    state = f"{count} warning{'s' * (count > 1)}" if count else "sound"
+    state = counted(count, "warning") if count else "sound"
     return section("Log health", "".join(parts), state, name="health", opened=opened and count > 0)
 
 
