@@ -4,9 +4,10 @@ The arm is made of capsules, from the chain's own geometry.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import rerun as rr
 
 from vftcli.outputs.palette import rgb
 from vftcli.robots.chain import Chain
@@ -14,7 +15,7 @@ from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
-Stream = Any  #: A recording of Rerun, which is untyped.
+Stream = rr.RecordingStream  #: A recording that is being made.
 
 ROBOT = "/robot"  #: Below it stands the arm.
 #: Radius of the first and of the last link, as a share of the arm's length.
@@ -104,8 +105,6 @@ def send_arm(
     stream: Stream, chain: Chain, poses: ArmPoses, painted: Mapping[int, Sequence[PaintedSpan]]
 ) -> None:
     """Send the arm's shape once, its poses over time, and when links have another colour."""
-    import rerun as rr
-
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
@@ -145,8 +144,6 @@ def send_colours(
         start: The first pose's time. [s]
         painted: The spans in which all of them have another colour, in order.
     """
-    import rerun as rr
-
     if not painted:
         stream.log(link, rr.Capsules3D.from_fields(colors=own), static=True)
         return
@@ -180,8 +177,6 @@ def send_force(
         scale: Newtons that are 1 m.
         colour: ``#rrggbb``.
     """
-    import rerun as rr
-
     known = np.all(np.isfinite(force), axis=1)
     count = int(known.sum())
     columns = rr.Arrows3D.columns(

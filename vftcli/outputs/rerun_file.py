@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 from uuid import UUID
 
 import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
 
 from vftcli.outputs.decimation import level_rows
 from vftcli.outputs.files import unwritable
@@ -21,7 +23,6 @@ from vftcli.outputs.page.figures import Span
 from vftcli.outputs.palette import REFERENCE as GREY
 from vftcli.outputs.palette import rgb
 from vftcli.outputs.rerun_arm import ROBOT, ArmPoses, Stream
-from vftcli.signals.packages import check_installed
 
 CONTACTS = "/contacts"  #: Below it stand the contacts: `/contacts/1` is that of number 1.
 #: How the names of lines begin that are drawn as bars, and how those end that are a band's edges.
@@ -90,9 +91,6 @@ def rerun_file(
         space: What the space is called in which it stands.
         marked: The span that the time panel marks, None if there is none. [s]
     """
-    check_installed("rerun", path.name)
-    import rerun as rr
-
     # The same data make the same recording: no random id, and no time at which it was made.
     identity = recording_id(title, tabs, words)
     # Nor rows put together by how much time has gone by.
@@ -137,16 +135,14 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
 def blueprint(
     tabs: Sequence[Tab],
     words: Sequence[str],
-    space: Any,  # noqa: ANN401 - Rerun is untyped
+    space: rrb.Spatial3DView,
     marked: tuple[float, float] | None,
-) -> Any:  # noqa: ANN401 - Rerun is untyped
+) -> rrb.Blueprint:
     """How the recording opens: the arm's space and words to the left, plots to the right, paused.
 
     Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
     span stands out in the time panel, and a click on a time of the text log goes there.
     """
-    import rerun.blueprint as rrb
-
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
     left = rrb.Vertical(space, said, row_shares=[3, 2])
@@ -161,10 +157,8 @@ def blueprint(
     )
 
 
-def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rerun is untyped
+def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
     """The time panel, paused on the log's own clock, with a span selected in it."""
-    import rerun.blueprint as rrb
-
     span: dict[str, Any] = {}
     # An unstable part of the viewer's: a version without it opens the recording all the same.
     if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
@@ -173,10 +167,8 @@ def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rer
     return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
 
 
-def arm_view(poses: ArmPoses, name: str) -> Any:  # noqa: ANN401 - Rerun is untyped
+def arm_view(poses: ArmPoses, name: str) -> rrb.Spatial3DView:
     """The space with an eye that sees the base and all places where the links have been."""
-    import rerun.blueprint as rrb
-
     corners = poses.translation.reshape(-1, 3)
     # The base stands at the origin and shall be seen too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
@@ -191,10 +183,8 @@ def arm_view(poses: ArmPoses, name: str) -> Any:  # noqa: ANN401 - Rerun is unty
     )
 
 
-def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
+def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if there are many plots; the first one's legend holds for all."""
-    import rerun.blueprint as rrb
-
     views = [
         rrb.TimeSeriesView(
             origin=plot.key,
@@ -223,10 +213,8 @@ def title_of(tab: Tab, plot: Chart) -> str:
     return f"{title}, {low:.3g} to {high:.3g}"
 
 
-def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
+def log_view(log: Sequence[LogLine]) -> rrb.TextLogView:
     """A text log: time and words."""
-    import rerun.blueprint as rrb
-
     columns: dict[str, Any] = {}
     # The path says nothing that the words do not; versions without the choice show it.
     if hasattr(rrb, "TextLogColumns"):
@@ -238,8 +226,6 @@ def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
 
 def send_plot(stream: Stream, plot: Chart) -> None:
     """Send one plot: names and colours once, then all samples in one batch; then its points."""
-    import rerun as rr
-
     lines = lines_of(plot)
     style = rr.SeriesLines(
         names=[drawable(line.name) for line in lines],
@@ -276,8 +262,6 @@ def width_of(line: ChartLine) -> float:
 
 def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
     """Send the lines of a text log, each to its entity, in the order of time."""
-    import rerun as rr
-
     for path in dict.fromkeys(line.path for line in log):
         own = sorted((line for line in log if line.path == path), key=lambda line: line.t)
         rows = rr.TextLog.columns(
