@@ -47,7 +47,7 @@ class BatchCount(NamedTuple):
 
 
 @dataclass(kw_only=True)
-class Batch:
+class BatchRun:
     """A batch and one run of it: which logs are done, which failed, what each took."""
 
     logs: Sequence[LogEntry]  #: The logs.

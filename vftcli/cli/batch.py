@@ -88,7 +88,7 @@ def batch(
     """
     from vftcli.batch.kinds import for_comparison, for_estimates
     from vftcli.batch.log_work import LogJob
-    from vftcli.batch.run import Batch
+    from vftcli.batch.run import BatchRun
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
     from vftcli.doctor.examiner import Examiner
@@ -119,7 +119,7 @@ def batch(
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
         )
-    asked = Batch(
+    asked = BatchRun(
         logs=found,
         job=job,
         folder=BatchFolder(absolute(output)),
