@@ -42,7 +42,7 @@ def test_sizes_and_winners_are_told() -> None:
     assert "median 1.50" in text
     assert "J4 (gmo in print, kfo-fe here)" in text
     assert "fdo and gmo agree on J4, J5, J6" in text
-    assert "delay of 138 ms on J1" in text  # 137.5 ms in closed form
+    assert "delay 138 ms on J1" in text  # 137.5 ms in closed form
 
 
 def test_the_discrete_reading_is_told() -> None:
