@@ -36,7 +36,7 @@ from vftcli.batch.engine import Outcome, begin, run_tasks
 from vftcli.outputs.files import put_text
 from vftcli.outputs.log.run_record import to_json, versions
 from vftcli.outputs.seals import digest
-from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
 #: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
@@ -51,7 +51,6 @@ class CopyChoice:
     #: Whether frames of which nothing can be told are filled with zeros and marked, instead of
     #: stopping the run.
     allow_missing: bool = False
-    link: bool = True  #: Whether films may be second names of the dataset's files.
     force: bool = False  #: Whether an earlier copy may be replaced.
 
 
@@ -78,10 +77,6 @@ def annotate(
     Returns:
         What ``meta/vftcli.json`` holds.
     """
-    if workers.ship:
-        raise ParameterError(
-            "workers write the copy themselves, so they have to see its folder; leave --ship out"
-        )
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=how.force)
     for _ in files_within(path):
@@ -114,7 +109,7 @@ def annotate(
             statistics |= outcome.value["statistics"]
         progress("writing descriptions", 0.9, 1.0)
         if path.is_dir():
-            copy_others(path, folder, plan.places, link=how.link)
+            copy_others(path, folder, plan.places)
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
         record = record_of_copy(path, command, choice, columns, made, plan.sources)
         with finished(folder / RECORD) as temporary:

@@ -25,15 +25,13 @@ class WorkersChoice:
     tls: tuple[Path, Path, Path] | None = None
     #: Bytes that a worker of this machine may take before it is ended, None for its share.
     memory: int | None = None
-    #: Whether logs are sent to workers that do not see the files, and results sent back.
-    ship: bool = False
 
     def __post_init__(self) -> None:
         if self.scheduler is not None:
             self._check_address(self.scheduler)
-        elif self.ship or self.tls is not None:
+        elif self.tls is not None:
             raise ParameterError(
-                "--ship and --tls-… are for the workers of a cluster; add --scheduler ADDRESS"
+                "--tls-… are for the workers of a cluster; add --scheduler ADDRESS"
             )
         if not self.in_process and not is_installed():
             raise ParameterError(
@@ -58,7 +56,6 @@ class WorkersChoice:
         *,
         workers: int | None = None,
         scheduler: str | None = None,
-        ship: bool = False,
         worker_memory: float | None = None,
         tls_ca: Path | None = None,
         tls_cert: Path | None = None,
@@ -73,7 +70,6 @@ class WorkersChoice:
             scheduler=scheduler,
             tls=(given[0], given[1], given[2]) if given else None,
             memory=None if worker_memory is None else int(worker_memory * 1e9),
-            ship=ship,
         )
 
     def check_closed(self, *, anyway: bool) -> None:

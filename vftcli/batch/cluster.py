@@ -45,7 +45,6 @@ THREADS = {
 CONFIG: Mapping[str, object] = {
     "distributed.scheduler.worker-saturation": 1.0,  # else a neighbour is blamed for a death
     "distributed.scheduler.allowed-failures": DEATHS - 1,
-    "distributed.admin.large-graph-warning-threshold": "1GB",  # logs that are sent
     "distributed.worker.memory.target": False,  # results are small: nothing to spill
     "distributed.worker.memory.spill": False,
     "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
@@ -79,8 +78,7 @@ def connected(
         else:
             with standing(choice, tell) as client:
                 check_versions(client)
-                if not choice.ship:
-                    check_sight(client, seen)
+                check_sight(client, seen)
                 yield client
 
 
@@ -186,8 +184,7 @@ def check_sight(client: "Client", seen: Sequence[str]) -> None:
         for path, head in here.items():
             if not isinstance(there, dict) or there.get(path) != head:
                 raise EngineError(
-                    f"worker {address} does not see {path} as it is here; share the folder, or "
-                    "send the logs there with --ship"
+                    f"worker {address} does not see {path} as it is here; share the folder with it"
                 )
 
 

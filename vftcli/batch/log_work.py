@@ -42,7 +42,6 @@ class LogTask:
     label: str  #: What it is called.
     key: str  #: What its result is kept under.
     sha256: str  #: Of its file's bytes; "" for several files.
-    told_path: Path | None = None  #: Its path where the user has it, if it was sent.
 
 
 def work_on_log(task: LogTask) -> None:
@@ -72,7 +71,7 @@ def analysed(task: LogTask) -> Analysis:
     recording = choice.library.open(task.path, choice.read)
     if task.sha256 and recording.source.sha256 != task.sha256:
         raise LogError(f"{task.path} was changed while the batch ran; run the command again")
-    source = replace(recording.source, label=task.label, path=task.told_path or task.path)
+    source = replace(recording.source, label=task.label, path=task.path)
     recording = replace(recording, source=source)
     begin("analysing")
     work: Analyser = list_touches if task.job.do == "contacts" else analyse

@@ -150,10 +150,10 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    Traditional ones and variable-parameter ones. Writes DIR/index.html, recording.rrd,
-    motion.parquet, comparison.{csv,json} and run.json. The
-    force is that of one observer, kfo-fe unless another is named. --set also takes the controllers'
-    parameters: position.stiffness=12, rz.threshold=4, admittance.xi=1.
+    Traditional ones and variable-parameter ones. Writes DIR/index.html, motion.parquet,
+    comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe unless another
+    is named. --set also takes the controllers' parameters:
+    position.stiffness=12, rz.threshold=4, admittance.xi=1.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ColumnOptions(Bundle):
-    """Which columns are added, and how the copy is made."""
+    """Which columns are added."""
 
     GROUP = WRITE
 
@@ -33,7 +33,6 @@ class ColumnOptions(Bundle):
         "Write 0 where nothing can be told. Columns …_valid say where; without it, such a frame "
         "stops the run.",
     )
-    copy: bool = flag("--copy", "Copy videos too. They are linked else, where that can be.")
 
 
 @taken_apart
@@ -83,7 +82,7 @@ def annotate_dataset(
     )
     engine = workers.choice()
     engine.check_closed(anyway=anyway.anyway)
-    how = CopyChoice(allow_missing=columns.allow_missing, link=not columns.copy, force=force)
+    how = CopyChoice(allow_missing=columns.allow_missing, force=force)
     record = annotate(
         dataset,
         output,

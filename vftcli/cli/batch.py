@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.bundles import Bundle, ChoiceBundle, flag, option, taken_apart
+from vftcli.cli.bundles import ChoiceBundle, option, taken_apart
 
 if TYPE_CHECKING:
     from vftcli.batch.choice import WorkersChoice
@@ -45,11 +45,6 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
         "ADDRESS",
         "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
     )
-    ship: bool = flag(
-        "--ship",
-        "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
-        seldom=True,
-    )
     worker_memory: float | None = option(
         "--worker-memory",
         "GB",
@@ -66,16 +61,6 @@ class WorkerOptions(ChoiceBundle["WorkersChoice"]):
     tls_key: Path | None = option("--tls-key", "FILE", "Its key, for tls://.", seldom=True)
 
 
-class ResumeOptions(Bundle):
-    """Which logs are done, in a second run and at all."""
-
-    limit: int | None = option("--limit", "N", "Only the first N logs.", seldom=True, min=1)
-    retry_failed: bool = flag("--retry-failed", "Also logs that failed in an earlier run.")
-    max_failures: int | None = option(
-        "--max-failures", "N", "Stop when so many logs failed.", seldom=True, min=1
-    )
-
-
 @taken_apart
 def batch(
     logs: Places,
@@ -89,7 +74,6 @@ def batch(
         ),
     ],
     workers: WorkerOptions,
-    resume: ResumeOptions,
     reference: opt.ReferenceOptions,
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
@@ -97,8 +81,8 @@ def batch(
 ) -> None:
     """Ask many logs the same, on every core or on a cluster.
 
-    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does no
-    finished log again. Exit code 3: some failed.
+    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does what
+    is missing or failed. Exit code 3: some failed.
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
@@ -128,7 +112,7 @@ def batch(
     engine = workers.choice()
     engine.check_closed(anyway=analysis.anyway.anyway)
     collection = LogCollection(choice.read, output)
-    found = list(collection.find(logs))[: resume.limit]
+    found = list(collection.find(logs))
     say_passed([path.name for path in collection.passed])
     if not found:
         raise LogError(
@@ -140,8 +124,6 @@ def batch(
         folder=output,
         workers=engine,
         command=command_line(),
-        retry_failed=resume.retry_failed,
-        max_failures=resume.max_failures,
         force=force,
         tell=say,
         progress=progress_line(),

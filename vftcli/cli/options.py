@@ -250,12 +250,6 @@ class ExtraOptions(Bundle):
     GROUP = headings.WRITE
 
     mcap: bool = flag("--mcap", "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.")
-    layouts: bool = flag(
-        "--layouts",
-        "Also write its layouts for Foxglove and PlotJuggler; implies --mcap.",
-        seldom=True,
-    )
-
     rrd_detail: str = option(
         "--rrd-detail",
         "full|levels|none",
@@ -269,8 +263,7 @@ class ExtraOptions(Bundle):
         """What is written, with what the command's own options ask for."""
         from vftcli.outputs.log.choice import OutputChoice
 
-        asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
-        extras = [name for name, wanted in asked.items() if wanted]
+        extras = [name for name, wanted in {**others, "mcap": self.mcap}.items() if wanted]
         return OutputChoice.parsed(extras=extras, rrd_detail=self.rrd_detail)
 
 

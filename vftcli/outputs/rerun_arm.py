@@ -37,7 +37,6 @@ def send_arm(
     path: str,
     chain: Chain,
     poses: ArmPoses,
-    ghost: tuple[int, ...] | None = None,
     painted: Mapping[int, Sequence[PaintedSpan]] | None = None,
 ) -> None:
     """Send an arm's shape once and its poses over time."""
@@ -47,8 +46,8 @@ def send_arm(
     for j, shapes in enumerate(capsules(chain)):
         link = f"{path}/link_{j}" if j else f"{path}/base"
         if shapes:
-            stream.log(link, capsule_batch(shapes, ghost), static=True)
-            own = [ghost or rgb(JOINT if shape.joint else LINK) for shape in shapes]
+            stream.log(link, capsule_batch(shapes), static=True)
+            own = [rgb(JOINT if shape.joint else LINK) for shape in shapes]
             send_colours(stream, link, own, float(poses.t[0]), (painted or {}).get(j, ()))
         if j:
             columns = rr.Transform3D.columns(
@@ -57,16 +56,15 @@ def send_arm(
             stream.send_columns(link, [time], columns)
 
 
-def capsule_batch(shapes: Sequence[Capsule], ghost: tuple[int, ...] | None) -> Any:  # noqa: ANN401
+def capsule_batch(shapes: Sequence[Capsule]) -> Any:  # noqa: ANN401
     """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
     import rerun as rr
 
     directions = np.array([shape.direction for shape in shapes])
     lengths = np.linalg.norm(directions, axis=1)
-    slimmer = 1.0 if ghost is None else 0.8  # ghosts that overlap are told apart
     return rr.Capsules3D(
         lengths=lengths,
-        radii=[slimmer * shape.radius for shape in shapes],
+        radii=[shape.radius for shape in shapes],
         translations=np.array([shape.start for shape in shapes]),
         quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
         fill_mode="solid",
@@ -85,7 +83,7 @@ def send_colours(
     Args:
         stream: The recording.
         link: Entity of the link.
-        own: Red, green and blue of each shape, perhaps opacity.
+        own: Red, green and blue of each shape.
         start: The first pose's time. [s]
         painted: The spans in which all of them have another colour, in order.
     """

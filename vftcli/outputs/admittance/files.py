@@ -13,8 +13,7 @@ from vftcli.admittance.parameters import AXES, PER_AXIS
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance.figures import REPLAY_FIGURES, replay_figures
-from vftcli.outputs.admittance.page import render_admittance
-from vftcli.outputs.admittance.recording import padded, write_ghosts
+from vftcli.outputs.admittance.page import padded, render_admittance
 from vftcli.outputs.admittance.tables import comparison_csv, latency_rows
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
@@ -22,13 +21,11 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.plain_rows import json_rows
 from vftcli.outputs.seals import SEAL
-from vftcli.signals.packages import installed
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import AXES as FORCES
 
 FILES = (
     "index.html",
-    "recording.rrd",
     "motion.parquet",
     "comparison.csv",
     "comparison.json",
@@ -158,8 +155,6 @@ def write_admittance(
             folder.write(name, text)
         with table_file(folder / "motion.parquet") as file:
             motion_table(replay).write_parquet(file, compression="zstd")
-        if installed("rerun"):
-            write_ghosts(folder / "recording.rrd", replay, title)
         if form is not None:
             write_figures(folder, replay_figures(replay, run), form)
         seal(folder, SEAL, record)

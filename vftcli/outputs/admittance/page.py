@@ -12,7 +12,6 @@ from vftcli.admittance.law import Controller
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
-from vftcli.outputs.admittance.recording import colours, padded
 from vftcli.outputs.admittance.tables import (
     comparison_grid,
     latency_grid,
@@ -161,8 +160,10 @@ def comparison_section(replay: Replay) -> str:
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
-    """Every controller with its colour."""
-    return list(zip(replay.controllers, colours(replay, "ink"), strict=True))
+    """Every controller with its colour: the traditional one's is that of the page's ink."""
+    # Every variable controller its own colour, again from the start when there are no more.
+    spare = iter(SPARE * len(replay.controllers))
+    return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
 
 
 def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
@@ -209,6 +210,11 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
         )
         for key, title, shown, band, label in found
     ]
+
+
+def padded(values: Array) -> Array:
+    """Rows with an unknown one more: the last deviation follows from the force before it."""
+    return np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])
 
 
 def lines(controllers: list[tuple[Controller, str]], values: Array) -> tuple[ChartLine, ...]:

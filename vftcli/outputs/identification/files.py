@@ -1,4 +1,4 @@
-"""Files of an identification: the robot file, its page, its Rerun recording and `run.json`."""
+"""Files of an identification: the robot file, its page and `run.json`."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,7 +11,6 @@ from vftcli.outputs.figures.paper import figure_files, write_figures
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.identification.figures import IDENTIFICATION_FIGURES, identification_figures
 from vftcli.outputs.identification.page import render_identification
-from vftcli.outputs.identification.recording import write_identification_rrd
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     file_sha256,
@@ -24,7 +23,6 @@ from vftcli.outputs.log.run_record import (
 from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
-from vftcli.signals.packages import installed
 
 
 def beside(path: Path) -> dict[str, Path]:
@@ -34,7 +32,6 @@ def beside(path: Path) -> dict[str, Path]:
     return {
         "toml": path,
         "html": path.with_suffix(".html"),
-        "rrd": path.with_suffix(".rrd"),
         "run": path.with_suffix(f".{SEAL}"),
     }
 
@@ -61,7 +58,7 @@ def write_identification(
     Returns:
         The text of `run.json`.
     """
-    # One folder for all four, so that they appear together or not at all.
+    # One folder for all three, so that they appear together or not at all.
     names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
     heading = [
@@ -74,8 +71,6 @@ def write_identification(
         "toml": robot_toml(found.robot, heading),
     }
     with OutputFolder(path.parent, force, files_beside(path, form)) as folder:
-        if installed("rerun"):
-            write_identification_rrd(folder / names["rrd"], found)
         for kind, text in texts.items():
             folder.write(names[kind], text)
         if form is not None:

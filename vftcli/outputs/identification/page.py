@@ -148,8 +148,7 @@ def series_section(found: Identification, charts: Sequence[Chart]) -> str:
         return ""
     name = shown_trace(found).motion.recording.name
     drawn = "".join(f"<h3>{escape(c.title)}</h3>{multiples(c)}{large(c)}" for c in charts)
-    words = soft("The Rerun recording holds every log.")
-    return section("Torques over time", drawn + words, name)
+    return section("Torques over time", drawn, name)
 
 
 def shown_trace(found: Identification) -> Trace:

@@ -153,18 +153,13 @@ def write_csv(path: Path, analysis: Analysis) -> None:
         table.write_csv(file, float_precision=9)
 
 
-#: Flag → names of its files.
-EXTRAS = {
-    "csv": ("estimates.csv",),
-    "mcap": ("estimates.mcap",),
-    "layouts": ("estimates.foxglove.json", "estimates.plotjuggler.xml"),
-    "rrd": ("recording.rrd",),
-}
+#: Flag → name of its file.
+EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
 
 
 def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
     """Names of the files of these extras."""
-    return tuple(name for extra in extras for name in EXTRAS[extra])
+    return tuple(EXTRAS[extra] for extra in extras)
 
 
 def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
@@ -178,7 +173,6 @@ def write_extras(
     """Write what was asked for besides, below a place of a folder."""
     if not choice.extras:
         return  # without loading what writes them: a third of the modules of a command
-    from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
     from vftcli.outputs.log.mcap_output import write_mcap
     from vftcli.outputs.log.rerun_recording import write_rrd
 
@@ -187,13 +181,8 @@ def write_extras(
         "mcap": write_mcap,
         "rrd": partial(write_rrd, detail=choice.rrd_detail),
     }
-    texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
     for extra in choice.extras:
-        for name in EXTRAS[extra]:
-            if name in texts:
-                folder.write(f"{place}{name}", texts[name](analysis))
-            else:
-                writers[extra](folder / f"{place}{name}", analysis)
+        writers[extra](folder / f"{place}{EXTRAS[extra]}", analysis)
 
 
 def write_estimate_folder(
