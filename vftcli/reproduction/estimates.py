@@ -18,8 +18,7 @@ from vftcli.evaluation.selection import facts
 from vftcli.observers import PAPER
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.torque_part import torque_chart
-from vftcli.outputs.page.wrench_part import wrench_chart
+from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.reproduction.control import deviation_chart

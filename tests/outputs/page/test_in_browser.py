@@ -6,8 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.page.index_page import render_index
-from vftcli.outputs.page.page import render
+from vftcli.outputs.page.pages import render, render_index
 
 FOCUSED = """() => { const x = document.activeElement; const style = getComputedStyle(x);
   return { words: x.textContent.trim(), tag: x.tagName, seen: style.outlineStyle !== "none" } }"""

@@ -19,14 +19,16 @@ from vftcli.outputs.admittance.tables import (
     stability_grid,
 )
 from vftcli.outputs.grid import html
-from vftcli.outputs.page.charts import DASHES, Chart, ChartLine, large, multiples
+from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
 from vftcli.outputs.page.shell import (
     alarms,
     all_remarks,
     bullets,
     document,
     health,
+    large,
     lead,
+    multiples,
     provenance,
     section,
     soft,

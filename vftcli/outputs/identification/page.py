@@ -15,21 +15,25 @@ from vftcli.outputs.identification.tables import (
     residual_grid,
     shape_choice_grid,
 )
-from vftcli.outputs.page.charts import Chart, ChartLine, families_of, large, multiples
-from vftcli.outputs.page.figures import Box, Scales, Span, axes, svg
+from vftcli.outputs.page.charts import Chart, ChartLine, families_of
+from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import (
     alarms,
     all_remarks,
+    axes,
     bullets,
     document,
+    frame,
     health,
+    large,
     lead,
+    multiples,
     pairs,
     section,
     soft,
     top,
 )
-from vftcli.outputs.page.torque_part import joint_panels
+from vftcli.outputs.page.svg import Box, Scales, Span
 from vftcli.outputs.palette import SPARE
 
 DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
@@ -119,7 +123,7 @@ def velocity_plot(traces: Sequence[Trace], j: int) -> str:
     high = float(np.quantile(sizes, 0.995)) or 1.0
     scales = Scales(Box(height=180), Span(-speed, speed), Span(-high, high))
     dots = "".join(scatter(t, j, scales, colour) for t, colour in coloured(traces))
-    drawn = svg(
+    drawn = frame(
         scales.box, f"Residual over velocity, J{j + 1}", axes(scales, "rad/s", (4, 4)) + dots
     )
     return f"<figure><figcaption>J{j + 1} <span>N·m</span></figcaption>{drawn}</figure>"

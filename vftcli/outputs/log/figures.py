@@ -15,15 +15,16 @@ from vftcli.outputs.figures.lines import NARROW, line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing
 from vftcli.outputs.log.rmse_tables import block, logs_of
 from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
-from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import (
+from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
     legend_name,
     response_charts,
+    spectra_chart,
     torque_chart,
+    tuning_chart,
+    wrench_chart,
 )
-from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.outputs.palette import colours_of_names
 
 if TYPE_CHECKING:
