@@ -23,10 +23,11 @@ import pinocchio as pin
 import polars as pl
 
 from vftcli.doctor import Examiner, examine
-from vftcli.observers import BEST, PAPER, KalmanObserver
+from vftcli.observers import KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import BEST, PAPER
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers import read
 from vftcli.reproduction.timing import (

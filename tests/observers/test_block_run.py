@@ -5,10 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from vftcli.observers.block_run import block_run, look_ahead, runs_in_blocks
 from vftcli.observers.observer import Observer
 from vftcli.observers.paper import KalmanObserver, MomentumObserver
-from vftcli.observers.smoother import KalmanSmoother
+from vftcli.observers.smoother import KalmanSmoother, block_run, look_ahead, runs_in_blocks
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import Clock, clock_of

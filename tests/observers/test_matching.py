@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import PAPER, Setup, build_observers
-from vftcli.observers.matching import match_observers, parse_target
 from vftcli.observers.observer import Observer
+from vftcli.observers.table import PAPER, Setup, build_observers
+from vftcli.observers.tuning import match_observers, parse_target
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 

@@ -107,7 +107,7 @@ def batch(
     from vftcli.batch.run import BatchPlan, run_batch
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.doctor.examination import Examiner
     from vftcli.readers.collection import LogCollection
     from vftcli.readers.library import Library
     from vftcli.signals.errors import LogError, ParameterError

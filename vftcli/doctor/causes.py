@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.stuck import TRAVEL
-from vftcli.doctor.windows import Windows, solve, spread, terms, up_axes, windows_of
+from vftcli.doctor.windows import Case, Windows, size_of, solve, spread, terms, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.drive import effort_name
 from vftcli.robots.friction import steady_torque

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.clock import GAP_STEPS
+from vftcli.doctor.signals import GAP_STEPS
 from vftcli.doctor.stuck import repeated_rows
 from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms

@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
-from vftcli.doctor.windows import Windows, windows_of
+from vftcli.doctor.windows import Case, Windows, size_of, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.doctor.case import Case
 from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.windows import RobustFit, solve
+from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask

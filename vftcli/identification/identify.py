@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from vftcli.identification.friction_method import friction_method
+from vftcli.identification.methods import chosen_method, friction_method, whole_arm
 from vftcli.identification.payload import (
     LoadFit,
     NotSameMotionError,
@@ -31,7 +31,6 @@ from vftcli.identification.result import (
 )
 from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
-from vftcli.identification.whole_arm import chosen_method, whole_arm
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
 from vftcli.signals.errors import IdentificationError, ParameterError

@@ -22,12 +22,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_loop, error_filter
-from vftcli.observers.observer import Complex, Tuning
+from vftcli.observers.observer import BlockObserver, Complex, Observer, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.observers.uneven import gain_sequence, recursion
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
 
@@ -248,3 +249,42 @@ def from_the_end(F: Array, x: Array) -> Array:
     """Run y_t = F_t y_{t+1} + x_t from a log's end; what comes of the samples behind each one."""
     y = recursion(F[:, :, ::-1], x[:, ::-1], np.zeros_like(x[:, 0]))[:, ::-1]
     return np.concatenate([y[:, 1:], np.zeros_like(y[:, :1])], axis=1)
+
+
+#: Samples that the smoother looks ahead at most; one that forgets more slowly has the whole log.
+FARTHEST = 1 << 17
+
+
+def runs_in_blocks(observer: Observer, clock: Clock, joints: int) -> bool:
+    """Whether an observer's estimate of a log can be made block by block."""
+    if not isinstance(observer, KalmanSmoother):
+        return isinstance(observer, BlockObserver)
+    steady = observer.filter.is_steady(clock)
+    return steady and look_ahead(observer, clock.step, joints) <= FARTHEST
+
+
+def block_run(observer: Observer, clock: Clock, joints: int) -> "CausalRun | SteadyRun":
+    """An observer at the beginning of a log of which `runs_in_blocks` holds.
+
+    It takes up block after block, and gives the estimates that are known by then, in order.
+    """
+    if isinstance(observer, KalmanSmoother):
+        return SteadyRun(observer, clock.step, joints)
+    assert isinstance(observer, BlockObserver)
+    return CausalRun(observer)
+
+
+class CausalRun:
+    """An observer that needs nothing of what follows."""
+
+    def __init__(self, observer: BlockObserver) -> None:
+        self._observer, self._state = observer, None
+
+    def take(self, terms: DynamicsTerms) -> Iterator[ExternalTorque]:
+        """The estimate of the block."""
+        estimate, self._state = self._observer.run(terms, self._state)
+        yield estimate
+
+    def end(self) -> Iterator[ExternalTorque]:
+        """Nothing is left."""
+        return iter(())

@@ -22,10 +22,8 @@ from vftcli.refinement.model_error import (
     usual_friction,
     without_waits,
 )
-from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
-from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import Guarded, faded, guarded
+from vftcli.refinement.normal_equations import Rows, slow_loads
+from vftcli.refinement.robust_fit import Guarded, WholeLogFit, faded, fit_robustly, guarded
 from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal

@@ -15,8 +15,8 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.selection import facts
-from vftcli.observers import PAPER
 from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.table import PAPER
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.torque_part import torque_chart
 from vftcli.outputs.page.wrench_part import wrench_chart

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.observers import BEST, PAPER, KalmanObserver
+from vftcli.observers import KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import BEST, PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms

@@ -8,7 +8,7 @@ from typing import Any
 import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.observers import OBSERVERS
+from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.grid import Column, Grid, GridCell, html, signed, significant
 from vftcli.outputs.log.rmse_tables import (
     blocks,
