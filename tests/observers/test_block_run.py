@@ -8,9 +8,9 @@ import pytest
 from vftcli.observers.observer import Observer
 from vftcli.observers.paper import KalmanObserver, MomentumObserver
 from vftcli.observers.smoother import KalmanSmoother, block_run, look_ahead, runs_in_blocks
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import Clock, clock_of
+from vftcli.signals.terms import DynamicsTerms
 
 SMOOTHER = KalmanSmoother(filter=KalmanObserver(discretisation="zoh"))
 

@@ -43,8 +43,7 @@ RATIO = 0.05
 def drive_constants(recording: Recording) -> Array:
     """The controller's own torque per current, target_torque over target_current. (n,) [N·m/A]
 
-    The controller adds friction to its current while it moves, so only resting samples count; NaN
-    where they carry too little current, or where the log lacks either.
+    Of resting samples, as friction is fed forward in motion; NaN where they carry too little.
     """
     current, torque = recording.target_current, recording.target_torque
     constants = np.full(recording.joints, np.nan)

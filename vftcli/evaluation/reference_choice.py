@@ -56,7 +56,11 @@ class ShownContact(NamedTuple):
 
 
 def touches(run: Run) -> tuple[ShownContact, ...]:
-    """The contacts that a log shows, in the order of time; what it does not show may still be."""
+    """The contacts that a log shows, in the order of time; what it does not show may still be.
+
+    The torque that the model leaves open is low-passed and compared with its own quiet level:
+    friction that is missed spreads over a log, a contact sticks out.
+    """
     recording, robot = run.recording, run.robot
     # Motor friction that nobody models hides contact and looks like one.
     unknown = robot.torque_source == "current" and not robot.friction
@@ -82,8 +86,7 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
 def touched_remarks(run: Run) -> tuple[Remark, ...]:
     """A warning where a log that is to be free shows contact, with the longest span without.
 
-    What the model leaves open may be friction as well: who says that nobody touched the arm is
-    believed, and reads what speaks against it.
+    It may be friction as well: who says that nobody touched the arm is believed.
     """
     found = touches(run)
     if not found:
@@ -149,8 +152,7 @@ class ReferenceChoice:
 def zero_reference(log: Run) -> ReferenceLoad:
     """No contact at all: the reference of a free motion.
 
-    How free it was cannot be known from the log alone, so neither can its error; where the log
-    shows contact a warning says so.
+    Its error is not known; where the log shows contact a warning says so.
     """
     recording = log.recording
     return ReferenceLoad(

@@ -118,8 +118,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
     """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]
 
-    It counts as determined too where it is `REFUTED` standard deviations from the profile's: then
-    that one is wrong, and the fitted one, zero at least, is nearer to the truth.
+    It counts as determined too where it is `REFUTED` standard deviations from the profile's.
     """
     if refuted := abs(value - before) >= REFUTED * sd:
         value = max(value, 0.0)
@@ -340,8 +339,8 @@ def with_vector(
 def chosen_method(data: Training) -> MethodResult:
     """Result of "friction", or of "base" where the profile's links are not the arm's.
 
-    The links are identified too where they leave `OTHER_LINKS` times what free ones leave, the logs
-    tell them, and nothing suggests a load or another arm.
+    The links are freed where they leave `OTHER_LINKS` times what free ones leave, the logs tell
+    them, and nothing suggests a load.
     """
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)

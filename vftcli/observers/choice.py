@@ -26,11 +26,11 @@ from vftcli.observers.table import (
     sections,
 )
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.terms import DynamicsTerms
 
 if TYPE_CHECKING:
     from vftcli.observers.tuning import Goal

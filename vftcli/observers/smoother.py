@@ -21,16 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_loop, error_filter
+from vftcli.observers.kalman_model import Covariance, Gains, closed_loop, error_filter
 from vftcli.observers.observer import BlockObserver, Complex, Observer, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.observers.uneven import gain_sequence, recursion
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.terms import DynamicsTerms
 
 #: Share of the smoother's settled information that may be missing where it counts as settled.
 SETTLED = 1e-16
@@ -151,7 +151,12 @@ class SteadyRun:
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
         correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
         tau -= correction[::-1][: len(t)]
-        deviation, sd = steady_deviation(gains, model, self._S, known), empty_series(*tau.shape)
+        # √P₂₂ from the log's last sample backwards, until it has settled.
+        step = information_step(gains, model.a12, model.a22)
+        missing = missing_information(step, information_gain(model.a12, self._S), known)
+        information = (missing[0] - missing).transpose(1, 0, 2)
+        deviation = np.sqrt(smoothed_variance(gains.posterior, information))
+        sd = empty_series(*tau.shape)
         sd[:] = deviation[-1]
         near = deviation[known - len(t) : known]
         sd[len(t) - len(near) :] = near[::-1]
@@ -172,13 +177,6 @@ def look_ahead(smoother: KalmanSmoother, step: float, joints: int) -> float:
     F = np.moveaxis(closed_loop(gains, model.a12, model.a22), -1, 0)
     pole = float(np.max(np.abs(np.linalg.eigvals(F))))
     return float(np.ceil(np.log(SETTLED) / np.log(pole))) if pole < 1.0 else np.inf
-
-
-def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
-    """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
-    step = information_step(gains, model.a12, model.a22)
-    missing = missing_information(step, information_gain(model.a12, S), samples)
-    return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
 
 
 def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) -> Array:

@@ -20,7 +20,7 @@ from vftcli.observers.auto_tuning import (
 from vftcli.observers.observer import Complex, Observer
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.observers.spectra import Spectra
-from vftcli.observers.table import Gains, Setup
+from vftcli.observers.table import Setup
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
@@ -73,9 +73,8 @@ def match_observers(
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
     """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
 
-    A first-order observer has one gain to move. A Kalman filter keeps R and Q_p and moves Q_τ,
-    which sets its natural frequency. Delay is that behind a slow ramp, 1/K or L₁/L₂ − Ts/2;
-    bandwidth is where the exact response to a sinusoid has fallen to 1/√2 of that to a constant.
+    A Kalman filter keeps R and Q_p and moves Q_τ. Delay is that behind a slow ramp, 1/K or L₁/L₂ −
+    Ts/2; bandwidth is where the exact response has fallen to 1/√2 of that to a constant.
     """
     if setup.as_printed:
         raise ParameterError(
@@ -240,11 +239,6 @@ def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
         "kfo-rts": kalman_smoother,
     }
     return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
-
-
-def gains_of(spectra: Spectra) -> Gains:
-    """The gains with the smallest expected error, as a gains file holds them."""
-    return {line.section: dict(line.gains) for line in tune_all(spectra, Goal("rmse"))}
 
 
 def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tuple[Remark, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
-from vftcli.observers.tuning import gains_of
+from vftcli.observers.tuning import Goal, tune_all
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad, free_load, without_load
@@ -79,9 +79,8 @@ class Baseline:
     def tunable(self) -> Spectra | None:
         """The spectra where gains may be taken from them, else None.
 
-        Not from a free part that only the fit calls so and that carries a load: on a UR10e with an
-        untold 2.8 kg they ran to the slowest there is on two joints, 2.3 N·m rms where the gains of
-        the robot file leave 1.7.
+        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran to the
+        slowest.
         """
         return None if self.by_fit and self.load is not None else self.spectra
 
@@ -89,8 +88,7 @@ class Baseline:
     def correction_sd(self) -> Array | None:
         """Standard deviation of the model's error as the correction has it. (T, n) [N·m]
 
-        On joints left alone too: what could not be predicted there is not known either. None
-        without a correction.
+        On joints left alone too; None without a correction.
         """
         return None if self.correction is None else self.correction.sd
 
@@ -166,7 +164,10 @@ class Baselines:
     def spectra(self, *, gains: bool) -> LogSpectra:
         """What the observers that are built for the log are tuned to."""
         plain = self.plain.tunable
-        called_for = gains_of(plain) if gains and plain is not None else None
+        called_for = None
+        if gains and plain is not None:
+            least = tune_all(plain, Goal("rmse"))
+            called_for = {line.section: dict(line.gains) for line in least}
         return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
 
 
