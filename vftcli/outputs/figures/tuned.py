@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from vftcli.observers.spectra import Spectra
+from vftcli.observers.tuning import Tuned, tuning_curves
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.log.figures import spectra_drawing, tuning_drawing
-from vftcli.refinement.tuning import Tuned, tuning_curves
 from vftcli.robots.writing import lines_of
 
 TUNED_FIGURES = ("spectra", "tuning")  #: Their names.
