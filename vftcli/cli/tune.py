@@ -54,10 +54,10 @@ def tune_gains(
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.figures.tuned import write_tuned
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
+    from vftcli.outputs.log.figures import write_tuned
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.readers.library import Library
