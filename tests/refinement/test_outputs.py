@@ -13,9 +13,8 @@ from vftcli.outputs.log.estimates import estimates_table
 from vftcli.outputs.log.rerun_recording import plot_groups
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.page.charts import observer_lines
-from vftcli.outputs.page.page import render
-from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import torque_chart
+from vftcli.outputs.page.log_charts import spectra_chart, torque_chart, tuning_chart
+from vftcli.outputs.page.pages import render
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 

@@ -17,7 +17,7 @@ from vftcli.batch.rows import SCHEMA
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
-from vftcli.outputs.page.batch_page import batch_lines, render_batch
+from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.readers.collection import LogEntry
 from vftcli.readers.library import absolute, labelled
 

@@ -32,7 +32,7 @@ from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import html, json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.page import shell
-from vftcli.outputs.page.charts import DASHES, Chart, ChartLine, large, multiples
+from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
 from vftcli.outputs.palette import SPARE
 from vftcli.outputs.quantity import counted
 from vftcli.outputs.seals import SEAL
@@ -203,7 +203,9 @@ def render_admittance(
         "<h2>Force and motion over time</h2>",
         *(
             # The deviation is open at once.
-            shell.section(c.title, multiples(c) + large(c), name=c.key, opened=c.key == "x")
+            shell.section(
+                c.title, shell.multiples(c) + shell.large(c), name=c.key, opened=c.key == "x"
+            )
             for c in drawn
         ),
         shell.soft(

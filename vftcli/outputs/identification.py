@@ -26,9 +26,9 @@ from vftcli.outputs.log.run_record import (
     seal,
     versions,
 )
-from vftcli.outputs.page import figures, shell
-from vftcli.outputs.page.charts import Chart, ChartLine, families_of, large, multiples
-from vftcli.outputs.page.torque_part import joint_panels
+from vftcli.outputs.page import shell, svg
+from vftcli.outputs.page.charts import Chart, ChartLine, families_of
+from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.palette import SPARE
 from vftcli.outputs.quantity import DASH, counted, signed
 from vftcli.outputs.seals import SEAL
@@ -124,7 +124,9 @@ def render_identification(
         grids[f"Base parameters ({len(found.base)})"] = base_grid(found.base)
     tables = {name: html(grid) for name, grid in grids.items() if grid.rows}
     residuals = tables.pop("residuals", "")
-    over_time = "".join(f"<h3>{escape(c.title)}</h3>{multiples(c)}{large(c)}" for c in charts)
+    over_time = "".join(
+        f"<h3>{escape(c.title)}</h3>{shell.multiples(c)}{shell.large(c)}" for c in charts
+    )
     inputs = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
     made = f"<pre>{escape(str(record.get('command', '')))}</pre>{shell.bullets(inputs)}"
     shown = shown_trace(found) if charts else None
@@ -173,9 +175,9 @@ def velocity_plot(coloured: Sequence[tuple[Trace, str]], j: int) -> str:
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
-    across, up = figures.Span(-speed, speed), figures.Span(-high, high)
-    scales = figures.Scales(figures.Box(height=180), across, up)
-    drawn = [figures.axes(scales, "rad/s", (4, 4))]
+    across, up = svg.Span(-speed, speed), svg.Span(-high, high)
+    scales = svg.Scales(svg.Box(height=180), across, up)
+    drawn = [shell.axes(scales, "rad/s", (4, 4))]
     for trace, colour in coloured:
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
         x = scales.across(trace.motion.dq[pick, j])
@@ -186,7 +188,7 @@ def velocity_plot(coloured: Sequence[tuple[Trace, str]], j: int) -> str:
             f'<path d="{path}" stroke="{colour}" stroke-width="2.4" stroke-linecap="round" '
             'stroke-opacity=".55" fill="none"/>'
         )
-    picture = figures.svg(scales.box, f"Residual over velocity, J{j + 1}", "".join(drawn))
+    picture = shell.frame(scales.box, f"Residual over velocity, J{j + 1}", "".join(drawn))
     return f"<figure><figcaption>J{j + 1} <span>N·m</span></figcaption>{picture}</figure>"
 
 

@@ -18,8 +18,8 @@ import rerun.blueprint as rrb
 
 from vftcli.outputs.decimation import level_rows
 from vftcli.outputs.files import unwritable
-from vftcli.outputs.page.charts import INK, REFERENCE, Chart, ChartLine, ends_of_family
-from vftcli.outputs.page.figures import Span
+from vftcli.outputs.page.charts import INK, REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.svg import Span, ends_of_family
 from vftcli.outputs.palette import REFERENCE as GREY
 from vftcli.outputs.palette import rgb
 from vftcli.outputs.rerun_arm import ROBOT, ArmPoses, Stream

@@ -12,8 +12,16 @@ from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, html, markdown
 from vftcli.outputs.log.run_record import seal, versions
-from vftcli.outputs.page.charts import large, multiples
-from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
+from vftcli.outputs.page.shell import (
+    bullets,
+    document,
+    large,
+    lead,
+    multiples,
+    section,
+    soft,
+    top,
+)
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job

@@ -11,8 +11,8 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground
 from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.page.page import believability_section, eyebrow, render
-from vftcli.outputs.page.sections import joint_values
+from vftcli.outputs.page import pages
+from vftcli.outputs.page.pages import eyebrow, render
 from vftcli.outputs.page.shell import asset, script_json
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution, explanation
@@ -214,17 +214,14 @@ def test_the_eyebrow_says_what_measured_the_force(
     assert words in measured
 
 
-def test_joints_that_agree_share_a_line() -> None:
-    assert joint_values(np.array([10.0, 10.0])) == "10.0"
-    text = joint_values(np.array([5.0, 10.0, 10.0, 7.0]))
-    assert re.sub(r"<[^>]*>", " ", text).split() == ["J1", "5.00", "J2–J3", "10.0", "J4", "7.00"]
-
-
-def test_a_ground_is_shown_with_its_sign_and_its_remedy() -> None:
+def test_a_ground_is_shown_with_its_sign_and_its_remedy(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
     good = Ground(standing="good", subject="clock of the UR", sentence="no gap <b>")
     bad = Ground(standing="bad", subject="load", sentence="heavy", remedy="vftcli x '<i>'")
-    html = believability_section([bad, good])
-    assert html.index("Load") < html.index("Clock of the UR")
+    monkeypatch.setattr(pages, "grounds", lambda _: (bad, good))
+    html = render(analysis)
+    assert html.index("Load<small>") < html.index("Clock of the UR")
     assert '<b class="sign bad">✗</b>' in html
     assert '<code class="remedy">vftcli x &#x27;&lt;i&gt;&#x27;</code>' in html
     assert "no gap &lt;b&gt;" in html

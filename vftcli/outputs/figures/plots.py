@@ -7,8 +7,8 @@ import numpy as np
 
 from vftcli.outputs.figures.paper import sheet, shortened
 from vftcli.outputs.log.rmse_tables import DAGGER
-from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine, ends_of_family
-from vftcli.outputs.page.figures import thinned, thinned_log
+from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.svg import ends_of_family, thinned, thinned_log
 from vftcli.signals.arrays import Array
 
 if TYPE_CHECKING:

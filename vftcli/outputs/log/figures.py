@@ -11,6 +11,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
+from vftcli.observers.tuning import Tuned, tuning_curves
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import (
     NARROW,
@@ -23,17 +24,17 @@ from vftcli.outputs.figures.plots import (
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.log.rmse_tables import block, logs_of
 from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
-from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import (
+from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
     legend_name,
     response_charts,
+    spectra_chart,
     torque_chart,
+    tuning_chart,
+    wrench_chart,
 )
-from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.outputs.palette import colours_of_names
-from vftcli.refinement.tuning import Tuned, tuning_curves
 from vftcli.robots.writing import lines_of
 
 if TYPE_CHECKING:

@@ -28,8 +28,13 @@ from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.torque_part import estimate_lines, legend_name, torque_chart
-from vftcli.outputs.page.wrench_part import condition_charts, wrench_chart
+from vftcli.outputs.page.log_charts import (
+    condition_charts,
+    estimate_lines,
+    legend_name,
+    torque_chart,
+    wrench_chart,
+)
 from vftcli.outputs.palette import SPARE
 from vftcli.outputs.rerun_arm import (
     NEWTON_PER_METRE,

@@ -1,15 +1,15 @@
-"""Charts that stand still: SVG that prints and needs no script, its ticks and its lines."""
+"""Charts that stand still as SVG: where values lie, ticks, the lines, and the arm at a contact."""
 
-from collections.abc import Iterable, Sequence
-from html import escape
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.outputs.decimation import decimated
+from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.quantity import minus
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.intervals import runs_of
 
 STEPS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
@@ -45,12 +45,9 @@ class Scales(NamedTuple):
 
     def across(self, x: Array | float) -> Array:
         """Horizontal places."""
-        if self.log:
-            x, low, high = np.log(x), np.log(self.x.low), np.log(self.x.high)
-        else:
-            low, high = self.x
-        share = (np.asarray(x) - low) / ((high - low) or 1.0)
-        places: Array = self.box.left + share * (self.box.width - self.box.left - self.box.right)
+        low, high = np.log(self.x) if self.log else self.x
+        share = ((np.log(x) if self.log else np.asarray(x)) - low) / ((high - low) or 1.0)
+        places: Array = self.box.left + share * (self.side - self.box.left)
         return places
 
     def up(self, y: Array | float) -> Array:
@@ -58,6 +55,10 @@ class Scales(NamedTuple):
         share = (np.asarray(y) - self.y.low) / ((self.y.high - self.y.low) or 1.0)
         places: Array = self.floor - share * (self.floor - self.box.top)
         return places
+
+    def inside(self, span: Sequence[float]) -> Array:
+        """Horizontal places of times, those outside of the chart at its edge."""
+        return self.across(np.clip(span, *self.x))
 
     @property
     def floor(self) -> float:
@@ -95,7 +96,7 @@ def label(value: float) -> str:
     return minus(f"{value + 0.0:.6g}")
 
 
-def ends_of(values: Iterable[Array], *, zero: bool = False) -> Span:
+def ends_of(values: Iterable[Array]) -> Span:
     """Ends of an axis that shows all values, with some room; about ±1 where none is known."""
     low, high = np.inf, -np.inf
     for x in values:
@@ -104,24 +105,59 @@ def ends_of(values: Iterable[Array], *, zero: bool = False) -> Span:
         high = max(high, float(np.max(x, where=known, initial=-np.inf)))
     if low > high:
         return Span(-1.0, 1.0)
-    if zero:
-        low, high = min(low, 0.0), max(high, 0.0)
     # A line that does not change has no scale of its own.
     room = 0.05 * (high - low) if high > low else abs(high) or 1.0
     return Span(low - room, high + room)
 
 
+def ends_of_family(chart: Chart, panel: int) -> Span:
+    """Ends of a panel's vertical axis: those of all panels of its family."""
+    families = chart.families or (0,) * len(chart.panels)
+    members = [j for j, family in enumerate(families) if family == families[panel]]
+    span = ends_of(values for j in members for values in drawn_values(chart, j))
+    return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
+
+
+def drawn_values(chart: Chart, panel: int) -> Iterator[Array]:
+    """What is drawn at once in a panel, line by line: of a long log all have no room at once."""
+    for series in chart.series:
+        if series.shown:
+            half = 0.0 if series.half is None else np.nan_to_num(series.half[:, panel])
+            yield series.values[:, panel] - half
+            yield series.values[:, panel] + half
+    if chart.band is not None:
+        yield np.array([chart.band[panel], -chart.band[panel]])
+
+
+def scales_of(chart: Chart) -> Iterator[Scales]:
+    """The scales of every panel's small picture."""
+    families = chart.families or (0,) * len(chart.panels)
+    ends = {family: ends_of_family(chart, families.index(family)) for family in set(families)}
+    x = Span(float(chart.x[0]), float(chart.x[-1]))
+    return (Scales(Box(), x, ends[family], chart.log) for family in families)
+
+
+def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
+    """A line's paths in a panel: its ribbon, the ribbon's grey part, and itself; "" for none."""
+    x = chart.x if line.x is None else line.x
+    thin = thinned_log if chart.log else thinned
+    t, y = thin(x, line.values[:, panel])
+    halves = [np.interp(t, x, half) for half in line.ribbons(panel) or ()]
+    own, quiet = (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
+    return own, quiet, path_of(scales, t, y)
+
+
 def path_of(scales: Scales, t: Array, y: Array) -> str:
     """A line as the text of an SVG path, broken where a value is not known."""
     x, z = scales.across(t), scales.up(np.clip(y, *outside(scales)))
-    parts = []
-    for start, stop in runs_of(np.isfinite(z) & np.isfinite(x)):
-        points = " ".join(
-            f"{a:.1f} {b:.1f}" for a, b in zip(x[start:stop], z[start:stop], strict=True)
-        )
-        # A single point is a dot.
-        parts.append(f"M{points}" + ("h.01" if stop - start == 1 else ""))
-    return "".join(parts)
+    runs = runs_of(np.isfinite(z) & np.isfinite(x))
+    return "".join(polyline(np.column_stack([x, z])[start:stop]) for start, stop in runs)
+
+
+def polyline(points: Array) -> str:
+    """Points as the text of an SVG path; a single one is a dot. (K, 2)"""
+    text = "M" + " ".join(f"{x:.1f} {y:.1f}" for x, y in points)
+    return text + ("h.01" if len(points) == 1 else "")
 
 
 def outside(scales: Scales) -> tuple[float, float]:
@@ -130,86 +166,25 @@ def outside(scales: Scales) -> tuple[float, float]:
     return scales.y.low - height, scales.y.high + height
 
 
-def line(scales: Scales, t: Array, y: Array, look: str) -> str:
-    """A line; `look` is its attributes."""
-    path = path_of(scales, t, y)
-    return f'<path d="{path}" fill="none" {look}/>' if path else ""
-
-
-def ribbon(scales: Scales, t: Array, low: Array, high: Array, look: str) -> str:
-    """What lies between two lines, broken where either is not known."""
-    known: Mask = np.isfinite(low) & np.isfinite(high)
-    parts = []
-    for start, stop in runs_of(known):
-        x = scales.across(t[start:stop])
-        ends = outside(scales)
-        above = scales.up(np.clip(high[start:stop], *ends))
-        below = scales.up(np.clip(low[start:stop], *ends))
-        there = " ".join(f"{a:.1f} {b:.1f}" for a, b in zip(x, above, strict=True))
-        back = " ".join(f"{a:.1f} {b:.1f}" for a, b in zip(x[::-1], below[::-1], strict=True))
-        parts.append(f"M{there} {back}Z")
-    return f'<path d="{"".join(parts)}" {look}/>' if parts else ""
-
-
-def rectangle(x: float, y: float, width: float, height: float, look: str) -> str:
-    """A filled rectangle; `look` is its attributes."""
-    return (
-        f'<rect x="{x:.1f}" y="{y:.1f}" width="{max(width, 0.5):.1f}" '
-        f'height="{max(height, 0.0):.1f}" {look}/>'
-    )
-
-
-def stripe(scales: Scales, start: float, stop: float, look: str) -> str:
-    """A stretch of time from top to floor."""
-    left, right = (
-        float(scales.across(max(min(v, scales.x.high), scales.x.low))) for v in (start, stop)
-    )
-    return rectangle(left, scales.box.top, right - left, scales.floor - scales.box.top, look)
-
-
-def stripes(scales: Scales, spans: Sequence[tuple[float, float]], look: str) -> str:
-    """Many stretches of time as one path."""
-    height = scales.floor - scales.box.top
-    places = [(float(scales.across(a)), float(scales.across(b))) for a, b in spans]
-    path = "".join(
-        f"M{left:.1f} {scales.box.top:g}h{max(right - left, 0.5):.1f}v{height:g}"
-        f"h{-max(right - left, 0.5):.1f}z"
-        for left, right in places
-    )
-    return f'<path d="{path}" {look}/>' if path else ""
-
-
-def axes(scales: Scales, unit: str, count: tuple[int, int] = (6, 3)) -> str:
-    """Grid lines and numbers of both axes; the last number below bears the unit."""
-    parts = []
-    for value in ticks(scales.y, count[1]):
-        y = float(scales.up(value))
-        strong = ' class="zero"' if value == 0.0 else ' class="grid"'
-        parts.append(f'<path d="M{scales.box.left:.1f} {y:.1f}H{scales.side:.1f}"{strong}/>')
+def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
+    """What lies between two lines as a path, broken where either is not known."""
+    x, ends, parts = scales.across(t), outside(scales), []
+    edges = [np.column_stack([x, scales.up(np.clip(edge, *ends))]) for edge in (high, low)]
+    for start, stop in runs_of(np.isfinite(low) & np.isfinite(high)):
+        above, below = (edge[start:stop] for edge in edges)
         parts.append(
-            f'<text x="{scales.box.left - 5:.1f}" y="{y + 3.5:.1f}" text-anchor="end">'
-            f"{label(value)}</text>"
-        )
-    below = decades(scales.x) if scales.log else ticks(scales.x, count[0])
-    for k, value in enumerate(below):
-        x = float(scales.across(value))
-        last = k == len(below) - 1
-        text = f"{label(value)} {unit}" if last else label(value)
-        anchor = "end" if last and scales.side - x < 14 else "middle"
-        parts.append(
-            f'<text x="{x:.1f}" y="{scales.box.height - 3:.1f}" text-anchor="{anchor}">'
-            f"{escape(text)}</text>"
+            f"M{' '.join(f'{a:.1f} {b:.1f}' for a, b in np.vstack([above, below[::-1]]))}Z"
         )
     return "".join(parts)
 
 
-def svg(box: Box, title: str, content: str, *, kind: str = "") -> str:
-    """The drawing; `title` is read to those who cannot see it."""
-    words = f' class="{kind}"' if kind else ""
-    return (
-        f'<svg{words} viewBox="0 0 {box.width:g} {box.height:g}" role="img">'
-        f"<title>{escape(title)}</title>{content}</svg>"
-    )
+def stripes(scales: Scales, spans: Sequence[tuple[float, float]]) -> str:
+    """Many stretches of time from top to floor as one path."""
+    height, path = scales.floor - scales.box.top, ""
+    for left, right in (scales.across(np.asarray(span)) for span in spans):
+        width = max(right - left, 0.5)
+        path += f"M{left:.1f} {scales.box.top:g}h{width:.1f}v{height:g}h{-width:.1f}z"
+    return path
 
 
 def thinned(t: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
@@ -225,9 +200,7 @@ def thinned_log(x: Array, values: Array, stretches: int = STRETCHES) -> tuple[Ar
     starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))
     index = [0, len(x) - 1]
     for start, stop in pairwise(starts):
-        index += [
-            start + int(np.argmin(values[start:stop])),
-            start + int(np.argmax(values[start:stop])),
-        ]
+        part = values[start:stop]
+        index += [start + int(np.argmin(part)), start + int(np.argmax(part))]
     chosen = np.unique(index)
     return x[chosen], values[chosen]
