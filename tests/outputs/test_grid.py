@@ -14,12 +14,12 @@ from vftcli.outputs.grid import (
     Grid,
     GridCell,
     escape_latex,
-    html,
     joint_columns,
     latex,
     markdown,
     terminal,
 )
+from vftcli.outputs.page.shell import table
 from vftcli.outputs.plain_rows import csv_rows, json_rows
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
@@ -180,7 +180,7 @@ class Cells(HTMLParser):
 
 
 def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) -> None:
-    found = Cells(html(grid))
+    found = Cells(table(grid))
     assert "b" not in [tag for tag, _ in found.elements]
     assert HOSTILE in found.words
     assert ("td", {"class": "best"}) in found.elements

@@ -18,7 +18,6 @@ from vftcli.outputs.admittance.tables import (
     parameter_grid,
     stability_grid,
 )
-from vftcli.outputs.grid import html
 from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
 from vftcli.outputs.page.shell import (
     alarms,
@@ -32,6 +31,7 @@ from vftcli.outputs.page.shell import (
     provenance,
     section,
     soft,
+    table,
     top,
 )
 from vftcli.outputs.palette import SPARE
@@ -71,10 +71,10 @@ def render_admittance(
             "beside the printed V, which rises."
         ),
         "<h2>Details</h2>",
-        section("Parameters", html(parameter_grid(replay))),
+        section("Parameters", table(parameter_grid(replay))),
         section(
             "Stability before motion",
-            html(stability_grid(replay))
+            table(stability_grid(replay))
             + soft(
                 "The escape bound is the largest deviation from which a release at rest would not "
                 "run away if there were no speed limit."
@@ -131,7 +131,7 @@ def closed_loop_section(run: ClosedLoop | None) -> str:
         "The paper measured 0.24 and 0.28 s from detection to motion, 0.26 and 0.12 s from "
         "withdrawal to the turn on its UR5 (docs/admittance.md)."
     )
-    return f"<h2>Closed loop in simulation</h2>{state}{html(latency_grid(run))}{words}"
+    return f"<h2>Closed loop in simulation</h2>{state}{table(latency_grid(run))}{words}"
 
 
 def comparison_section(replay: Replay) -> str:
@@ -156,7 +156,7 @@ def comparison_section(replay: Replay) -> str:
         "as a share of the deviation at the release. Work: what the hand does on the arm while it "
         "drags."
     )
-    return f"<h2>Comparison</h2>{html(grid)}{words}"
+    return f"<h2>Comparison</h2>{table(grid)}{words}"
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:

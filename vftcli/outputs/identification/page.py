@@ -8,7 +8,6 @@ import numpy as np
 
 from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification, Trace
-from vftcli.outputs.grid import html
 from vftcli.outputs.identification.tables import (
     base_grid,
     parameter_grid,
@@ -31,6 +30,7 @@ from vftcli.outputs.page.shell import (
     pairs,
     section,
     soft,
+    table,
     top,
 )
 from vftcli.outputs.page.svg import Box, Scales, Span
@@ -76,20 +76,20 @@ def residual_section(found: Identification) -> str:
     """The table of residuals, "" where no log was used."""
     if found.residuals.is_empty():
         return ""
-    return f"<h2>How much torque is left unexplained</h2>{html(residual_grid(found))}"
+    return f"<h2>How much torque is left unexplained</h2>{table(residual_grid(found))}"
 
 
 def parameter_section(found: Identification) -> str:
     """The identified numbers, how friction models competed, and base parameters."""
     parts = []
     if not found.parameters.is_empty():
-        parts.append(section("Identified numbers", html(parameter_grid(found)), opened=True))
+        parts.append(section("Identified numbers", table(parameter_grid(found)), opened=True))
     if not found.shape_choices.is_empty():
         parts.append(
-            section("Friction models compared", html(shape_choice_grid(found.shape_choices)))
+            section("Friction models compared", table(shape_choice_grid(found.shape_choices)))
         )
     if found.base is not None:
-        parts.append(section(f"Base parameters ({len(found.base)})", html(base_grid(found.base))))
+        parts.append(section(f"Base parameters ({len(found.base)})", table(base_grid(found.base))))
     return "".join(parts)
 
 
