@@ -155,7 +155,7 @@ def test_a_bound_is_never_reached_in_silence() -> None:
     ]
     assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
     assert (slow.values["rate_rad_s"], fast.values["rate_rad_s"]) == (1.0, 250.0)
-    assert str(fast).startswith("kfo-auto: tuning ran to the fastest it tries, 250 rad/s, on J3")
+    assert str(fast).startswith("kfo-auto: J3: noise missing from the free part")
 
 
 def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:

@@ -13,14 +13,15 @@ from vftcli.outputs.grid import (
     Column,
     Grid,
     GridCell,
+    csv_rows,
     escape_latex,
     joint_columns,
+    json_rows,
     latex,
     markdown,
     terminal,
 )
 from vftcli.outputs.page.shell import table
-from vftcli.outputs.plain_rows import csv_rows, json_rows
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 

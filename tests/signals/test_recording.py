@@ -19,7 +19,7 @@ def test_the_only_effort_is_taken_for_what_is_said() -> None:
     (remark,) = log.source.remarks
     assert (remark.code, remark.level) == ("effort-taken", "fact")
     assert str(remark) == (
-        "the motor currents of the log are taken for joint torques without gravity's, times -1"
+        "the motor currents of the log are read as joint torques without gravity's, times -1"
     )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vftcli.analysis import Analysis
-from vftcli.batch.engine import begin
+from vftcli.batch.outcome import begin
 from vftcli.doctor.examiner import Examiner
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.log.choice import PLAIN, OutputChoice

@@ -1,7 +1,7 @@
 """A batch: every log of a collection done once, on an engine, and gathered in one table."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.engine import Effort, Failure, Outcome, run_tasks
+from vftcli.batch.cluster import run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import LogJob, LogTask, work_on_log
+from vftcli.batch.outcome import Effort, Failure, Outcome
 from vftcli.batch.rows import SCHEMA
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
@@ -30,21 +31,6 @@ SHARES = 8  #: A worker gets at least so many groups, so that all end at about t
 Tell = Callable[[str], None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class BatchPlan:
-    """What a batch is to do."""
-
-    logs: Sequence[LogEntry]  #: The logs.
-    job: LogJob  #: What is done with each.
-    folder: Path  #: Where it is written.
-    workers: WorkersChoice  #: Where it is done.
-    command: str  #: The command line, for the records.
-    force: bool = False  #: Whether a batch with other options may be gone on with.
-    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
-    #: Who is told after each log how many are done.
-    progress: "Callable[[BatchCount], None]" = field(repr=False)
-
-
 class BatchCount(NamedTuple):
     """How far a batch is."""
 
@@ -60,19 +46,27 @@ class BatchCount(NamedTuple):
         return self.logs - self.before - self.done - self.failed
 
 
-class _Run:
-    """One run of a plan: which logs are done, which failed, what each took."""
+@dataclass(kw_only=True)
+class Batch:
+    """A batch and one run of it: which logs are done, which failed, what each took."""
 
-    def __init__(self, plan: BatchPlan) -> None:
-        self.plan = plan
-        self.folder = BatchFolder(absolute(plan.folder))
-        choice = with_files(plan.job.choice, absolute)
-        self.job = replace(plan.job, choice=choice)
+    logs: Sequence[LogEntry]  #: The logs.
+    job: LogJob  #: What is done with each.
+    folder: BatchFolder  #: Where it is written.
+    workers: WorkersChoice  #: Where it is done.
+    command: str  #: The command line, for the records.
+    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
+    #: Who is told after each log how many are done.
+    progress: Callable[[BatchCount], None] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        # A worker of a cluster may stand in another folder.
+        self.job = replace(self.job, choice=with_files(self.job.choice, absolute))
         self.options = options_digest(self.job)
-        names = labelled(entry.path for entry in plan.logs)
+        names = labelled(entry.path for entry in self.logs)
         self.labels = [
             names[e.path] if e.episode is None else f"{names[e.path]} episode {e.episode}"
-            for e in plan.logs
+            for e in self.logs
         ]
         self.keys: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
@@ -80,10 +74,14 @@ class _Run:
         self.before, self.began = 0, time.monotonic()
         self.done: set[str] = set()
 
-    def waiting(self) -> Iterator[tuple[int, LogTask]]:
-        """The logs that are to be done, with their numbers; those of equal bytes once."""
+    def groups(self) -> Iterator[list[LogTask]]:
+        """The logs that are to be done, those of equal bytes once; small ones go together."""
         there, begun = self.folder.keys(), set[str]()
-        for number, entry in enumerate(self.plan.logs):
+        workers = max(1, self.workers.workers or 4)
+        most = max(1, min(TOGETHER, len(self.logs) // (SHARES * workers)))
+        group: list[LogTask] = []
+        room = float(most)
+        for number, entry in enumerate(self.logs):
             try:
                 content = content_digest(entry.files)
             except OSError as error:
@@ -91,49 +89,49 @@ class _Run:
                 self.failures[number] = Failure("finding", type(error).__name__, line)
                 continue
             key = self.keys[number] = key_of(content, self.options, entry.episode)
-            if key in there:
-                self.before += 1
-                continue
-            if key in begun:
+            self.before += key in there
+            if key in there or key in begun:
                 continue
             begun.add(key)
-            yield (
-                number,
+            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
+            if group and share > room:
+                yield group
+                group, room = [], float(most)
+            room -= share
+            group.append(
                 LogTask(
                     job=self.job,
                     folder=self.folder.path,
-                    command=self.plan.command,
+                    command=self.command,
                     path=entry.path,
                     episode=entry.episode,
                     label=self.labels[number],
                     key=key,
                     sha256=content if entry.files == (entry.path,) else "",
-                ),
+                )
             )
-
-    def grouped(self, waiting: Iterable[tuple[int, LogTask]]) -> Iterator[list[LogTask]]:
-        """The same in groups: small logs go together."""
-        workers = max(1, self.plan.workers.workers or 4)
-        most = max(1, min(TOGETHER, len(self.plan.logs) // (SHARES * workers)))
-        group: list[LogTask] = []
-        room = float(most)
-        for number, task in waiting:
-            entry = self.plan.logs[number]
-            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
-            if group and share > room:
-                yield group
-                group, room = [], float(most)
-            group.append(task)
-            room -= share
         if group:
             yield group
 
+    def run(self, *, force: bool) -> "tuple[pl.DataFrame, BatchCount]":
+        """Do what is left of the batch, and gather all of it.
+
+        `force` is whether a batch with other options may be gone on with.
+
+        Returns:
+            Why logs failed (columns log, key, stage, error, line), and how many did.
+        """
+        record = {"command": self.command, "do": self.job.do, "versions": versions()}
+        with self.folder.opened(self.options, record, force=force):
+            self.work()
+            return self.gather()
+
     def work(self) -> None:
         """Do what is left of the batch."""
-        groups = self.grouped(self.waiting())
+        groups = self.groups()
         first = next(groups, None)
         if first is None:
-            self.plan.progress(self.count())
+            self.progress(self.count())
             return
         # What every worker has to see: the folder, the first log, and what the options name.
         seen = [str(self.folder.path), str(first[0].path)]
@@ -144,14 +142,14 @@ class _Run:
 
         with_files(self.job.choice, noted)
         every = chain([first], groups)
-        ended = run_tasks(every, work_on_log, self.plan.workers, self.plan.tell, seen)
+        ended = run_tasks(every, work_on_log, self.workers, self.tell, seen)
         # A batch that stops early takes its cluster down at once.
         with closing(ended):  # type: ignore[type-var]
             for outcome in ended:
                 self.take(outcome)
-                self.plan.progress(self.count())
+                self.progress(self.count())
 
-    def take(self, outcome: "Outcome[LogTask]") -> None:
+    def take(self, outcome: Outcome[LogTask]) -> None:
         """Keep what a log came to: why it failed, what it took."""
         task = outcome.task
         if outcome.effort is not None:
@@ -168,7 +166,7 @@ class _Run:
     def count(self) -> BatchCount:
         """How far it is."""
         return BatchCount(
-            logs=len(self.plan.logs),
+            logs=len(self.logs),
             before=self.before,
             done=len(self.done),
             failed=len(self.failures),
@@ -187,7 +185,7 @@ class _Run:
         logs = pl.DataFrame(
             {
                 "log": [self.labels[n] for n in finished],
-                "episode": [self.plan.logs[n].episode for n in finished],
+                "episode": [self.logs[n].episode for n in finished],
                 "key": [self.keys[n] for n in finished],
             },
             schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
@@ -233,7 +231,7 @@ class _Run:
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
         return {
-            "command": self.plan.command,
+            "command": self.command,
             "versions": versions(),
             "do": self.job.do,
             "options_sha256": self.options,
@@ -251,19 +249,6 @@ class _Run:
                 for key, effort in self.efforts.items()
             ],
         }
-
-
-def run_batch(plan: BatchPlan) -> "tuple[pl.DataFrame, BatchCount]":
-    """Do what is left of a batch, and gather all of it.
-
-    Returns:
-        Why logs failed (columns log, key, stage, error, line), and how many did.
-    """
-    run = _Run(plan)
-    record = {"command": plan.command, "do": plan.job.do, "versions": versions()}
-    with run.folder.opened(run.options, record, force=plan.force):
-        run.work()
-        return run.gather()
 
 
 def size_of(entry: LogEntry) -> int:

@@ -160,7 +160,7 @@ def admit(
     from vftcli.admittance.choice import ControlChoice, split_settings
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
-    from vftcli.outputs.admittance.files import files_of_replay, write_admittance
+    from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
 
@@ -359,13 +359,13 @@ def looped(
 def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.cli.console import detail, say
-    from vftcli.outputs.admittance.tables import (
+    from vftcli.outputs.admittance_tables import (
         comparison_text,
         latency_text,
         latex_text,
         parameter_text,
     )
-    from vftcli.outputs.plain_rows import json_rows
+    from vftcli.outputs.grid import json_rows
 
     if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))

@@ -67,7 +67,7 @@ def annotate_dataset(
 
     Example: vftcli annotate fixtures/panda_episodes -o forces
     """
-    from vftcli.batch.annotated_copy import CopyChoice, annotate
+    from vftcli.batch.annotated_copy import annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.cli.console import command_line, detail, say, say_json, stages
 
@@ -82,16 +82,16 @@ def annotate_dataset(
     )
     engine = workers.choice()
     engine.check_closed(anyway=anyway.anyway)
-    how = CopyChoice(allow_missing=columns.allow_missing, force=force)
     record = annotate(
         dataset,
         output,
         asked,
-        how,
         engine,
         command=command_line(),
         tell=detail,
         progress=stages(),
+        allow_missing=columns.allow_missing,
+        force=force,
     )
     if json:
         say_json(record)

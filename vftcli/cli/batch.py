@@ -88,12 +88,13 @@ def batch(
     """
     from vftcli.batch.kinds import for_comparison, for_estimates
     from vftcli.batch.log_work import LogJob
-    from vftcli.batch.run import BatchPlan, run_batch
+    from vftcli.batch.run import Batch
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
     from vftcli.doctor.examiner import Examiner
+    from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.collection import LogCollection
-    from vftcli.readers.library import Library
+    from vftcli.readers.library import Library, absolute
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.progress import no_stage
 
@@ -118,17 +119,16 @@ def batch(
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
         )
-    plan = BatchPlan(
+    asked = Batch(
         logs=found,
         job=job,
-        folder=output,
+        folder=BatchFolder(absolute(output)),
         workers=engine,
         command=command_line(),
-        force=force,
         tell=say,
         progress=progress_line(),
     )
-    failures, count = run_batch(plan)
+    failures, count = asked.run(force=force)
     STAGES.end()
     for name, reason in failures.select("log", "line").head(MOST_TOLD).iter_rows():
         say(f"error: {name}: {reason}")

@@ -109,8 +109,12 @@ def identify_robot(
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification.files import beside, files_beside, write_identification
-    from vftcli.outputs.identification.tables import tables_text
+    from vftcli.outputs.identification import (
+        beside,
+        files_beside,
+        tables_text,
+        write_identification,
+    )
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=robot.friction != "none")

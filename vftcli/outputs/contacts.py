@@ -5,8 +5,7 @@ from typing import Any
 
 from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
 from vftcli.outputs.answer import direction, free_words, place_words
-from vftcli.outputs.grid import Column, Grid
-from vftcli.outputs.plain_rows import csv_rows
+from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.outputs.quantity import banded
 
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.

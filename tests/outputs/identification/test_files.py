@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.doctor import examine
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.identification.files import write_identification
+from vftcli.outputs.identification import write_identification
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError
 

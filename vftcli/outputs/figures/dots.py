@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vftcli.outputs.figures.lines import MARKS, NARROW, plain
-from vftcli.outputs.figures.paper import add_legend, legend_room, sheet, shortened
+from vftcli.outputs.figures.paper import sheet, shortened
 from vftcli.outputs.log.rmse_tables import DAGGER
 from vftcli.signals.arrays import Array
 
@@ -54,10 +54,7 @@ def dot_figure(
     handles: dict[str, Any] = {shortened(n): Line2D([], [], **how) for n, how in looks.items()}
     if any(np.isfinite(plot.floor).any() for plot in plots):
         handles["floor of the reference"] = Line2D([], [], color="black", linewidth=1.2)
-    legend_columns, above = legend_room(width, list(handles))
-    height = 1.7 if len(plots) == 1 else 1.45
-    figure = sheet(width, len(plots), columns, height, above)
-    grid = figure.subplots(-(-len(plots) // columns), columns, squeeze=False).ravel()
+    figure, grid = sheet(width, len(plots), columns, 1.7 if len(plots) == 1 else 1.45, handles)
     for axes, plot in zip(grid, plots, strict=False):
         draw_dots(axes, plot, looks)
         axes.set_ylabel(label)
@@ -67,7 +64,6 @@ def dot_figure(
             axes.set_title(shortened(plot.title), fontsize=7.0, pad=3.5)
     for axes in grid[len(plots) :]:
         axes.set_axis_off()
-    add_legend(figure, handles, legend_columns)
     return figure
 
 

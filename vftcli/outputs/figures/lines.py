@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from vftcli.outputs.figures.paper import add_legend, legend_room, sheet, shortened
+from vftcli.outputs.figures.paper import sheet, shortened
 from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.svg import ends_of_family, thinned, thinned_log
 from vftcli.signals.arrays import Array
@@ -67,9 +67,9 @@ def line_figure(
     if columns is None:
         columns = min(len(plots), 2 if not wide else 4 if len(plots) > 6 else 3)
     labels = legend_handles(plots, list(marks or ()))
-    legend_columns, above = legend_room(width, list(labels))
-    figure = sheet(width, len(plots), columns, HIGH[wide], above + 0.12 * bool(numbers))
-    grid = figure.subplots(-(-len(plots) // columns), columns, squeeze=False).ravel()
+    figure, grid = sheet(width, len(plots), columns, HIGH[wide], labels)
+    if numbers:
+        figure.set_figheight(figure.get_figheight() + 0.12)
     for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
         draw_plot(axes, plot)
         axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
@@ -88,7 +88,6 @@ def line_figure(
         if k >= columns:
             hang_axis(grid[k], plots[k - columns], below or AXES[plots[k - columns].chart.unit])
     figure.align_ylabels(list(grid[: len(plots)]))
-    add_legend(figure, labels, legend_columns)
     return figure
 
 

@@ -3,7 +3,6 @@
 import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,18 +170,20 @@ def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write what was asked for besides, below a place of a folder."""
-    if not choice.extras:
-        return  # without loading what writes them: a third of the modules of a command
-    from vftcli.outputs.log.mcap_output import write_mcap
-    from vftcli.outputs.log.rerun_recording import write_rrd
-
-    writers: dict[str, Callable[[Path, Analysis], None]] = {
-        "csv": write_csv,
-        "mcap": write_mcap,
-        "rrd": partial(write_rrd, detail=choice.rrd_detail),
-    }
+    # Without loading what writes the others: a third of the modules of a command.
     for extra in choice.extras:
-        writers[extra](folder / f"{place}{EXTRAS[extra]}", analysis)
+        path = folder / f"{place}{EXTRAS[extra]}"
+        if extra == "csv":
+            write_csv(path, analysis)
+        elif extra == "mcap":
+            from vftcli.outputs.log.mcap_output import write_mcap
+
+            write_mcap(path, analysis)
+        else:
+            needed("rerun", path.name)
+            from vftcli.outputs.log.rerun_recording import write_rrd
+
+            write_rrd(path, analysis, choice.rrd_detail)
 
 
 def write_estimate_folder(

@@ -123,10 +123,10 @@ def contact_numbers(analysis: Analysis) -> dict[int, float]:
     return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
 
 
-def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
+def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    None where no joint has an error, or where more than `MOST` logs have no rows that stand for
+    Empty where no joint has an error, or where more than `MOST` logs have no rows that stand for
     all of them.
     """
     from vftcli.evaluation.errors import POOLED
@@ -136,18 +136,11 @@ def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
     plots = [error_plot(rows) for rows in groups]
     if not 0 < len(plots) <= MOST:
-        return None
+        return {}
     paints = colours_of_names(list(dict.fromkeys(r.name for plot in plots for r in plot.rows)))
-    return Drawing(
-        "RMSE of the external torque with its 95 % interval",
-        partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)"),
-    )
-
-
-def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
-    """The figure of a table of errors, as `error_drawing` makes it."""
-    drawn = error_drawing(errors)
-    return {} if drawn is None else {"errors": drawn}
+    title = "RMSE of the external torque with its 95 % interval"
+    draw = partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)")
+    return {"errors": Drawing(title, draw)}
 
 
 def error_plot(rows: "pl.DataFrame") -> DotPlot:

@@ -15,7 +15,6 @@ from vftcli.outputs.log import tables
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.pages import render, render_index
@@ -143,6 +142,8 @@ def fill(
         lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
     ]
     if choice.writes_recording and installed("rerun"):  # else `left_out` says how to get it
+        from vftcli.outputs.log.rerun_recording import write_rrd
+
         path = folder / f"{place}recording.rrd"
         writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
     for write in steps(writers):

@@ -10,8 +10,10 @@ from vftcli.evaluation.errors import POOLED
 from vftcli.outputs.grid import (
     Column,
     Grid,
+    csv_rows,
     escape_markdown,
     joint_columns,
+    json_rows,
     latex,
     markdown,
     terminal,
@@ -30,7 +32,6 @@ from vftcli.outputs.log.wrench_tables import (
     contact_grids,
     nothing_to_compare,
 )
-from vftcli.outputs.plain_rows import csv_rows, json_rows
 from vftcli.outputs.quantity import significant
 from vftcli.signals.letters import printable
 

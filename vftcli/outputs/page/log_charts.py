@@ -33,8 +33,7 @@ def torque_chart(analysis: Analysis) -> Chart:
     """External torque joint by joint: the best estimate with its band, the reference below it."""
     n, reference = analysis.recording.joints, analysis.reference
     found = blocks(analysis.errors) if analysis.errors is not None else ()
-    each = [(e.name, e.tau, e.error_sd) for e in analysis.estimates]
-    lines = lines_of(analysis, each, alike=True)
+    lines = estimate_lines(analysis)
     return Chart(
         "tau",
         "External torque on the robot",
@@ -84,6 +83,12 @@ def lines_of(
         for name, values, sd in found
     ]
     return sorted(lines, key=lambda line: line.leads)
+
+
+def estimate_lines(analysis: Analysis) -> list[ChartLine]:
+    """Every observer's torque."""
+    each = [(e.name, e.tau, e.error_sd) for e in analysis.estimates]
+    return lines_of(analysis, each, alike=True)
 
 
 def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:

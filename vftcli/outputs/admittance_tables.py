@@ -9,8 +9,7 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, latex, terminal
-from vftcli.outputs.plain_rows import csv_rows
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
 from vftcli.outputs.quantity import minus
 from vftcli.signals.arrays import Array
 
