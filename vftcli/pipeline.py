@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.doctor.examiner import Examiner, let_go_of_examined
+from vftcli.doctor.examination import Examiner, let_go_of_examined
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.estimates import refuse_estimates
@@ -242,7 +242,7 @@ def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baselines | None":
     """The log's free part, spectra and bias, None where nothing asks for them."""
     if not choice.looks_back:
         return None
-    from vftcli.refinement.correction import find_baselines
+    from vftcli.refinement.baseline import find_baselines
 
     return find_baselines(motion, choice.refinement, best=BEST in choice.observers.names)
 

@@ -8,7 +8,7 @@ from itertools import chain
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.observers.block_run import block_run, runs_in_blocks
+from vftcli.observers.smoother import block_run, runs_in_blocks
 from vftcli.pipeline import AnalysisChoice
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import Examiner, in_words
-from vftcli.doctor.examiner import refuse
+from vftcli.doctor.examination import refuse
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice

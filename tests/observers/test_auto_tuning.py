@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_runs import samples_of
 
-from vftcli.observers import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.observers.auto_tuning import (
     KINDS,
     bound_remarks,
@@ -18,8 +17,9 @@ from vftcli.observers.auto_tuning import (
     tune_to_spectra,
 )
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.robots.run import RunSamples
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.terms import DynamicsTerms
 
 STEP = 0.008
 

@@ -5,13 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from vftcli.observers.block_run import block_run, look_ahead, runs_in_blocks
 from vftcli.observers.observer import Observer
 from vftcli.observers.paper import KalmanObserver, MomentumObserver
-from vftcli.observers.smoother import KalmanSmoother
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.observers.smoother import KalmanSmoother, block_run, look_ahead, runs_in_blocks
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import Clock, clock_of
+from vftcli.signals.terms import DynamicsTerms
 
 SMOOTHER = KalmanSmoother(filter=KalmanObserver(discretisation="zoh"))
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import PAPER, Setup, build_observers
-from vftcli.observers.matching import match_observers, parse_target
 from vftcli.observers.observer import Observer
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.observers.table import PAPER, Setup, build_observers
+from vftcli.observers.tuning import match_observers, parse_target
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.terms import DynamicsTerms
 
 GAINS = {
     "fdo": {"omega": 10.0},

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.observers import (
+from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
+from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.table import (
     PAPER,
-    FilteredDynamicsObserver,
-    KalmanObserver,
-    MomentumObserver,
     Setup,
     build_observers,
+    load_gains,
+    overlay_gains,
+    parse_settings,
+    sections,
 )
-from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.settings import load_gains, overlay_gains, parse_settings
-from vftcli.observers.table import sections
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import ParameterError, VftError
 

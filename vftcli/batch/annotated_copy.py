@@ -88,10 +88,9 @@ def annotate(
             plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
         )
         made = gathered(outcomes, allow_missing, progress)
-        told = first_known(made)
         columns = force_columns(
             choice,
-            told["names"],
+            joint_names(made),
             derived=any(one.get("derived") for one in made.episodes),
             valid=allow_missing,
         )
@@ -216,7 +215,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
         )
 
 
-def first_known(made: Made) -> dict[str, Any]:
+def joint_names(made: Made) -> list[str]:
     """The names of the joints, of the first episode that tells any; all must have as many."""
     known = [one for one in made.episodes if one["status"] != "missing"]
     if not known:
@@ -230,8 +229,7 @@ def first_known(made: Made) -> dict[str, Any]:
         raise LogError(
             f"the episodes are of arms of {' and '.join(map(str, sorted(widths)))} joints"
         )
-    names = known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
-    return {"names": names}
+    return known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
 
 
 def write_file(

@@ -91,7 +91,7 @@ def batch(
     from vftcli.batch.run import Batch
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.collection import LogCollection
     from vftcli.readers.library import Library, absolute

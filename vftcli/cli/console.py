@@ -149,7 +149,7 @@ def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
     """The examiner of a command's logs: it prints one line on the health of each."""
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.doctor.examination import Examiner
     from vftcli.outputs.examination import health_line
 
     def tell(examination: "Examination") -> None:

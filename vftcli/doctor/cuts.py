@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.clock import GAP_STEPS
+from vftcli.doctor.signals import GAP_STEPS
 from vftcli.doctor.stuck import repeated_rows
 from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms
@@ -215,8 +215,7 @@ def frozen_rows(recording: Recording) -> Mask:
 def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     """Changes of position beyond what the velocities say, and which of them are jumps.
 
-    The sample before each (K,), their sizes (K, n) [rad], and the jumps among them (K, n). A step
-    of time may be off by what the steps around it are, and by a sample that was late.
+    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be off.
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step

@@ -2,29 +2,11 @@
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
-from vftcli.observers.settings import Settings
-from vftcli.observers.table import (
-    BEST,
-    DEFAULT,
-    OBSERVERS,
-    PAPER,
-    LogSpectra,
-    Setup,
-    build_observers,
-)
 
 __all__ = [
-    "BEST",
-    "DEFAULT",
-    "OBSERVERS",
-    "PAPER",
     "FilteredDynamicsObserver",
     "KalmanObserver",
-    "LogSpectra",
     "MomentumObserver",
     "Observer",
-    "Settings",
-    "Setup",
     "Tuning",
-    "build_observers",
 ]

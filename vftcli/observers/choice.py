@@ -7,35 +7,33 @@ from typing import TYPE_CHECKING
 
 from vftcli.observers.lead import estimate_from_rest
 from vftcli.observers.observer import Observer
-from vftcli.observers.settings import (
-    Gains,
-    Settings,
-    check_gains,
-    load_gains,
-    overlay_gains,
-    parse_settings,
-)
 from vftcli.observers.table import (
     BEST,
     DEFAULT,
     NOT_SHOWN,
     OBSERVERS,
     PAPER,
+    Gains,
     LogSpectra,
+    Settings,
     Setup,
     build_observers,
+    check_gains,
+    load_gains,
+    overlay_gains,
+    parse_settings,
     read_as,
     sections,
 )
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.terms import DynamicsTerms
 
 if TYPE_CHECKING:
-    from vftcli.observers.matching import Goal
+    from vftcli.observers.tuning import Goal
 
 PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
@@ -110,7 +108,7 @@ class ObserverChoice:
         """
         target = None
         if match is not None:
-            from vftcli.observers.matching import parse_target
+            from vftcli.observers.tuning import parse_target
 
             target = parse_target(match)
         if gains is not None and gains_file is not None:
@@ -178,7 +176,7 @@ class ObserverChoice:
             remarks = (*remarks, caution("gains-without-free-part"))
         if self.match is None:
             return observers, remarks
-        from vftcli.observers.matching import match_observers
+        from vftcli.observers.tuning import match_observers
 
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)

@@ -21,15 +21,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_loop, error_filter
-from vftcli.observers.observer import Complex, Tuning
+from vftcli.observers.kalman_model import Covariance, Gains, closed_loop, error_filter
+from vftcli.observers.observer import BlockObserver, Complex, Observer, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.observers.uneven import gain_sequence, recursion
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.series import Clock
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.terms import DynamicsTerms
 
 #: Share of the smoother's settled information that may be missing where it counts as settled.
 SETTLED = 1e-16
@@ -150,7 +151,12 @@ class SteadyRun:
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
         correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
         tau -= correction[::-1][: len(t)]
-        deviation, sd = steady_deviation(gains, model, self._S, known), empty_series(*tau.shape)
+        # √P₂₂ from the log's last sample backwards, until it has settled.
+        step = information_step(gains, model.a12, model.a22)
+        missing = missing_information(step, information_gain(model.a12, self._S), known)
+        information = (missing[0] - missing).transpose(1, 0, 2)
+        deviation = np.sqrt(smoothed_variance(gains.posterior, information))
+        sd = empty_series(*tau.shape)
         sd[:] = deviation[-1]
         near = deviation[known - len(t) : known]
         sd[len(t) - len(near) :] = near[::-1]
@@ -171,13 +177,6 @@ def look_ahead(smoother: KalmanSmoother, step: float, joints: int) -> float:
     F = np.moveaxis(closed_loop(gains, model.a12, model.a22), -1, 0)
     pole = float(np.max(np.abs(np.linalg.eigvals(F))))
     return float(np.ceil(np.log(SETTLED) / np.log(pole))) if pole < 1.0 else np.inf
-
-
-def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
-    """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
-    step = information_step(gains, model.a12, model.a22)
-    missing = missing_information(step, information_gain(model.a12, S), samples)
-    return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
 
 
 def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) -> Array:
@@ -248,3 +247,42 @@ def from_the_end(F: Array, x: Array) -> Array:
     """Run y_t = F_t y_{t+1} + x_t from a log's end; what comes of the samples behind each one."""
     y = recursion(F[:, :, ::-1], x[:, ::-1], np.zeros_like(x[:, 0]))[:, ::-1]
     return np.concatenate([y[:, 1:], np.zeros_like(y[:, :1])], axis=1)
+
+
+#: Samples that the smoother looks ahead at most; one that forgets more slowly has the whole log.
+FARTHEST = 1 << 17
+
+
+def runs_in_blocks(observer: Observer, clock: Clock, joints: int) -> bool:
+    """Whether an observer's estimate of a log can be made block by block."""
+    if not isinstance(observer, KalmanSmoother):
+        return isinstance(observer, BlockObserver)
+    steady = observer.filter.is_steady(clock)
+    return steady and look_ahead(observer, clock.step, joints) <= FARTHEST
+
+
+def block_run(observer: Observer, clock: Clock, joints: int) -> "CausalRun | SteadyRun":
+    """An observer at the beginning of a log of which `runs_in_blocks` holds.
+
+    It takes up block after block, and gives the estimates that are known by then, in order.
+    """
+    if isinstance(observer, KalmanSmoother):
+        return SteadyRun(observer, clock.step, joints)
+    assert isinstance(observer, BlockObserver)
+    return CausalRun(observer)
+
+
+class CausalRun:
+    """An observer that needs nothing of what follows."""
+
+    def __init__(self, observer: BlockObserver) -> None:
+        self._observer, self._state = observer, None
+
+    def take(self, terms: DynamicsTerms) -> Iterator[ExternalTorque]:
+        """The estimate of the block."""
+        estimate, self._state = self._observer.run(terms, self._state)
+        yield estimate
+
+    def end(self) -> Iterator[ExternalTorque]:
+        """Nothing is left."""
+        return iter(())

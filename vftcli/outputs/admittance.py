@@ -26,8 +26,8 @@ from vftcli.outputs.admittance_tables import (
     stability_grid,
 )
 from vftcli.outputs.examination import health_record
-from vftcli.outputs.figures.lines import NARROW, line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
 from vftcli.outputs.files import OutputFolder, table_file
 from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions

@@ -19,6 +19,8 @@ def number_form(form: str) -> Callable[[float], str]:
     return lambda value: minus(format(value, form))
 
 
+THIRD = number_form(".3f")
+
 #: Key of a row → its column.
 COLUMNS = {
     "controller": Column("controller", words=True),
@@ -26,16 +28,25 @@ COLUMNS = {
     "xi": Column("ξ", form=number_form(".3g")),
     "axis": Column("axis"),
     "drag": Column("drag"),
-    "start_s": Column("start", "s", number_form(".3f")),
-    "release_s": Column("release", "s", number_form(".3f")),
+    "start_s": Column("start", "s", THIRD),
+    "release_s": Column("release", "s", THIRD),
     "peak": Column("peak", "m, rad", number_form(".4f")),
-    "time_to_peak_s": Column("to peak", "s", number_form(".3f")),
-    "peak_advance_s": Column("advance", "s", number_form(".3f")),
+    "time_to_peak_s": Column("to peak", "s", THIRD),
+    "peak_advance_s": Column("advance", "s", THIRD),
     "overshoot": Column("overshoot", "%", lambda share: number_form(".1f")(100.0 * share)),
-    "return_10_s": Column("back to 10 %", "s", number_form(".3f"), symbol="$t_{10}$"),
-    "return_2_s": Column("back to 2 %", "s", number_form(".3f"), symbol="$t_2$"),
-    "idle_s": Column("idle", "s", number_form(".3f")),
-    "work_J": Column("work", "J", number_form(".3f")),
+    "return_10_s": Column("back to 10 %", "s", THIRD, symbol="$t_{10}$"),
+    "return_2_s": Column("back to 2 %", "s", THIRD, symbol="$t_2$"),
+    "idle_s": Column("idle", "s", THIRD),
+    "work_J": Column("work", "J", THIRD),
+}
+#: What is timed of a contact → its heading.
+LATENCIES = {
+    "force": "force [s]",
+    "detection": "detected [s]",
+    "motion": "moved [s]",
+    "withdrawal": "withdrawal [s]",
+    "reaction": "detection to motion [s]",
+    "turn": "withdrawal to turn [s]",
 }
 #: What the headings of the LaTeX table mean.
 RETURNS = (
@@ -78,12 +89,7 @@ def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
     return [
         {
             "axis": AXES[entry.axis],
-            "force_s": entry.force,
-            "detection_s": entry.detection,
-            "motion_s": entry.motion,
-            "withdrawal_s": entry.withdrawal,
-            "reaction_s": entry.reaction,
-            "turn_s": entry.turn,
+            **{f"{name}_s": getattr(entry, name) for name in LATENCIES},
             "at_rest_before": entry.rested,
         }
         for entry in latencies(run)
@@ -92,27 +98,18 @@ def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
 
 def latency_grid(run: ClosedLoop) -> Grid:
     """The latencies of a closed loop, from the true force and as the paper times them."""
-    heads = (
-        "force [s]",
-        "detected [s]",
-        "moved [s]",
-        "withdrawal [s]",
-        "detection to motion [s]",
-        "withdrawal to turn [s]",
-    )
-    keys = ("force_s", "detection_s", "motion_s", "withdrawal_s", "reaction_s", "turn_s")
     return Grid(
         title="From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of "
         "the flange; from its fall below to the estimate's; as the paper times, from the estimate "
         "past its threshold to 5 mm, from its fall below to where the flange goes no farther",
         columns=(
             Column("axis", words=True),
-            *(Column(head, form=".3f") for head in heads),
+            *(Column(head, form=".3f") for head in LATENCIES.values()),
             Column("at rest before"),
         ),
         rows=tuple(
-            (row["axis"], *(row[k] for k in keys), "yes" if row["at_rest_before"] else "no")
-            for row in latency_rows(run)
+            (axis, *times, "yes" if rested else "no")
+            for axis, *times, rested in map(dict.values, latency_rows(run))
         ),
     )
 
@@ -124,8 +121,8 @@ def latency_text(run: ClosedLoop) -> str:
     lines = []
     for row in latency_rows(run):
         detection, motion, withdrawal, reaction, turn = (
-            "never" if row[name] is None else f"{row[name]:.3f} s"
-            for name in ("detection_s", "motion_s", "withdrawal_s", "reaction_s", "turn_s")
+            "never" if row[f"{name}_s"] is None else f"{row[f'{name}_s']:.3f} s"
+            for name in list(LATENCIES)[1:]
         )
         moving = "" if row["at_rest_before"] else " (the arm was moving already)"
         lines.append(

@@ -13,9 +13,8 @@ import polars as pl
 from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.examination import health_record, overridden_lines
-from vftcli.outputs.figures.dots import DotPlot, DotRow, dot_figure
-from vftcli.outputs.figures.lines import line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.log.run_record import (

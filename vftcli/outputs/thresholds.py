@@ -185,21 +185,19 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
         "largest_missed_N": check.largest_missed,
         "false_alarms": check.false_alarms,
         "untouched_h": check.untouched_h,
-        "contacts": [contact_record(k, c) for k, c in enumerate(check.contacts, start=1)],
+        "contacts": [
+            {
+                "number": number,
+                "start_s": contact.start,
+                "stop_s": contact.stop,
+                "peak_force_N": contact.peak_force,
+                "delay_s": contact.delay,
+                "by": contact.by or None,
+                "alarm_was_on": contact.was_on,
+            }
+            for number, contact in enumerate(check.contacts, start=1)
+        ],
         "remarks": list(check.remarks),
-    }
-
-
-def contact_record(number: int, contact: CheckedContact) -> dict[str, Any]:
-    """One contact of a check for machines."""
-    return {
-        "number": number,
-        "start_s": contact.start,
-        "stop_s": contact.stop,
-        "peak_force_N": contact.peak_force,
-        "delay_s": contact.delay,
-        "by": contact.by or None,
-        "alarm_was_on": contact.was_on,
     }
 
 

@@ -7,8 +7,8 @@ from html import escape
 
 import numpy as np
 
-from vftcli.outputs.figures.lines import line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.log.run_record import seal, versions

@@ -89,7 +89,7 @@ def test_a_form_is_checked_before_anything_is_computed(monkeypatch: pytest.Monke
 
 @pytest.mark.slow
 def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
-    rooms = ("figures.tuned", "admittance.files", "identification.files", "log.report")
+    rooms = ("log.figures", "admittance", "identification", "log.report")
     modules = (f"vftcli.outputs.{room}" for room in rooms)
     assert "matplotlib" not in loaded(", ".join(("vftcli.cli.report", *modules)))
 

@@ -45,22 +45,20 @@ def places_of(labels: Sequence[str]) -> list[str]:
 
 
 def report_files(
-    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
+    labels: Sequence[str],
+    extras: Sequence[str] = (),
+    form: str | None = None,
+    *,
+    several: bool | None = None,
 ) -> list[str]:
     """Names of all files that a report of logs with these labels may hold, with these extras.
 
-    `form` is what figures are written as, None without any.
+    `form` is what figures are written as, None without any; `several` is whether there is a
+    sub-folder a log, None for where there is more than one.
     """
-    if len(labels) == 1:
-        return [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
-    return files_of_several(labels, extras, form)
-
-
-def files_of_several(
-    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
-) -> list[str]:
-    """Those of a report with a sub-folder a log, even where one log alone could be analysed."""
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
+    if not (len(labels) > 1 if several is None else several):
+        return own
     above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
     return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
@@ -103,7 +101,8 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, choice.extras, form)) as folder:
+    names = report_files(labels, choice.extras, form, several=True)
+    with OutputFolder(path, force, names) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, choice, form)
             for place, analysis in steps(list(zip(places, analyses, strict=True)))

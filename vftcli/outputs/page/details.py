@@ -12,7 +12,7 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.evaluation.print_table import Comparison
 from vftcli.evaluation.selection import Facts, advice, facts
-from vftcli.observers import OBSERVERS
+from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns
 from vftcli.outputs.log.run_record import observer_record
 from vftcli.outputs.page.shell import part

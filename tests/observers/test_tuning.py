@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from vftcli.cli import app
 from vftcli.observers.spectra import Spectra
-from vftcli.refinement.tuning import bounds_reached, crossings, parse_goal, tune_all
+from vftcli.observers.tuning import bounds_reached, crossings, parse_goal, tune_all
 from vftcli.signals.errors import ParameterError, VftError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
