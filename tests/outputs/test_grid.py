@@ -15,13 +15,13 @@ from vftcli.outputs.grid import (
     GridCell,
     csv_rows,
     escape_latex,
-    html,
     joint_columns,
     json_rows,
     latex,
     markdown,
     terminal,
 )
+from vftcli.outputs.page.shell import table
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 
@@ -181,7 +181,7 @@ class Cells(HTMLParser):
 
 
 def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) -> None:
-    found = Cells(html(grid))
+    found = Cells(table(grid))
     assert "b" not in [tag for tag, _ in found.elements]
     assert HOSTILE in found.words
     assert ("td", {"class": "best"}) in found.elements

@@ -29,7 +29,7 @@ from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.grid import html, json_rows
+from vftcli.outputs.grid import json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
 from vftcli.outputs.page import shell
 from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
@@ -214,10 +214,10 @@ def render_admittance(
             "beside the printed V, which rises."
         ),
         "<h2>Details</h2>",
-        shell.section("Parameters", html(parameter_grid(replay))),
+        shell.section("Parameters", shell.table(parameter_grid(replay))),
         shell.section(
             "Stability before motion",
-            html(stability_grid(replay))
+            shell.table(stability_grid(replay))
             + shell.soft(
                 "The escape bound is the largest deviation from which a release at rest would not "
                 "run away if there were no speed limit."
@@ -244,7 +244,7 @@ def closed_loop_section(run: ClosedLoop | None) -> str:
         "The paper measured 0.24 and 0.28 s from detection to motion, 0.26 and 0.12 s from "
         "withdrawal to the turn on its UR5 (docs/admittance.md)."
     )
-    return f"<h2>Closed loop in simulation</h2>{state}{html(latency_grid(run))}{words}"
+    return f"<h2>Closed loop in simulation</h2>{state}{shell.table(latency_grid(run))}{words}"
 
 
 def comparison_section(replay: Replay) -> str:
@@ -269,7 +269,7 @@ def comparison_section(replay: Replay) -> str:
         "as a share of the deviation at the release. Work: what the hand does on the arm while it "
         "drags."
     )
-    return f"<h2>Comparison</h2>{html(grid)}{words}"
+    return f"<h2>Comparison</h2>{shell.table(grid)}{words}"
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:

@@ -1,9 +1,9 @@
 """Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
 
-Whoever has a table to show makes a Grid of it; how a table looks is decided here alone, and so is
-what must be escaped: names and words come from files, and may hold any letter. Rows for machines,
-whose values are not rounded, are written by `csv_rows` and `json_rows`: what is not known is null
-or empty.
+Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for HTML, in
+the pages' templates, and so is what must be escaped: names and words come from files, and may hold
+any letter. Rows for machines, whose values are not rounded, are written by `csv_rows` and
+`json_rows`: what is not known is null or empty.
 """
 
 import csv
@@ -12,7 +12,6 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +25,6 @@ NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
 DECIMALS = "." + 20 * "0"
 #: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
-BEST = ' class="best"'  #: What the style sheet makes bold.
 
 
 class GridCell(NamedTuple):
@@ -229,44 +227,6 @@ def latex_line(texts: Iterable[str]) -> str:
 def bold(text: str, best: bool, form: str) -> str:
     """A text as it is, or put into a form for bold type."""
     return form.format(text) if best else text
-
-
-def html(grid: Grid) -> str:
-    """A table for the page, which scrolls by itself where the page is narrow."""
-    heads = [column.heading for column in grid.columns]
-    heads[0] = heads[0][:1].upper() + heads[0][1:]
-    head = "".join(
-        f'<th scope="col"{words_class(column)}>{escape(text)}</th>'
-        for column, text in zip(grid.columns, heads, strict=True)
-    )
-    first_summary = len(grid.rows) - grid.summaries
-    rows = "".join(
-        html_line(grid, row, ' class="floor"' if k >= first_summary else "")
-        for k, row in enumerate(grid.cells)
-    )
-    caption = f"<caption>{escape(grid.caption)}</caption>" if grid.caption else ""
-    return (
-        f'<div class="scroll"><table>{caption}<thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
-    )
-
-
-def html_line(grid: Grid, row: Sequence[GridCell], kind: str) -> str:
-    """One row of a table: its head, then its entries."""
-    first, *rest = row
-    # The page's script paints the observer's colour before every head that names one.
-    swatch = f' data-swatch="{escape(first.text)}"' if grid.swatches and not kind else ""
-    head = f'<th scope="row"{swatch}>{first.html or escape(first.text)}</th>'
-    entries = "".join(
-        f"<td{BEST if cell.best else words_class(column)}>{cell.html or escape(cell.text)}</td>"
-        for cell, column in zip(rest, grid.columns[1:], strict=True)
-    )
-    return f"<tr{kind}>{head}{entries}</tr>"
-
-
-def words_class(column: Column) -> str:
-    """The class of a column of words, which the style sheet sets to the left."""
-    return ' class="text"' if column.words else ""
 
 
 def escape_markdown(text: str) -> str:

@@ -16,7 +16,7 @@ from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import Column, Entry, Grid, html, joint_columns, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     file_sha256,
@@ -122,7 +122,7 @@ def render_identification(
     }
     if found.base is not None:
         grids[f"Base parameters ({len(found.base)})"] = base_grid(found.base)
-    tables = {name: html(grid) for name, grid in grids.items() if grid.rows}
+    tables = {name: shell.table(grid) for name, grid in grids.items() if grid.rows}
     residuals = tables.pop("residuals", "")
     over_time = "".join(
         f"<h3>{escape(c.title)}</h3>{shell.multiples(c)}{shell.large(c)}" for c in charts

@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import Column, Grid, GridCell, html, markdown
+from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.log.run_record import seal, versions
 from vftcli.outputs.page.shell import (
     bullets,
@@ -20,6 +20,7 @@ from vftcli.outputs.page.shell import (
     multiples,
     section,
     soft,
+    table,
     top,
 )
 from vftcli.outputs.quantity import DASH, minus, significant
@@ -138,7 +139,7 @@ def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job
     about = lead(f"{paper.title}.") + lead(*paper.setting)
     parts = [
         top((paper.name, f"doi {paper.doi}"), "The paper, run again", about),
-        html(overview(found)),
+        table(overview(found)),
         soft(RATIOS),
         *(item_section(name, shown) for name, shown in found.items()),
         "<h2>What was run</h2>",
@@ -155,7 +156,7 @@ def item_section(name: str, shown: ShownItem) -> str:
     parts += [f'<p class="alarm">{escape(line)}</p>' for line in shown.failures]
     parts.append(f"<p><strong>{escape(item.answer)}</strong> {escape(item.why)}</p>")
     if item.lines:
-        parts.append(html(item_grid(shown)))
+        parts.append(table(item_grid(shown)))
     if shown.chart is not None:
         drawn = multiples(shown.chart) + large(shown.chart)
         parts.append(section("Traces", drawn, shown.chart.title, opened=True))

@@ -139,11 +139,10 @@ def observers_view(analysis: Analysis) -> dict[str, Any]:
     )
     # The record has parameters as JSON can hold them, also those of a wrapped observer.
     used = [observer_record(observer, None)["parameters"] for observer in analysis.observers]
-    texts = ["; ".join(f"{k} = {value_text(v)}" for k, v in each.items()) for each in used]
     return {
         "grid": grid,
         "names": ", ".join(names),
-        "parameters": dict(zip(names, texts, strict=True)),
+        "parameters": dict(zip(names, used, strict=True)),
     }
 
 
@@ -166,24 +165,6 @@ def joint_values(values: Array) -> str:
         (text, [j for j, _ in run]) for text, run in groupby(enumerate(texts, 1), itemgetter(1))
     ]
     return part("parts/joint_values", runs)
-
-
-def value_text(value: Any) -> str:  # noqa: ANN401 - whatever JSON can hold
-    """A parameter's value with six digits; of a list whose items are equal one is shown."""
-    match value:
-        case bool():
-            return "yes" if value else "no"
-        case None:
-            return DASH
-        case float():
-            return f"{value:.6g}"
-        case list() if value and all(entry == value[0] for entry in value):
-            return value_text(value[0])
-        case list():
-            return ", ".join(map(value_text, value))
-        case dict():
-            return ", ".join(f"{key} {value_text(entry)}" for key, entry in value.items())
-    return str(value)
 
 
 def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:

@@ -1,6 +1,6 @@
 """The charts of one log: torques, wrenches, what the pose tells, responses, spectra and tuning."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from vftcli.outputs.page.charts import (
 )
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import COVERS
-from vftcli.signals.wrench import AXES, unit_of
+from vftcli.signals.wrench import AXES, Wrench, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
 #: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
@@ -33,14 +33,15 @@ def torque_chart(analysis: Analysis) -> Chart:
     """External torque joint by joint: the best estimate with its band, the reference below it."""
     n, reference = analysis.recording.joints, analysis.reference
     found = blocks(analysis.errors) if analysis.errors is not None else ()
+    lines = estimate_lines(analysis)
     return Chart(
         "tau",
         "External torque on the robot",
         ("N·m",) * n,
         # A dagger where the reference is not to be trusted, as in the tables.
-        tuple(found[0].joint_heads) if found else tuple(f"J{j}" for j in range(1, n + 1)),
+        tuple(found[0].joint_heads) if found else joint_panels(lines[0].values),
         analysis.t,
-        (*reference_lines(analysis), *estimate_lines(analysis)),
+        (*reference_lines(analysis), *lines),
         families=families_of(analysis.robot.limits.tau_max),
         band=None if reference is None else reference.floor,
         band_label="± floor of the reference",
@@ -54,28 +55,40 @@ def contact_spans(analysis: Analysis) -> tuple[tuple[float, float], ...]:
     return tuple((contact.start, contact.stop) for contact in found if not contact.is_load)
 
 
-def estimate_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
-    """Every observer's torque; one is drawn at once, `best` where it ran, with its 95 % band.
+def lines_of(
+    analysis: Analysis, found: Sequence[tuple[str, Array, Array | None]], *, alike: bool
+) -> list[ChartLine]:
+    """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
 
     Beside `best` no other bears a band: five would hide one another.
+
+    Args:
+        analysis: What gives every observer its colour.
+        found: Name, values and their standard deviation of every observer. (T, n)
+        alike: Whether every line bears its band where `best` did not run.
     """
     styles = observer_lines(analysis.estimates)
-    alone = BEST not in styles
-    first = next(iter(styles), "") if alone else BEST
+    names = [name for name, *_ in found]
+    first = BEST if BEST in names else next(iter(names), "")
+    banded = set(names) if alike and first != BEST else {first}
     lines = [
         ChartLine(
-            e.name,
-            e.tau,
-            *styles[e.name],
-            half=COVERS * e.error_sd
-            if e.error_sd is not None and (alone or e.name == first)
-            else None,
-            leads=e.name == first,
-            shown=e.name == first,
+            name,
+            values,
+            *styles[name],
+            half=COVERS * sd if sd is not None and name in banded else None,
+            leads=name == first,
+            shown=name == first,
         )
-        for e in analysis.estimates
+        for name, values, sd in found
     ]
-    return tuple(sorted(lines, key=lambda line: line.leads))
+    return sorted(lines, key=lambda line: line.leads)
+
+
+def estimate_lines(analysis: Analysis) -> list[ChartLine]:
+    """Every observer's torque."""
+    each = [(e.name, e.tau, e.error_sd) for e in analysis.estimates]
+    return lines_of(analysis, each, alike=True)
 
 
 def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
@@ -117,21 +130,22 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
         delay = -1e3 * phase / (360.0 * frequency[:, None])
         for key, values in (("gain", decibel), ("phase", phase), ("delay", delay)):
             columns[key].append(ChartLine(observer.name, values, *styles[observer.name]))
-    titles = {"gain": ("Gain", "dB"), "phase": ("Phase", "°"), "delay": ("Delay", "ms")}
-    return tuple(
-        Chart(
-            key,
-            title,
-            (unit,),
-            (f"{title}, joint 1",),
-            frequency,
-            tuple(columns[key]),
-            unit="Hz",
-            log=True,
-            lowest=LOWEST if key == "gain" else None,
+    gain, *others = (
+        over_frequency(title.lower(), title, unit, frequency, lines)._replace(
+            panels=(f"{title}, joint 1",)
         )
-        for key, (title, unit) in titles.items()
+        for title, unit, lines in zip(
+            ("Gain", "Phase", "Delay"), ("dB", "°", "ms"), columns.values(), strict=True
+        )
     )
+    return gain._replace(lowest=LOWEST), *others
+
+
+def over_frequency(key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]) -> Chart:
+    """A chart over frequency, a panel a joint. (T,) [Hz]"""
+    panels = joint_panels(lines[0].values)
+    units = (unit,) * len(panels)
+    return Chart(key, title, units, panels, x, tuple(lines), unit="Hz", log=True)
 
 
 def joint_panels(values: Array) -> tuple[str, ...]:
@@ -144,19 +158,10 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     found = [wrench for wrench in analysis.wrenches if wrench.name != "reference"]
     if not found:
         return None
-    styles = observer_lines(analysis.estimates)
-    first = next((w.name for w in found if w.name == BEST), found[0].name)
+    each = [(wrench.name, wrench.known, wrench.sd) for wrench in found]
     lines = [
-        ChartLine(
-            w.name,
-            w.known,
-            *styles[w.name],
-            half=COVERS * w.sd if w.sd is not None and w.name == first else None,
-            leads=w.name == first,
-            shown=w.name == first,
-            quiet=quiet_samples(analysis, w.name),
-        )
-        for w in sorted(found, key=lambda wrench: wrench.name == first)
+        line._replace(quiet=quiet_samples(analysis, line.name))
+        for line in lines_of(analysis, each, alike=False)
     ]
     reference = [w for w in analysis.wrenches if w.name == "reference"]
     below = [ChartLine(legend_name(analysis, w.name), w.known, REFERENCE) for w in reference]
@@ -185,54 +190,40 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     if sensed is None or not sensed.wrenches:
         return
     # σ_min and the mask follow from the pose, so that every observer has the same.
-    first, t = sensed.wrenches[0], analysis.t
+    first, least = sensed.wrenches[0], sensed.sensor.least_sigma
     styles = observer_lines(analysis.estimates)
+
+    def chart(key: str, title: str, unit: str, lines: Sequence[ChartLine]) -> Chart:
+        """A chart of one panel."""
+        return Chart(key, title, (unit,), (title,), analysis.t, tuple(lines))
+
     if first.sigma_min is not None:
-        least = np.array([sensed.sensor.least_sigma])
-        sigma = (ChartLine("σ_min of J", column(first.sigma_min)),)
-        title = "What the pose can tell: σ_min"
-        yield Chart(
-            "sigma_min",
-            title,
-            ("m",),
-            (title,),
-            t,
-            sigma,
-            band=least,
-            band_label="masked below",
-            lowest=0.0,
+        lines = [ChartLine("σ_min of J", first.sigma_min[:, None])]
+        yield chart("sigma_min", "What the pose can tell: σ_min", "m", lines)._replace(
+            band=np.array([least]), band_label="masked below", lowest=0.0
         )
     if sensed.hides:
-        blown = tuple(
-            ChartLine(w.name, masked_force(w.values, w.hidden), *styles[w.name])
-            for w in sensed.wrenches
-            if w.hidden.any()
-        )
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
-        yield Chart("blow-up", title, ("N",), (title,), t, blown)
+        blown = [w for w in sensed.wrenches if w.hidden.any()]
+        lines = [ChartLine(w.name, masked_force(w), *styles[w.name]) for w in blown]
+        yield chart("blow-up", title, "N", lines)
     if first.null_space is not None:
-        left = tuple(
-            ChartLine(w.name, column(w.null_space), *styles[w.name])
+        lines = [
+            ChartLine(w.name, w.null_space[:, None], *styles[w.name])
             for w in sensed.wrenches
             if w.null_space is not None
-        )
+        ]
         limit = np.array([e.threshold for e in sensed.elsewhere[:1]])
-        band = limit if limit.size else None
         title = "Torque that no wrench at the flange explains"
-        yield Chart(
-            "null_space", title, ("N·m",), (title,), t, left, band=band, band_label="free part"
+        yield chart("null_space", title, "N·m", lines)._replace(
+            band=limit if limit.size else None, band_label="free part"
         )
 
 
-def column(values: Array) -> Array:
-    """One series as a chart's only column. (T, 1)"""
-    return values[:, None]
-
-
-def masked_force(values: Array, hidden: Mask) -> Array:
+def masked_force(wrench: Wrench) -> Array:
     """Norm of the force in masked samples, NaN elsewhere. (T, 1) [N]"""
-    norm = np.linalg.norm(values[:, :3], axis=1)
-    return column(np.where(hidden, norm, np.nan))
+    norm = np.linalg.norm(wrench.values[:, :3], axis=1)
+    return np.where(wrench.hidden, norm, np.nan)[:, None]
 
 
 def refined_charts(analysis: Analysis) -> list[Chart]:
@@ -258,18 +249,10 @@ def spectra_chart(found: Spectra) -> Chart:
         ChartLine("free part, S_n", free, FREE),
         ChartLine("loaded part, S_d", level(found.loaded), LOADED, "5 2"),
     )
-    n = free.shape[1]
-    return Chart(
-        "spectra",
-        "Spectrum of the disturbance, dB of 1 (N·m)²/Hz",
-        ("dB",) * n,
-        joint_panels(free),
-        found.frequency[1:],
-        lines,
-        families=(1,) * n,
-        unit="Hz",
-        log=True,
-    )
+    title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
+    families = (1,) * free.shape[1]
+    chart = over_frequency("spectra", title, "dB", found.frequency[1:], lines)
+    return chart._replace(families=families)
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
@@ -278,16 +261,6 @@ def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
         for name, curve in curves.items()
     )
-    values = lines[0].values
-    x = [line.x for line in lines if line.x is not None]
-    ends = np.array([min(float(v.min()) for v in x), max(float(v.max()) for v in x)])
-    return Chart(
-        "curve",
-        "Expected error against natural frequency ω_n/2π",
-        ("N·m",) * values.shape[1],
-        joint_panels(values),
-        ends,
-        lines,
-        unit="Hz",
-        log=True,
-    )
+    x = np.concatenate([line.x for line in lines if line.x is not None])
+    title, ends = "Expected error against natural frequency ω_n/2π", np.array([x.min(), x.max()])
+    return over_frequency("curve", title, "N·m", ends, lines)

@@ -13,7 +13,6 @@ import numpy as np
 from vftcli.doctor import in_words
 from vftcli.outputs.answer import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
-from vftcli.outputs.grid import html
 from vftcli.outputs.page import svg
 from vftcli.outputs.page.charts import QUIET, Chart, LineStyle, packed_charts
 from vftcli.outputs.quantity import counted, ranged
@@ -34,7 +33,7 @@ def templates() -> "Environment":
     from markupsafe import Markup
 
     def shown(value: object) -> object:
-        """A value as HTML, escaped as `vftcli.outputs.grid` escapes it."""
+        """A value as HTML."""
         return value if hasattr(value, "__html__") else Markup(escape(printable(str(value))))
 
     made = Environment(
@@ -59,7 +58,6 @@ def templates() -> "Environment":
         "known": np.isfinite,
         "polyline": svg.polyline,
         "said": lambda line: explanation(line) if isinstance(line, Remark) else line,
-        "table": lambda grid: Markup(html(grid)),
         "warnings_of": warnings_of,
         "worst_first": worst_first,
     }
@@ -120,6 +118,6 @@ alarms, all_remarks = partial(part, "parts/alarms"), partial(part, "parts/all_re
 bullets, health = partial(part, "parts/bullets"), partial(part, "parts/health")
 lead, pairs, top = (partial(part, f"parts/{name}") for name in ("lead", "pairs", "top"))
 provenance, section = partial(part, "parts/provenance"), partial(part, "parts/section")
-soft = partial(part, "parts/soft")
+soft, table = partial(part, "parts/soft"), partial(part, "parts/table")
 axes, frame = partial(part, "svg/axes"), partial(part, "svg/svg")
 large, multiples = partial(part, "svg/large"), partial(part, "svg/multiples")
