@@ -90,7 +90,7 @@ def profiles() -> dict[str, Robot]:
 def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMatch, ...]]:
     """The profile that a log is from where the maker's own model settles it, and all fits.
 
-    A measured effort settles nothing: friction and loads leave several per cent of it open.
+    A measured effort settles nothing: friction and loads leave too much open.
     """
     fits = ranking(recording, profiles().values())
     if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:

@@ -254,8 +254,7 @@ MATTERS = 0.02
 def whole_arm(data: Training) -> MethodResult:
     """Base parameters by weighted least squares, and the robot of the nearest physical links.
 
-    Friction models are chosen twice: with the profile's links, and again with the links that come
-    out, so that an error of the profile does not count as friction.
+    Friction models are chosen twice, so that an error of the profile's links is no friction.
     """
     data, fits, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)

@@ -185,8 +185,7 @@ def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
     """A load from the same motion with and without it; which is which shows by itself.
 
-    The torque difference at the same phase is the load's, since friction and model errors are
-    alike in both, but for friction that grows with the load: that is fitted along.
+    The torque difference at the same phase is the load's, and friction's that grows with it.
     """
     for loaded, free in ((second, first), (first, second)):
         fit, sd, origin = solve_pair(loaded, free, robot)

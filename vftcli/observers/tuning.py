@@ -309,8 +309,8 @@ def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
     """How often an hour a Gaussian signal of this power spectrum leaves ±threshold. (n,)
 
-    Rice's formula, ν = (σ̇/2πσ) e^{−(h∓m)²/2σ²} for each side, with the power at 0 Hz as a constant
-    offset m. Friction is no Gaussian noise, so this is an estimate.
+    Rice's formula, ν = (σ̇/2πσ) e^{−(h∓m)²/2σ²} for each side, the power at 0 Hz a constant offset
+    m: an estimate, as friction is no Gaussian noise.
 
     References:
         S. O. Rice, "Mathematical analysis of random noise", Bell Syst. Tech. J. 23–24, 1944–45.

@@ -176,7 +176,7 @@ def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
 def expected_error(robot: Robot) -> ModelError:
     """Standard deviation of the model's error in every column, from the robot's own numbers.
 
-    An arm that measures behind its gears has no rotor in its torque.
+    Torque behind the gears has no rotor in it.
     """
     chain, friction = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
