@@ -178,25 +178,24 @@ def noise_of(
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
-    """What is free of contact, None where nothing is known to be.
+    """The free part of a log, None where there is none, or it is found and to be doubted.
 
-    Where in a free run or cycle the log's own motion lies does not matter here: nothing is paired.
+    Its remarks say of free runs that they are: nothing is paired with them.
     """
-    own, log, choice = motion.within_spans, motion.log, motion.choice
-    remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
-    if choice.cycles or not (choice.is_given or motion.runs):
-        if not choice.cycles and not repeats(motion):
-            return None
-        found = motion.free_cycles
-        own = own | np.isin(motion.cycles.number(log.t), found.numbers)
-        if not choice.cycles and is_touched(log, own):
-            return None
-        remarks.append(found.remark(motion.cycles.whole))
-    pieces = [RunSamples(log, own)] if own.any() else []
-    for run in motion.runs:
-        pieces.append(RunSamples(run.run, np.ones(run.recording.samples, dtype=bool)))
-        remarks.append(fact("free-log", Where(about=run.recording.name)))
-    return FreePart(tuple(pieces), own, tuple(remarks))
+    try:
+        part = motion.known
+    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
+        if motion.choice.is_given:
+            raise
+        return None
+    if part.doubted and (
+        motion.cycles.whole < LEAST_CYCLES
+        or not motion.free_cycles.numbers
+        or is_touched(motion.log, part.own)
+    ):
+        return None
+    runs = (fact("free-log", Where(about=run.recording.name)) for run in motion.runs)
+    return part._replace(remarks=(*part.remarks, *runs))
 
 
 def is_touched(log: Run, own: Mask) -> bool:
@@ -207,14 +206,6 @@ def is_touched(log: Run, own: Mask) -> bool:
     try:
         return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
     except ParameterError:  # too short for a spectrum
-        return False
-
-
-def repeats(motion: FreeMotion) -> bool:
-    """Whether the log has two cycles at least, and the quietest of them can be told."""
-    try:
-        return motion.cycles.whole >= LEAST_CYCLES and len(motion.free_cycles.numbers) > 0
-    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
         return False
 
 

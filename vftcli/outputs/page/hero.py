@@ -55,7 +55,7 @@ def told(found: ContactList) -> float | None:
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
     """Stretches of the log that are known to be free of contact. [s]"""
     try:
-        own = analysis.motion.part.own
+        own = analysis.motion.known.own
     except VftError:
         # Nothing is known to be free, which the list of contacts says.
         return []
