@@ -28,7 +28,7 @@ from vftcli.contacts.untouched import (
     observed,
     untouched_motion,
 )
-from vftcli.contacts.windows import BlockLog, BlockSpan, gate_of
+from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
@@ -37,6 +37,7 @@ from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.intervals import covered
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
@@ -239,7 +240,7 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
     spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
     course = error_course(fine.noise, blocks)
-    others = gate_of(len(blocks.t), [spans[k] for k in range(len(spans)) if k not in set(brief)])
+    others = covered([spans[k] for k in range(len(spans)) if k not in set(brief)], len(blocks.t), 1)
     white = np.where(others[:, None], UNKNOWN, course.white)
     some = found.kept(brief)._replace(
         log=BlockLog.of(blocks, course._replace(white=white)),

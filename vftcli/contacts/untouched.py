@@ -18,9 +18,7 @@ from vftcli.contacts.model_error import (
 from vftcli.contacts.places import places
 from vftcli.contacts.windows import (
     BlockLog,
-    ContactPrior,
     Lane,
-    gate_of,
     smooth_lanes,
     window_of,
 )
@@ -35,11 +33,12 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.intervals import near, runs_of
+from vftcli.signals.intervals import covered, near, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
@@ -267,7 +266,7 @@ class SelfTest(NamedTuple):
     smallest_force: float  #: |F| that 95 % of the blocks stay below. [N]
 
 
-def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
+def self_test(free: Untouched, robot: Robot, prior: WrenchPrior) -> SelfTest:
     """Make contacts up in free motion, whose wrench is zero, and see what is measured."""
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
@@ -275,11 +274,11 @@ def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
         made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
         if not made_up:
             continue
-        course = error_course(free.noise, blocks, gate_of(count, made_up))
+        course = error_course(free.noise, blocks, covered(made_up, count, 1))
         J = places(robot.loaded_chain, blocks.q)[0].jacobian
         nowhere = np.zeros(count, dtype=bool)
         lanes = [
-            Lane(window_of(blocks.t, run), gate_of(count, [run]), nowhere, J, prior)
+            Lane(window_of(blocks.t, run), covered([run], count, 1), nowhere, J, prior)
             for run in made_up
         ]
         measured = smooth_lanes(BlockLog.of(blocks, course), lanes)
