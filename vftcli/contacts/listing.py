@@ -143,7 +143,9 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
         recording=run.name,
         duration=run.recording.duration,
         contacts=numbered(told),
-        candidates=numbered(sorted((replace(row, inferred=True) for row in weak), key=start_of)),
+        candidates=numbered(
+            sorted((replace(row, inferred=True) for row in weak), key=lambda row: row.start)
+        ),
         basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
@@ -172,11 +174,6 @@ def carried(load: FreeLoad, run: Run) -> CarriedLoad:
     name = min(apart, key=lambda key: apart[key], default=None)
     alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
     return CarriedLoad(load.mass, load.sd, run.robot.name, name if alike else None, span)
-
-
-def start_of(row: Contact) -> float:
-    """When a contact begins. [s]"""
-    return row.start
 
 
 def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:

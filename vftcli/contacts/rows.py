@@ -30,7 +30,7 @@ from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
-from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
+from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the error of the
 #: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
@@ -306,13 +306,6 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     u = force / np.maximum(size, 1e-12)[:, None]
     variance = np.einsum("ki,kij,kj->k", u, covariance, u)
     return ForceCourse(t, size, NORMAL * np.sqrt(variance))
-
-
-def with_drives(force: Array, covariance: Array) -> Array:
-    """Covariances of forces with the share of them that the drives' constants hide. (K, 3, 3)"""
-    share: Array = DRIVES * force
-    found: Array = covariance + share[:, :, None] * share[:, None, :]
-    return found
 
 
 def vendor_force(run: Run, J: Array, peak: int, t: Array) -> float | None:

@@ -13,7 +13,6 @@ References:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -159,14 +158,6 @@ def long_stretches(blocks: Blocks) -> list[Blocks]:
     return [blocks.part(slice(*run)) for run in runs]
 
 
-class FittedNoise(NamedTuple):
-    """What one joint's spectrum gives."""
-
-    white: float  #: R. [(N·m)²]
-    variance: float  #: s². [(N·m)²]
-    time: float  #: T. [s]
-
-
 def fit_joints(stretches: Sequence[Blocks]) -> tuple[Array, Array, Array]:
     """R, s² and T of every joint, by Whittle's likelihood over all stretches together. (n,) each"""
     # A block holds whole samples, so that it is not quite as long as was asked.
@@ -188,7 +179,7 @@ def periodogram(d: Array, seconds: float) -> Array:
     return power
 
 
-def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNoise:
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
     The level follows in closed form, so that two numbers are left to search.
@@ -216,4 +207,4 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNo
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
         count = 5
     time, ratio = np.exp(best)
-    return FittedNoise(max(level, LEAST_NOISE), float(level * ratio), float(time))
+    return max(level, LEAST_NOISE), float(level * ratio), float(time)
