@@ -344,13 +344,12 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     """
     from vftcli.contacts.rows import loosened
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
-    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
     learned = found.model.prior
-    prior = None if learned is None else WrenchPrior(*loosened(learned))
+    prior = None if learned is None else loosened(learned)
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 

@@ -46,6 +46,7 @@ def test_a_named_span_is_the_free_part() -> None:
     (piece,) = part.pieces
     t = LOG.t[piece.inside]
     assert (t[0], t[-1]) == (pytest.approx(0.304), pytest.approx(4.0))
+    assert not part.doubted
     assert part.remarks[0].code == "free-span"
 
 

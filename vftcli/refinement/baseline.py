@@ -137,7 +137,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         spectra = spectra_of(RunSamples(log, ~part.own), known.samples)
     except ParameterError as error:
         return replace(known, missing=caution("no-spectra", reason=str(error)))
-    if motion.choice.is_given or looks_free(spectra):
+    if not part.doubted or looks_free(spectra):
         return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
     listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()

@@ -52,7 +52,7 @@ def timelines(analysis: Analysis, found: ContactList) -> list[Timeline]:
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
     """Stretches of the log that are known to be free of contact. [s]"""
     try:
-        own = analysis.motion.part.own
+        own = analysis.motion.known.own
     except VftError:
         # Nothing is known to be free, which the list of contacts says.
         return []
