@@ -1,6 +1,7 @@
 """The examination of a log: all findings, and whether its arm explains it."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.clock import clock_findings
@@ -11,10 +12,11 @@ from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import signal_findings, unusable_findings
 from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
+from vftcli.doctor.windows import spread
 from vftcli.robots import Robot
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.shown import Shown
 
 #: Findings that an arm's model is another's: what identification is for.
@@ -80,19 +82,37 @@ class Examination(Shown):
         return None
 
 
-def examine(recording: Recording, robot: Robot | None = None) -> Examination:
+#: Samples at most that are examined of a log in stretches, and samples of such a stretch.
+EXAMINED, STRETCH = 1 << 16, 1 << 10
+
+
+def stretches(recording: Recording) -> Recording:
+    """Stretches of a long log, evenly spread from start to end; a short one as it is."""
+    rows = spread(recording.samples, EXAMINED, STRETCH)
+    part = recording if len(rows) == recording.samples else recording.rows(rows)
+    recording.release()
+    return part
+
+
+def examine(
+    recording: Recording, robot: Robot | None = None, *, in_stretches: bool = False
+) -> Examination:
     """Examine a log; it is not changed.
 
     Args:
         recording: The log.
         robot: The arm it is from, its payload mounted; None to take the one that the log settles,
             or to look for it among the profiles.
+        in_stretches: Whether `stretches` of a long log are examined, and all of its clock, where
+            all of it has no room.
     """
-    if unusable := tuple(unusable_findings(recording)):
+    part = stretches(recording) if in_stretches else recording
+    if unusable := tuple(unusable_findings(part)):
         return Examination(recording=recording, findings=unusable, robots=())
-    velocities = velocity_fit(recording)
-    by_signal = (*clock_findings(recording, velocities), *signal_findings(recording, velocities))
-    by_arm, fits = arm_findings(recording, robot, by_signal)
+    velocities = velocity_fit(part)
+    by_clock = clock_findings(recording, velocities, part)
+    by_signal = (*by_clock, *signal_findings(part, velocities))
+    by_arm, fits = arm_findings(part, robot, by_signal)
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
@@ -101,13 +121,16 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     findings = [
         *cut_findings(recording),
         *by_signal,
-        *controller_findings(recording, best),
+        *controller_findings(part, best),
         *by_arm,
     ]
     said = {finding.code for finding in findings}
     if best is not None and not (LAGLESS | REFUSING) & said:
-        findings += effort_lag(recording, best)
+        findings += effort_lag(part, best)
     if best is not None:
-        findings += temperature_findings(recording, best)
+        findings += temperature_findings(part, best)
+    if part is not recording:
+        counts: dict[str, Any] = {"examined": part.samples, "samples": recording.samples}
+        findings.append(fact("examined-in-stretches", **counts))
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)

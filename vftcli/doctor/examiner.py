@@ -18,10 +18,8 @@ from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 
-#: Signals for the examination alone; temperatures where no friction follows them.
-ONLY_EXAMINED = frozenset(
-    ("target_q", "target_dq", "target_current", "target_torque", "temperature")
-)
+#: Samples of a block of a long log in which bad ones are looked for.
+BLOCK = 1 << 14
 
 
 class Examiner:
@@ -66,7 +64,9 @@ class Examiner:
         """All that were loaded, in their order."""
         return tuple(self._robots.values())
 
-    def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
+    def taken(
+        self, recording: Recording, robot: Robot, choice: ReadChoice, *, in_stretches: bool = False
+    ) -> Recording:
         """A log in its robot's joints, its effort read as the model explains it best if it is open.
 
         Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
@@ -74,16 +74,22 @@ class Examiner:
         Raises:
             RobotError: If the names of its joints are not the robot's.
         """
-        recording = without_bad_samples(unwound(paired(recording, robot), robot), robot)
+        recording = unwound(paired(recording, robot), robot)
+        # What no block of a long log shows has no room to be looked for in all of it at once.
+        blocks = recording.blocks(BLOCK) if in_stretches else ()
+        if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):
+            recording = without_bad_samples(recording, robot)
         if choice.effort != "auto":
             return recording
-        for finding in examine(recording, robot).findings:
+        for finding in examine(recording, robot, in_stretches=in_stretches).findings:
             if (right := CORRECTIONS.get(finding.code)) is not None:
                 name = effort_name(recording, robot)
                 return recording.with_effort(right.kind or name, source=name, factor=right.factor)
         return recording
 
-    def examine(self, recording: Recording, robot: Robot) -> Examination:
+    def examine(
+        self, recording: Recording, robot: Robot, *, in_stretches: bool = False
+    ) -> Examination:
         """The examination of a log as this arm's, made once.
 
         Raises:
@@ -93,7 +99,7 @@ class Examiner:
         for known, arm, examination in self._made:
             if known is recording and arm is robot:
                 return examination
-        found = examine(recording, robot)
+        found = examine(recording, robot, in_stretches=in_stretches)
         if not self._anyway:
             refuse(recording.name, found.refusals(fitting=self._fitting))
         self._made.append((recording, robot, found))
@@ -129,9 +135,3 @@ def refuse(name: str, findings: Iterable[Remark]) -> None:
     others = list(dict.fromkeys(other.name for other in found[1:]))
     more = f" Also: {', '.join(others)}." if others else ""
     raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
-
-
-def let_go_of_examined(recording: Recording, robot: Robot) -> None:
-    """Give back the memory of what nothing but the examination of a log looks at."""
-    warmed = any(joint.temperature for joint in robot.friction)
-    recording.let_go(ONLY_EXAMINED - {"temperature"} if warmed else ONLY_EXAMINED)

@@ -208,9 +208,9 @@ def warned(analysis: Analysis, examination: Examination, *, own: bool) -> Iterat
 
 def clock_ground(recording: Recording) -> Ground:
     """Gaps in the clock, and what was dropped, turned or derived in reading."""
-    steps = recording.steps
-    longest, at = steps[np.argmax(steps[:, 0])].tolist() if len(steps) else (0.0, 0.0)
-    gaps = int(np.count_nonzero(steps[:, 0] > 0.1))
+    t, steps = recording.t, np.diff(recording.t)
+    longest, at = (steps.max(), t[np.argmax(steps)]) if len(steps) else (0.0, 0.0)
+    gaps = int(np.count_nonzero(steps > 0.1))
     odd = [r for r in recording.source.remarks if r.level != "fact"]
     repaired = [r for r in recording.source.remarks if r.level == "fact"]
     words = f"no gap above {1e3 * longest:.0f} ms"
