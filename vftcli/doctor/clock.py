@@ -23,14 +23,16 @@ STALE = 0.003  #: Share of rows that repeat the one before, from which it is wor
 
 
 def clock_findings(
-    recording: Recording, fit: VelocityFit | None, part: Recording
+    recording: Recording,
+    fit: VelocityFit | None,
+    part: Recording | None = None,
 ) -> Iterator[Remark]:
     """Findings about the clock, each check independent of the others.
 
     Args:
         recording: The log.
         fit: How its velocities fit its positions.
-        part: The log, or stretches of it where all signals have no room.
+        part: Stretches of it where all signals have no room; None for all of it.
     """
     common = common_cause(fit)
     if common is not None and common.code in {"time-unit", "clock-rate"}:
@@ -51,7 +53,7 @@ def clock_findings(
         yield level(
             "repeated-stamps", repeats=source.duplicates, rows=source.rows, share_percent=share
         )
-    yield from stale_rows(part)
+    yield from stale_rows(part or recording)
 
 
 def uneven_steps(recording: Recording) -> Iterator[Remark]:

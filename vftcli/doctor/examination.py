@@ -95,7 +95,10 @@ def stretches(recording: Recording) -> Recording:
 
 
 def examine(
-    recording: Recording, robot: Robot | None = None, *, in_stretches: bool = False
+    recording: Recording,
+    robot: Robot | None = None,
+    *,
+    in_stretches: bool = False,
 ) -> Examination:
     """Examine a log; it is not changed.
 

@@ -65,7 +65,12 @@ class Examiner:
         return tuple(self._robots.values())
 
     def taken(
-        self, recording: Recording, robot: Robot, choice: ReadChoice, *, in_stretches: bool = False
+        self,
+        recording: Recording,
+        robot: Robot,
+        choice: ReadChoice,
+        *,
+        in_stretches: bool = False,
     ) -> Recording:
         """A log in its robot's joints, its effort read as the model explains it best if it is open.
 
@@ -88,7 +93,11 @@ class Examiner:
         return recording
 
     def examine(
-        self, recording: Recording, robot: Robot, *, in_stretches: bool = False
+        self,
+        recording: Recording,
+        robot: Robot,
+        *,
+        in_stretches: bool = False,
     ) -> Examination:
         """The examination of a log as this arm's, made once.
 

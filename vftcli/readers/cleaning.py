@@ -9,7 +9,14 @@ import numpy as np
 
 from vftcli.readers.joining import joined
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import Array, Indices, Mask, handed_over, median, pieces
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    handed_over,
+    median,
+    pieces,
+)
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact

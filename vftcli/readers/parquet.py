@@ -17,7 +17,12 @@ import numpy as np
 
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.opening import check_unpacked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
+from vftcli.readers.reader import (
+    LogFile,
+    RawLog,
+    ReadChoice,
+    episode_of,
+)
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError

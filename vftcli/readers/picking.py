@@ -10,7 +10,13 @@ import numpy as np
 from vftcli.readers.joining import joined
 from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.table import Column, LongTable, Pick, Picks, Table
+from vftcli.readers.table import (
+    Column,
+    LongTable,
+    Pick,
+    Picks,
+    Table,
+)
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step
@@ -94,7 +100,11 @@ def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
 
 
 def _stamps(
-    table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int, clock_name: str
+    table: Table,
+    picks: Picks,
+    loaded: Mapping[int, Column],
+    rows: int,
+    clock_name: str,
 ) -> tuple[Column, float, str]:
     """The stamps, the length of their tick and which clock they are."""
     stamps = _ticks(table, picks, loaded, rows)

@@ -35,20 +35,19 @@ def is_sealed(value: NDArray[Any]) -> bool:
     owner = value.base
     if owner is None or value.flags.writeable:
         return not value.flags.writeable
-    return is_sealed(owner) if isinstance(owner, np.ndarray) else is_mapped(owner)
+    if isinstance(owner, np.ndarray):
+        return is_sealed(owner)
+    # The memory of a file that nobody can write to through it.
+    return isinstance(owner, memoryview) and owner.readonly and isinstance(owner.obj, mmap.mmap)
 
 
-def is_mapped(memory: object) -> bool:
-    """Whether memory is that of a file which nobody can write to through it."""
-    return isinstance(memory, memoryview) and memory.readonly and isinstance(memory.obj, mmap.mmap)
-
-
-def release(memory: Any) -> None:  # noqa: ANN401 - an array, or what it is a view of
+def release(memory: object) -> None:
     """Let go of the pages of a mapped file that were touched so far; they can be read again."""
     while isinstance(memory, np.ndarray):
         memory = memory.base
-    if is_mapped(memory) and hasattr(mmap, "MADV_DONTNEED"):
-        memory.obj.madvise(mmap.MADV_DONTNEED)
+    mapped = memory.obj if isinstance(memory, memoryview) else None
+    if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        mapped.madvise(mmap.MADV_DONTNEED)
 
 
 def pieces(values: NDArray[Any], size: int = 1 << 16) -> Iterator[NDArray[Any]]:

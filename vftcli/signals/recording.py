@@ -16,7 +16,11 @@ from vftcli.signals.arrays import (
     release,
     seal,
 )
-from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+from vftcli.signals.errors import (
+    ClockError,
+    MissingSignalError,
+    ShapeError,
+)
 from vftcli.signals.names import COLUMN_NAMES, EFFORTS, JOINT_SIGNALS, MEANINGS
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import fact

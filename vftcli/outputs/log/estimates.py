@@ -1,7 +1,12 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import (
+    Callable,
+    Iterable,
+    Iterator,
+    Sequence,
+)
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
