@@ -17,7 +17,7 @@ from vftcli.signals.errors import LogError
 HELD = 1 << 22
 
 
-class Rows:
+class JoinedRows:
     """The rows of a signal, part by part.
 
     Attributes:
@@ -80,10 +80,10 @@ def joined(parts: Iterable[Mapping[str, Array]]) -> dict[str, Array]:
     Raises:
         LogError: If there are no parts, or no room for them.
     """
-    found: dict[str, Rows] = {}
+    found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():
-            found.setdefault(name, Rows()).add(rows)
+            found.setdefault(name, JoinedRows()).add(rows)
     if not found:
         raise LogError("the log has no rows; nothing was recorded into it")
     return {name: rows.whole() for name, rows in found.items()}

@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
 from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
 from vftcli.readers.bags.ros_messages import types_for
-from vftcli.readers.joining import Rows
+from vftcli.readers.joining import JoinedRows
 from vftcli.readers.joints import in_order, kinematic_order
 from vftcli.readers.table import Column
 from vftcli.signals.arrays import Array
@@ -127,7 +127,7 @@ class Stream:
         yield from ((name, value) for name, value in times if value is not None)
         yield from self.signals.items()
 
-    def with_series(self, rows: Mapping[str, Rows]) -> "Stream":
+    def with_series(self, rows: Mapping[str, JoinedRows]) -> "Stream":
         """The stream with other times and signals, those that have one width in every message."""
         count = rows["receive"].count
         found = {
@@ -165,7 +165,7 @@ class _Topic:
     #: The parts of the batch at hand.
     parts: dict[_Key, list[_Part]] = field(default_factory=dict)
     #: The streams of the first batches, and the times and signals of all batches.
-    streams: dict[_Key, tuple[Stream, dict[str, Rows]]] = field(default_factory=dict)
+    streams: dict[_Key, tuple[Stream, dict[str, JoinedRows]]] = field(default_factory=dict)
     constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
     seen: int = 0
 
@@ -197,7 +197,7 @@ class Decoder:
                 first, series = topic.streams.setdefault(key, (stream, {}))
                 first.mixed |= stream.mixed
                 for name, value in stream.series():
-                    series.setdefault(name, Rows()).add(value)
+                    series.setdefault(name, JoinedRows()).add(value)
             topic.parts.clear()
         except LayoutError as error:
             raise LogError(
