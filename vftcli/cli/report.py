@@ -61,7 +61,6 @@ def report(
     names = report_files([library.label(log) for log in logs], written.extras, form)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
-    choice = replace(choice, spares_memory=True)
     if published is not None:
         check_published(published, reference.reference)
         choice = replace(choice, observers=choice.observers.beside_print())

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from typing import Any
 
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import cut_findings, without_bad_samples
@@ -12,6 +13,7 @@ from vftcli.doctor.load import controller_findings
 from vftcli.doctor.signals import clock_findings, signal_findings, unusable_findings
 from vftcli.doctor.temperature import temperature_findings
 from vftcli.doctor.velocity import velocity_fit
+from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
@@ -87,19 +89,40 @@ class Examination(Shown):
         return None
 
 
-def examine(recording: Recording, robot: Robot | None = None) -> Examination:
+#: Samples at most that are examined of a log in stretches, and samples of such a stretch.
+EXAMINED, STRETCH = 1 << 16, 1 << 10
+
+
+def stretches(recording: Recording) -> Recording:
+    """Stretches of a long log, evenly spread from start to end; a short one as it is."""
+    rows = spread(recording.samples, EXAMINED, STRETCH)
+    part = recording if len(rows) == recording.samples else recording.rows(rows)
+    recording.release()
+    return part
+
+
+def examine(
+    recording: Recording,
+    robot: Robot | None = None,
+    *,
+    in_stretches: bool = False,
+) -> Examination:
     """Examine a log; it is not changed.
 
     Args:
         recording: The log.
         robot: The arm it is from, its payload mounted; None to take the one that the log settles,
             or to look for it among the profiles.
+        in_stretches: Whether `stretches` of a long log are examined, and all of its clock, where
+            all of it has no room.
     """
-    if unusable := tuple(unusable_findings(recording)):
+    part = stretches(recording) if in_stretches else recording
+    if unusable := tuple(unusable_findings(part)):
         return Examination(recording=recording, findings=unusable, robots=())
-    velocities = velocity_fit(recording)
-    by_signal = (*clock_findings(recording, velocities), *signal_findings(recording, velocities))
-    by_arm, fits = arm_findings(recording, robot, by_signal)
+    velocities = velocity_fit(part)
+    by_clock = clock_findings(recording, velocities, part)
+    by_signal = (*by_clock, *signal_findings(part, velocities))
+    by_arm, fits = arm_findings(part, robot, by_signal)
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
@@ -108,22 +131,23 @@ def examine(recording: Recording, robot: Robot | None = None) -> Examination:
     findings = [
         *cut_findings(recording),
         *by_signal,
-        *controller_findings(recording, best),
+        *controller_findings(part, best),
         *by_arm,
     ]
     said = {finding.code for finding in findings}
     if best is not None and not (LAGLESS | REFUSING) & said:
-        findings += effort_lag(recording, best)
+        findings += effort_lag(part, best)
     if best is not None:
-        findings += temperature_findings(recording, best)
+        findings += temperature_findings(part, best)
+    if part is not recording:
+        counts: dict[str, Any] = {"examined": part.samples, "samples": recording.samples}
+        findings.append(fact("examined-in-stretches", **counts))
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)
 
 
-#: Signals for the examination alone; temperatures where no friction follows them.
-ONLY_EXAMINED = frozenset(
-    ("target_q", "target_dq", "target_current", "target_torque", "temperature")
-)
+#: Samples of a block of a long log in which bad ones are looked for.
+BLOCK = 1 << 14
 
 
 class Examiner:
@@ -168,7 +192,14 @@ class Examiner:
         """All that were loaded, in their order."""
         return tuple(self._robots.values())
 
-    def taken(self, recording: Recording, robot: Robot, choice: ReadChoice) -> Recording:
+    def taken(
+        self,
+        recording: Recording,
+        robot: Robot,
+        choice: ReadChoice,
+        *,
+        in_stretches: bool = False,
+    ) -> Recording:
         """A log in its robot's joints, its effort read as the model explains it best if it is open.
 
         Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
@@ -176,16 +207,26 @@ class Examiner:
         Raises:
             RobotError: If the names of its joints are not the robot's.
         """
-        recording = without_bad_samples(unwound(paired(recording, robot), robot), robot)
+        recording = unwound(paired(recording, robot), robot)
+        # What no block of a long log shows has no room to be looked for in all of it at once.
+        blocks = recording.blocks(BLOCK) if in_stretches else ()
+        if not in_stretches or any(without_bad_samples(b, robot) is not b for b in blocks):
+            recording = without_bad_samples(recording, robot)
         if choice.effort != "auto":
             return recording
-        for finding in examine(recording, robot).findings:
+        for finding in examine(recording, robot, in_stretches=in_stretches).findings:
             if (right := CORRECTIONS.get(finding.code)) is not None:
                 name = effort_name(recording, robot)
                 return recording.with_effort(right.kind or name, source=name, factor=right.factor)
         return recording
 
-    def examine(self, recording: Recording, robot: Robot) -> Examination:
+    def examine(
+        self,
+        recording: Recording,
+        robot: Robot,
+        *,
+        in_stretches: bool = False,
+    ) -> Examination:
         """The examination of a log as this arm's, made once.
 
         Raises:
@@ -195,7 +236,7 @@ class Examiner:
         for known, arm, examination in self._made:
             if known is recording and arm is robot:
                 return examination
-        found = examine(recording, robot)
+        found = examine(recording, robot, in_stretches=in_stretches)
         if not self._anyway:
             refuse(recording.name, found.refusals(fitting=self._fitting))
         self._made.append((recording, robot, found))
@@ -231,9 +272,3 @@ def refuse(name: str, findings: Iterable[Remark]) -> None:
     others = list(dict.fromkeys(other.name for other in found[1:]))
     more = f" Also: {', '.join(others)}." if others else ""
     raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
-
-
-def let_go_of_examined(recording: Recording, robot: Robot) -> None:
-    """Give back the memory of what nothing but the examination of a log looks at."""
-    warmed = any(joint.temperature for joint in robot.friction)
-    recording.let_go(ONLY_EXAMINED - {"temperature"} if warmed else ONLY_EXAMINED)

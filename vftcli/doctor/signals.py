@@ -12,6 +12,7 @@ from vftcli.signals.names import EFFORTS, JOINT_SIGNALS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.rest import NONZERO
+from vftcli.signals.series import gaps_of
 
 SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
 #: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
@@ -23,8 +24,18 @@ SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion
 STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
 
 
-def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """Findings about the clock, each check independent of the others."""
+def clock_findings(
+    recording: Recording,
+    fit: VelocityFit | None,
+    part: Recording | None = None,
+) -> Iterator[Remark]:
+    """Findings about the clock, each check independent of the others.
+
+    Args:
+        recording: The log.
+        fit: How its velocities fit its positions.
+        part: Stretches of it where all signals have no room; None for all of it.
+    """
     common = common_cause(fit)
     if common is not None and common.code in {"time-unit", "clock-rate"}:
         yield common
@@ -44,18 +55,19 @@ def clock_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Re
         yield level(
             "repeated-stamps", repeats=source.duplicates, rows=source.rows, share_percent=share
         )
-    yield from stale_rows(recording)
+    yield from stale_rows(part or recording)
 
 
 def uneven_steps(recording: Recording) -> Iterator[Remark]:
     """Samples that were missed, and steps that vary."""
-    steps = np.diff(recording.t)
     usual = recording.median_step
+    steps = np.diff(recording.t)
     missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
     if missed > 0.001 * len(steps):
         yield fact("missing-samples", missed=missed, steps=len(steps))
     # A gap is no jitter: it has its own finding.
-    low, high = np.percentile(steps[steps < GAP_STEPS * usual], [5, 95])
+    steps = steps[steps < GAP_STEPS * usual]
+    low, high = np.percentile(steps, [5, 95], overwrite_input=True)
     spread = float(high - low) / usual
     if spread > JITTER:
         yield fact(
@@ -69,14 +81,14 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
 
 def long_steps(recording: Recording) -> Iterator[Remark]:
     """Gaps, with the longest of them."""
-    steps = recording.steps
-    gaps = steps[steps[:, 0] > GAP_STEPS * recording.median_step]
+    t, at = recording.t, gaps_of(recording.t, GAP_STEPS)
+    gaps = np.column_stack([t[at + 1] - t[at], t[at]])
     for cut in recording.source.cuts:  # has a finding of its own
         gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
     if len(gaps):
-        longest, at = gaps[np.argmax(gaps[:, 0])].tolist()
+        longest, begun = gaps[np.argmax(gaps[:, 0])].tolist()
         level = warning if longest > LONG_GAP else fact
-        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=at)
+        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)
 
 
 def stale_rows(recording: Recording) -> Iterator[Remark]:

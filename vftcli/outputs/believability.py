@@ -181,9 +181,9 @@ def finding_grounds(analysis: Analysis) -> Iterator[Ground]:
 
 def clock_ground(recording: Recording) -> Ground:
     """Gaps in the clock, and what was dropped, turned or derived in reading."""
-    steps = recording.steps
-    longest, at = steps[np.argmax(steps[:, 0])].tolist() if len(steps) else (0.0, 0.0)
-    gaps = int(np.count_nonzero(steps[:, 0] > 0.1))
+    t, steps = recording.t, np.diff(recording.t)
+    longest, at = (steps.max(), t[np.argmax(steps)]) if len(steps) else (0.0, 0.0)
+    gaps = int(np.count_nonzero(steps > 0.1))
     told = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
     odd = gaps > 0 or any(remark.level != "fact" for remark in told)
     words = f"no gap above {1e3 * longest:.0f} ms"

@@ -1,9 +1,8 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
 import math
-import mmap
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Self
 from vftcli.readers.columns import ColumnSpec, parse_columns
 from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array, Indices, release
 from vftcli.signals.derivation import is_fast, with_velocity
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.recording import Recording
@@ -56,9 +55,7 @@ class LogFile:
 
     def release(self) -> None:
         """Let go of the pages of a mapped file that were touched so far; they can be read again."""
-        mapped = self.content.obj
-        if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-            mapped.madvise(mmap.MADV_DONTNEED)
+        release(self.content)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -112,9 +109,6 @@ class RawLog:
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     part: str = ""
     files: tuple[Path, ...] = ()  #: The files of a folder that it was read from; () for all.
-    #: What follows in the file, block by block, where this is the first of several; None where it
-    #: is all.
-    rest: "Iterator[RawLog] | None" = None
     #: Which rows of the file these are, counted from 0; None for all. (T,)
     rows: Indices | None = None
     #: Rows of the file that were left out because a value is no number.
@@ -130,10 +124,6 @@ class RawLog:
             return self
         mass, *com = constants
         return replace(self, constants=constants, payload_mass=mass, payload_com=tuple(com))
-
-
-class InOnePieceError(Exception):
-    """A log that was to come in blocks has to be read whole: only that tells what is odd."""
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
@@ -175,7 +165,6 @@ class ReadChoice:
     arm: str | None = None  #: Which arm of a log of two, a member of `ARMS`; None for the only one.
     #: Whether the log is only looked at, where a part and a word say more than a refusal.
     examining: bool = False
-    blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
     #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
 

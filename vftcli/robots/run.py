@@ -157,6 +157,7 @@ class Run(Shown):
         That takes less time than a pass of the observers, and all of a log's results have no room
         beside it.
         """
+        self.recording.release()
         if self.recording.samples > LONG and "terms" in vars(self):
             _ = self.noise
             del vars(self)["terms"]

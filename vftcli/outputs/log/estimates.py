@@ -1,7 +1,11 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import (
+    Iterable,
+    Iterator,
+    Sequence,
+)
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,6 +31,8 @@ if TYPE_CHECKING:
 
 
 ALL = slice(None)  #: All rows of a table.
+#: An analysis and which of its rows are written; None where all of them went by in blocks.
+Group = tuple[Analysis, slice | None]
 #: Rows from which on a table is written as several groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
 
@@ -105,10 +111,12 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         )
 
 
-def write_groups(
-    path: Path, groups: Iterable[tuple[Analysis, slice]], csv: Path | None = None
-) -> None:
-    """Write the table of a long log as groups of rows: all of it has no room beside the log."""
+def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
+    """Write the table of a long log as groups of rows: all of it has no room beside the log.
+
+    Returns:
+        The analysis of the last group.
+    """
     pq = needed("pyarrow.parquet", "the estimates of a long log")
 
     # Measured numbers hardly repeat: a dictionary of them costs time and room.
@@ -117,6 +125,8 @@ def write_groups(
     with ExitStack() as files:
         file = files.enter_context(table_file(path))
         for analysis, rows in groups:
+            if rows is None:
+                continue
             table = estimates_table(analysis, rows)
             if schema is None:
                 schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
@@ -128,6 +138,7 @@ def write_groups(
             writer.write_table(table.to_arrow().cast(schema))
             if csv is not None:
                 table.write_csv(text, include_header=False, float_precision=9)
+    return analysis
 
 
 def doubts_of(analysis: Analysis) -> dict[str, str]:
@@ -188,38 +199,32 @@ def write_extras(
 
 def write_estimate_folder(
     path: Path,
-    analysis: Analysis,
+    analysis: Analysis | Iterator[Group],
     command: str,
     choice: OutputChoice = PLAIN,
     force: bool = False,
-) -> str:
+) -> tuple[Analysis, str]:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
-    Returns:
-        The text of `run.json`.
-    """
-    record = run_record(analysis, command)
-    with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
-        write_estimates(folder / "estimates.parquet", analysis)
-        # After the record: it names the packages that are loaded, and these made no number.
-        write_extras(folder, "", analysis, choice)
-        return seal(folder, SEAL, record)
-
-
-def write_long_estimates(
-    path: Path,
-    blocks: Iterable[Analysis],
-    whole: Callable[[], Analysis],
-    command: str,
-    choice: OutputChoice = PLAIN,
-    force: bool = False,
-) -> str:
-    """Write the folder of a long log as `write_estimate_folder` does, block by block.
+    Args:
+        path: The folder.
+        analysis: The analysis of the log; of a long log its groups, with CSV as the only extra.
+        command: The command line.
+        choice: Which extras are written.
+        force: Whether an existing folder may be replaced.
 
     Returns:
-        The text of `run.json`.
+        The analysis of the whole log, and the text of `run.json`.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
-        csv = folder / "estimates.csv" if "csv" in choice.extras else None
-        write_groups(folder / "estimates.parquet", ((block, ALL) for block in blocks), csv)
-        return seal(folder, SEAL, run_record(whole(), command))
+        table = folder / "estimates.parquet"
+        if isinstance(analysis, Analysis):
+            record = run_record(analysis, command)
+            write_estimates(table, analysis)
+            # After the record: it names the packages that are loaded, and these made no number.
+            write_extras(folder, "", analysis, choice)
+        else:
+            csv = folder / "estimates.csv" if "csv" in choice.extras else None
+            analysis = write_groups(table, analysis, csv)
+            record = run_record(analysis, command)
+        return analysis, seal(folder, SEAL, record)
