@@ -54,7 +54,6 @@ KNOWN = {("evaluation", "refinement"), ("contacts", "refinement")}
 """Pairs of those that do, the first the second."""
 
 FILES = (
-    "batch/shipping.py",  # unpacks what was sent
     "cli/",  # asks before it overwrites
     "batch/datasets/",
     "outputs/",

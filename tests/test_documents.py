@@ -148,7 +148,7 @@ def test_the_summaries_of_help_are_the_commands_own() -> None:
 
 
 def test_every_observer_and_robot_is_documented() -> None:
-    from vftcli.observers import OBSERVERS
+    from vftcli.observers.table import OBSERVERS
     from vftcli.robots import PROFILES
 
     observers = (ROOT / "docs" / "observers.md").read_text("utf-8")

@@ -375,9 +375,7 @@ WITHOUT_ROW = {
     "absurd-steps": UNREAD,
     "absurd-values": UNREAD,
     "apparent-load": "names a command; tried below",
-    "bandwidth-matched": NAMED,
     "current-without-gravity": "asks for a log with other numbers",
-    "delay-matched": NAMED,
     "effort-offset": "a command; tried below",
     "episode-taken-first": "says how an episode is chosen; tried as episode-taken",
     "field-taken": NAMED,
@@ -438,7 +436,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
     monkeypatch.chdir(tmp_path)
     said = told("effort-offset", printed(planted("offset_J3_20pct")(tmp_path))[1])
     assert said is not None
-    (shift,) = re.findall(r"is shifted by (\S+) ", said)
+    (shift,) = re.findall(r"has an offset of (\S+) ", said)
     (how,) = re.findall("identify --interval A:B --method (friction) -o FILE.toml", said)
     search = ("identify", "--interval", "0.3:4", "--method", how, "-o", "own.toml")
     code, text = printed(planted("offset_J3_20pct", *search)(tmp_path))

@@ -342,10 +342,10 @@ WITHOUT_ROW = {
         "--derive dq makes them", "gravity would be written as force",
     ),
     CLUSTER: (
-        "leave --ship out", "add --scheduler ADDRESS", "need Dask and cryptography",
+        "add --scheduler ADDRESS", "need Dask and cryptography",
         "(all three) belong together", "leave --workers out", "are given together",
         "can run code as you", "workers need a certificate", "no Dask scheduler answers",
-        "has no worker; start some", "send the logs there with --ship",
+        "has no worker; start some",
     ),
     LONG: ("cannot be mended: leave out --causal",),
 }  # fmt: skip

@@ -2,7 +2,6 @@
 
 import importlib
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli import streaming
-from vftcli.analysis import Analysis
 from vftcli.cli import app
+from vftcli.doctor import examination
+from vftcli.robots.terms import DynamicsTerms, RunningTerms
+from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 
@@ -23,12 +24,16 @@ def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every table counts as a long log, in blocks of 320 samples."""
     monkeypatch.setattr(importlib.import_module("vftcli.readers.picking"), "WHOLE_ROWS", 0)
     monkeypatch.setattr(importlib.import_module("vftcli.readers.delimited"), "BLOCK_BYTES", 1 << 16)
+    monkeypatch.setattr(importlib.import_module("vftcli.readers.joining"), "HELD", 1 << 14)
+    monkeypatch.setattr(streaming, "WHOLE_ROWS", 0)
     monkeypatch.setattr(streaming, "PIECE", 320)
 
 
-def estimated(folder: Path, *words: str) -> tuple[pl.DataFrame, dict[str, Any]]:
-    """The table and the record of an estimate of the fixture."""
-    command = ["estimate", str(FIXTURE), "--robot", "ur5", "-o", str(folder), *words]
+def estimated(
+    folder: Path, *words: str, log: Path = FIXTURE
+) -> tuple[pl.DataFrame, dict[str, Any]]:
+    """The table and the record of an estimate of a log, the fixture's if none is given."""
+    command = ["estimate", str(log), "--robot", "ur5", "-o", str(folder), *words]
     done = CliRunner().invoke(app, command, catch_exceptions=False)
     assert done.exit_code == 0, done.output
     record = json.loads((folder / "run.json").read_text("utf-8"))
@@ -42,13 +47,14 @@ def estimated(folder: Path, *words: str) -> tuple[pl.DataFrame, dict[str, Any]]:
         ("--causal",),
         ("--causal", "--as-printed"),
         ("--causal", "--wrench", "--observer", "kfo-zoh"),
-        ("--no-contacts", "--observer", "kfo-rts", "--observer", "gmo"),
+        ("--no-contacts", "--observer", "gmo"),
+        ("--causal", "--interval", "2:9"),
     ],
 )
 def test_numbers_and_record_of_the_whole(
     tmp_path: Path, request: pytest.FixtureRequest, words: tuple[str, ...]
 ) -> None:
-    """All columns to 1e-9 N·m, the bar of the smoother; blocks are shorter than its pieces."""
+    """All columns to 1e-9 N·m: sums of filters in another order, as blocks cut their pieces."""
     whole, of_whole = estimated(tmp_path / "whole", *words, "--csv")
     request.getfixturevalue("in_blocks")
     made, record = estimated(tmp_path / "blocks", *words, "--csv")
@@ -67,15 +73,15 @@ def test_numbers_and_record_of_the_whole(
 @pytest.mark.usefixtures("in_blocks")
 def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that ends in the middle of a log leaves no folder."""
-    whole = streaming.BlockAnalysis.blocks
+    whole, blocks = RunningTerms.next, []
 
-    def broken(self: streaming.BlockAnalysis) -> Iterator[Analysis]:
-        for number, block in enumerate(whole(self)):
-            if number == 3:
-                raise KeyboardInterrupt
-            yield block
+    def broken(terms: RunningTerms, block: Recording) -> DynamicsTerms:
+        blocks.append(block)
+        if len(blocks) == 3:
+            raise KeyboardInterrupt
+        return whole(terms, block)
 
-    monkeypatch.setattr(streaming.BlockAnalysis, "blocks", broken)
+    monkeypatch.setattr(streaming.RunningTerms, "next", broken)
     command = ["estimate", str(FIXTURE), "--robot", "ur5", "-o", str(tmp_path / "out"), "--causal"]
     CliRunner().invoke(app, command)
     assert list(tmp_path.iterdir()) == []
@@ -84,7 +90,7 @@ def test_interruption_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyP
 @pytest.mark.slow
 @pytest.mark.usefixtures("in_blocks")
 def test_wrong_robot_is_refused_before_anything_is_written(tmp_path: Path) -> None:
-    """The stretches that are drawn tell what the whole log tells."""
+    """The stretches that are examined tell what the whole log tells."""
     command = ["estimate", str(FIXTURE), "--robot", "ur10", "-o", str(tmp_path / "o"), "--causal"]
     done = CliRunner().invoke(app, command)
     assert done.exit_code != 0
@@ -97,3 +103,36 @@ def test_what_needs_the_whole_log_has_it(tmp_path: Path) -> None:
     made, record = estimated(tmp_path / "o", "--causal", "--wrench", "--zero", "0:1")
     assert "wrench/gmo/fx" in made.columns
     assert record["input"]["samples"] == len(made)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", [("--causal",), ("--causal", "--wrench")])
+def test_bad_samples_are_cut_out_as_of_the_whole(
+    tmp_path: Path, request: pytest.FixtureRequest, words: tuple[str, ...]
+) -> None:
+    """A velocity that no arm has, in the last tenth: the row goes, and the numbers are equal."""
+    path, rows = tmp_path / "log.csv", pl.read_csv(FIXTURE, separator=" ")
+    late, speed = pl.int_range(rows.height) == int(0.95 * rows.height), pl.col("actual_qd_2")
+    rows = rows.with_columns(pl.when(late).then(3.0).otherwise(speed).alias("actual_qd_2"))
+    rows.write_csv(path, separator=" ")
+    whole, of_whole = estimated(tmp_path / "whole", *words, log=path)
+    request.getfixturevalue("in_blocks")
+    made, record = estimated(tmp_path / "blocks", *words, log=path)
+    assert len(made) == len(whole) == rows.height - 1
+    for column in whole.columns:
+        known = whole[column].to_numpy()
+        np.testing.assert_allclose(made[column].to_numpy(), known, rtol=0, atol=1e-9)
+    codes = [finding["code"] for finding in record["examination"][0]["findings"]]
+    assert codes == [finding["code"] for finding in of_whole["examination"][0]["findings"]]
+    assert "isolated-velocity" in codes
+
+
+@pytest.mark.usefixtures("in_blocks")
+def test_a_log_that_is_examined_in_stretches_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(examination, "EXAMINED", 1000)
+    monkeypatch.setattr(examination, "STRETCH", 100)
+    made, record = estimated(tmp_path / "o", "--causal")
+    found = {each["code"]: each for each in record["examination"][0]["findings"]}
+    assert found["examined-in-stretches"]["values"] == {"examined": 1000, "samples": len(made)}

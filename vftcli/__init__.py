@@ -51,10 +51,11 @@ if TYPE_CHECKING:
     from vftcli.robots import Payload, Robot, load_robot
     from vftcli.robots.choice import RobotChoice
     from vftcli.robots.kinematics import flange_jacobian, link_poses
-    from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+    from vftcli.robots.terms import dynamics_terms
     from vftcli.signals.errors import VftError
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
+    from vftcli.signals.terms import DynamicsTerms
     from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 __version__ = VERSION
@@ -63,7 +64,7 @@ __version__ = VERSION
 HOMES = {
     "Analysis": "analysis",
     "AnalysisChoice": "pipeline",
-    "DynamicsTerms": "robots.terms",
+    "DynamicsTerms": "signals.terms",
     "ExternalTorque": "signals.external_torque",
     "FilteredDynamicsObserver": "observers",
     "FreeChoice": "repetition.choice",

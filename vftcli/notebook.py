@@ -226,7 +226,7 @@ def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
         ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
     """
     from vftcli.contacts.tail import SETTLING
-    from vftcli.evaluation.obvious_contacts import PLAIN, touches
+    from vftcli.evaluation.references import PLAIN, touches
 
     known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
     found = [touch for touch in known if touch.stop > run.t[0] + SETTLING]

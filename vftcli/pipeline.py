@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vftcli.doctor.examiner import Examiner, let_go_of_examined
+from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.estimates import refuse_estimates
@@ -60,8 +60,6 @@ class AnalysisChoice:
     library: Library = field(default_factory=Library, repr=False, compare=False)
     #: Who examines them, each once, and says whether results mean anything.
     examiner: Examiner = field(default_factory=Examiner, repr=False, compare=False)
-    #: Whether what only the examination looks at of a log is let go after it.
-    spares_memory: bool = False
     #: Told what is being done, and from which share of a log's work to which.
     progress: Callable[[str, float, float], None] = field(
         default=no_stage, repr=False, compare=False
@@ -233,8 +231,7 @@ def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", 
     """
     runs = [motion.log, *(free.run for free in motion.runs)]
     found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
-    if choice.spares_memory:
-        let_go_of_examined(motion.log.recording, motion.log.robot)
+    motion.log.recording.release()  # much of it is only examined
     return tuple(dict.fromkeys(found))
 
 
@@ -242,15 +239,19 @@ def model(motion: FreeMotion, choice: AnalysisChoice) -> "Baselines | None":
     """The log's free part, spectra and bias, None where nothing asks for them."""
     if not choice.looks_back:
         return None
-    from vftcli.refinement.correction import find_baselines
+    from vftcli.refinement.baseline import find_baselines
 
     return find_baselines(motion, choice.refinement, best=BEST in choice.observers.names)
 
 
 def observe(
-    motion: FreeMotion, baselines: "Baselines | None", choice: AnalysisChoice
+    motion: FreeMotion,
+    baselines: "Baselines | None",
+    choice: AnalysisChoice,
+    *,
+    running: bool = True,
 ) -> "Analysis":
-    """Run the observers along the log."""
+    """Run the observers along the log; if not `running`, only build them for it."""
     from vftcli.analysis import Analysis
     from vftcli.signals.remarks import caution
 
@@ -259,13 +260,12 @@ def observe(
     shown = NOT_SHOWN if baselines is None else baselines.spectra(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
-    whole = observers if log.recording.long is None else ()  # of a long log, block by block
     return Analysis(
         motion=motion,
         observers=observers,
         estimates=tuple(
             run(o, (log if baselines is None else baselines.of(o.name).of(log)).terms)
-            for o in whole
+            for o in (observers if running else ())
         ),
         tunings={o.name: o.tuning(step, log.robot.joints) for o in observers},
         remarks=(*remarks, *printed),
@@ -344,13 +344,12 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     """
     from vftcli.contacts.rows import loosened
     from vftcli.virtual_sensor.smoother.observer_wrench import Gate
-    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
     learned = found.model.prior
-    prior = None if learned is None else WrenchPrior(*loosened(learned))
+    prior = None if learned is None else loosened(learned)
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 

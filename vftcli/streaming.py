@@ -1,101 +1,80 @@
-"""Long logs: the same analysis block by block, so that its memory does not grow with the log."""
+"""Long logs: the analysis block by block, so that its memory does not grow with the log."""
 
-from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from itertools import chain
+from typing import Any
 
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.observers.block_run import block_run, runs_in_blocks
-from vftcli.pipeline import AnalysisChoice
-from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run
+from vftcli.doctor.examination import stretches
+from vftcli.observers.observer import BlockObserver
+from vftcli.observers.table import OBSERVERS
+from vftcli.pipeline import AnalysisChoice, observe, read, sense
+from vftcli.readers.opening import WHOLE_ROWS
+from vftcli.robots.run import Run, Runs
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
 
 
-def comes_in_blocks(recording: Recording, robot: Robot, choice: AnalysisChoice) -> bool:
-    """Whether nothing that is asked of a long log needs all of it at once."""
-    wrench = choice.wrench
-    if recording.long is None or choice.looks_back or choice.lists_contacts:
+def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:
+    """Whether a log is long, and nothing that is asked of it needs all of it at once."""
+    if recording.samples <= WHOLE_ROWS or recording.dq is None or recording.source.derived:
         return False
-    if choice.reference is not None or recording.source.derived or recording.dq is None:
+    if choice.looks_back or choice.lists_contacts or choice.reference is not None:
         return False
-    names = choice.observers.names
+    names, wrench = choice.observers.names, choice.wrench
     if wrench is not None:
-        asked = (wrench.torque_sd, wrench.sensor_pose, *wrench.zero.spans)
-        smooths = any(map(wrench.smooths, names))
-        if smooths or wrench.zero.start or any(asked):
+        asked = (wrench.torque_sd, wrench.sensor_pose, wrench.zero.start, *wrench.zero.spans)
+        if any(map(wrench.smooths, names)) or any(asked):
             return False
-    timing = recording.long.timing
-    observers, _ = choice.observers.build(robot, timing.step)
-    return all(runs_in_blocks(each, timing.clock, robot.joints) for each in observers)
+    return all(OBSERVERS[name].online for name in names)
 
 
-class BlockAnalysis:
-    """The blocks of a long log's analysis, and what is known when the last has gone by."""
+def analysed_in_blocks(
+    recording: Recording, choice: AnalysisChoice
+) -> Iterator[tuple[Analysis, slice | None]]:
+    """The analyses of a log's blocks, in order; with None for its rows that of the log at last.
 
-    def __init__(self, made: Analysis, choice: AnalysisChoice) -> None:
-        self.made, self.choice = made, choice
-
-    def blocks(self) -> Iterator[Analysis]:
-        """The analyses of the blocks, in order; `made` is that of the log after the last."""
-        long, robot = self.made.recording.long, self.made.robot
-        assert long is not None
-        clock, samples = long.timing.clock, long.timing.samples
-        literal = self.choice.observers.as_printed
-        terms = RunningTerms(robot, clock, literal=literal)
-        runs = [block_run(observer, clock, robot.joints) for observer in self.made.observers]
-        waiting: deque[Recording] = deque()
-        ready: list[deque[ExternalTorque]] = [deque() for _ in runs]
-        masked, least, done = [], np.inf, 0
-        for block in chain(long.blocks(PIECE), (None,)):  # None behind the last
-            if block is not None:
-                waiting.append(block)
-                block_terms = terms.next(block)
-            for run, queue in zip(runs, ready, strict=True):
-                queue.extend(run.end() if block is None else run.take(block_terms))
-            while waiting and all(ready):
-                analysis = self._block(waiting.popleft(), [queue.popleft() for queue in ready])
-                done += analysis.recording.samples
-                self.choice.progress("estimating", done / samples, 1.0)
-                for wrench in analysis.wrenches[:1]:
-                    masked.append(wrench.hidden)
-                    if wrench.sigma_min is not None:
-                        least = min(least, float(np.min(wrench.sigma_min)))
-                yield analysis
-        self._finish(analysis.estimates, masked, least)
-
-    def _block(self, recording: Recording, estimates: Sequence[ExternalTorque]) -> Analysis:
-        """The analysis of one block."""
-        made, sensed = self.made, self.made.virtual_sensor
-        log = Run(recording=recording, robot=made.robot)
+    The last holds the estimates of the last block alone. The log is examined in stretches; its
+    clock, its numbers and samples that no arm can have made are looked for in all of it.
+    """
+    robot = choice.examiner.robot(stretches(recording), choice.robot)
+    log = choice.examiner.taken(recording, robot, choice.read, in_stretches=True)
+    examined = choice.examiner.examine(log, robot, in_stretches=True)
+    whole, part = (read(each, robot, choice, Runs()) for each in (log, stretches(log)))
+    made = observe(whole, None, choice, running=False)
+    sensed = sense(replace(made, motion=part), choice).virtual_sensor
+    made = replace(made, examinations=(examined,))
+    terms = RunningTerms(robot, clock_of(log.t), literal=choice.observers.as_printed)
+    states: dict[str, Any] = {}
+    estimates: list[ExternalTorque] = []
+    masked, least, done = list[np.ndarray](), np.inf, 0
+    for block in log.blocks(PIECE):
+        of_block, estimates = terms.next(block), []
+        for observer in made.observers:
+            assert isinstance(observer, BlockObserver)
+            estimate, states[observer.name] = observer.run(of_block, states.get(observer.name))
+            estimates.append(estimate)
         if sensed is not None:
-            chain = made.robot.chain
-            wrenches = sensed.sensor.wrenches(estimates, recording.q, chain)
+            wrenches = sensed.sensor.wrenches(estimates, block.q, robot.chain)
             sensed = replace(sensed, wrenches=wrenches)
-        return replace(
-            made,
-            motion=replace(made.motion, log=log),
-            estimates=tuple(estimates),
-            virtual_sensor=sensed,
-        )
+            masked.append(wrenches[0].hidden)
+            if wrenches[0].sigma_min is not None:
+                least = min(least, float(np.min(wrenches[0].sigma_min)))
+        done += block.samples
+        choice.progress("estimating", done / log.samples, 1.0)
+        motion = replace(whole, log=Run(recording=block, robot=robot))
+        every = slice(None)
+        yield replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed), every
+    if sensed is not None:
+        from vftcli.virtual_sensor.sensing import mask_remark
+        from vftcli.virtual_sensor.torque_error import unknown_error
 
-    def _finish(
-        self, last: Sequence[ExternalTorque], masked: Sequence[np.ndarray], least: float
-    ) -> None:
-        """Take up what the last block's estimates say of the log, and what the poses hid."""
-        sensed = self.made.virtual_sensor
-        if sensed is not None:
-            from vftcli.virtual_sensor.sensing import mask_remark
-            from vftcli.virtual_sensor.torque_error import unknown_error
-
-            hidden = np.concatenate(masked)
-            poses = mask_remark(hidden, np.array([least]))
-            told = (*sensed.remarks, *poses, *unknown_error().remarks)
-            sensed = replace(sensed, masked=hidden, remarks=told)
-        self.made = replace(self.made, estimates=tuple(last), virtual_sensor=sensed)
+        hidden = np.concatenate(masked)
+        told = (*mask_remark(hidden, np.array([least])), *unknown_error().remarks)
+        sensed = replace(sensed, wrenches=(), masked=hidden, remarks=(*sensed.remarks, *told))
+    yield replace(made, estimates=tuple(estimates), virtual_sensor=sensed), None

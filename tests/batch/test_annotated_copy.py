@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.batch import annotated_copy
-from vftcli.batch.annotated_copy import CopyChoice, annotate
+from vftcli.batch.annotated_copy import annotate
 from vftcli.batch.annotation import ForceChoice
 from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.datasets.copying import partial_of
@@ -38,11 +38,11 @@ def made(
         path,
         copy,
         asked or ForceChoice(),
-        CopyChoice(**how),
         here,
         "x",
         lambda _words: None,
         no_stage,
+        **how,
     )
 
 

@@ -14,9 +14,8 @@ import pytest
 from distributed import LocalCluster
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import REPLACED, Workers, connected
-from vftcli.batch.engine import EngineError, Failure, Outcome, begin, run_tasks
-from vftcli.batch.outcome import failure_of, perform
+from vftcli.batch.cluster import REPLACED, Workers, connected, run_tasks
+from vftcli.batch.outcome import EngineError, Failure, Outcome, begin, failure_of, perform
 
 HERE = WorkersChoice(workers=0)
 

@@ -35,7 +35,6 @@ def test_with_dask_the_cores_are_used() -> None:
         {"scheduler": "tcp://host:8786", "workers": 2},
         {"scheduler": "tls://host:8786", "tls_ca": KEY},
         {"scheduler": "tcp://host:8786", "tls_ca": KEY, "tls_cert": KEY, "tls_key": KEY},
-        {"ship": True},
     ],
 )
 def test_what_does_not_go_together_is_refused(words: dict[str, object]) -> None:

@@ -23,10 +23,11 @@ import pinocchio as pin
 import polars as pl
 
 from vftcli.doctor import Examiner, examine
-from vftcli.observers import BEST, PAPER, KalmanObserver
+from vftcli.observers import KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import BEST, PAPER
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers import read
 from vftcli.reproduction.timing import (
@@ -45,10 +46,11 @@ from vftcli.reproduction.timing import (
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.names import EFFORTS, EXAMINED
 from vftcli.signals.recording import Recording
+from vftcli.signals.terms import DynamicsTerms
 
 RATIOS = {
     "core_over_rnea_loop": "four observers with dynamics / one bare pin.rnea loop",

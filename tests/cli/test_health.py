@@ -47,7 +47,7 @@ def test_a_sound_log_is_said_to_be_sound(
     assert code == 0, err
     assert "log health: sound" in err.splitlines()
     # the short recipe has none, and the UR5's friction follows them where a command models the log
-    assert err.count("no joint temperatures in the log") == (command != "convert")
+    assert err.count("no joint temperatures") == (command != "convert")
     json.loads(out)
 
 

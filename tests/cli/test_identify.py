@@ -29,7 +29,7 @@ def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
     )
     assert result.exit_code == 0, result.output
     assert "identified" in result.stdout
-    for ending in (".toml", ".html", ".rrd", ".run.json"):
+    for ending in (".toml", ".html", ".run.json"):
         assert robot.with_suffix(ending).is_file()
     assert load_robot(robot).document["identification"]["base_parameters"]
     out = tmp_path / "out"

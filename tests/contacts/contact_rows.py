@@ -3,8 +3,8 @@
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact, ContactList, ContactModel
-from vftcli.contacts.windows import ContactPrior
 from vftcli.signals.remarks import caution, fact
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 
 def contact(**changed: object) -> Contact:
@@ -30,7 +30,7 @@ def contact_list(*contacts: Contact, **changed: object) -> ContactList:
         "free": (fact("free-span", begin_s=0.3, end_s=4.0),), "free_seconds": 3.7,
         "false_on_free": 0, "threshold": 12.0, "smallest_force": 6.5, "stops": (17.9,),
         "model": ContactModel(
-            prior=ContactPrior(0.3, 31.0, 1.0), noise_sd=np.ones(6), error_sd=np.ones(6),
+            prior=WrenchPrior(0.3, 31.0, 1.0), noise_sd=np.ones(6), error_sd=np.ones(6),
             error_time=np.ones(6), block=0.024,
         ),
         "remarks": (caution("arm-stopped-abruptly", at_s=17.9),),

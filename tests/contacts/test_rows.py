@@ -17,7 +17,6 @@ from vftcli.contacts.rows import (
     quiet_error,
     sensor_force,
     vendor_force,
-    with_drives,
 )
 from vftcli.readers import read
 from vftcli.robots import load_robot
@@ -25,6 +24,7 @@ from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
+from vftcli.virtual_sensor.smoother.smoothing import hidden_by_blocks
 
 
 def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
@@ -119,7 +119,8 @@ def test_a_course_bears_the_band_along_its_force() -> None:
     # u = (.6, .8, 0): √(.36·4 + .64·9) = 2.683; without a force there is no direction.
     assert course.band.tolist() == pytest.approx([1.96 * 2.6833, 0.0], rel=1e-4)
     # 3 % of 5 N, which the drives' constants may be off.
-    wider = force_course(t, force, with_drives(force, covariance)).band[0]
+    drives = hidden_by_blocks(force, bent=0.0)
+    wider = force_course(t, force, covariance + drives).band[0]
     assert wider == pytest.approx(1.96 * np.hypot(2.6833, 0.15), rel=1e-4)
 
 

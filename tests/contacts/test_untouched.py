@@ -24,9 +24,9 @@ from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.terms import DynamicsTerms
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 
@@ -46,6 +46,7 @@ def test_a_named_span_is_the_free_part() -> None:
     (piece,) = part.pieces
     t = LOG.t[piece.inside]
     assert (t[0], t[-1]) == (pytest.approx(0.304), pytest.approx(4.0))
+    assert not part.doubted
     assert part.remarks[0].code == "free-span"
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.doctor.clock import clock_findings
+from vftcli.doctor.signals import clock_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import Examiner, in_words
-from vftcli.doctor.examiner import refuse
+from vftcli.doctor.examination import refuse
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
@@ -97,3 +97,26 @@ def test_an_open_effort_is_taken_for_what_the_model_explains() -> None:
     assert [remark.code for remark in healed.source.remarks] == ["effort-taken"]
     assert examiner.taken(turned(log), UR5E, ReadChoice()).source.remarks == ()
     assert not Examiner().examine(healed, UR5E).refusals()
+
+
+@pytest.mark.slow
+def test_the_unit_of_the_effort_is_what_the_last_tenth_of_a_long_log_says(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An arm that stands upright needs no current; then it moves, on currents in mA."""
+    monkeypatch.setattr("vftcli.doctor.examination.EXAMINED", 4000)
+    monkeypatch.setattr("vftcli.doctor.examination.STRETCH", 400)
+    motion, constant = excited(40.0), UR5E.torque_constant
+    assert constant is not None
+    still, noise = np.zeros((9 * motion.samples, 6)), np.random.default_rng(2)
+    upright = np.array([0.0, -0.5 * np.pi, 0.0, -0.5 * np.pi, 0.0, 0.0])
+    current = 1e3 * motion.require("torque") / constant
+    log = Recording(
+        t=0.01 * np.arange(10 * motion.samples),
+        q=np.concatenate([still + upright, motion.q]),
+        dq=np.concatenate([still, motion.require("dq")]),
+        current=np.concatenate([noise.normal(0, 1.0, still.shape), current]),
+    )
+    auto = ReadChoice(effort="auto")
+    read = Examiner().taken(log, UR5E, auto, in_stretches=True)
+    assert read.require("current")[-1] == pytest.approx(1e-3 * current[-1])

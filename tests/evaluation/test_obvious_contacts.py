@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli import readers
-from vftcli.evaluation.obvious_contacts import touched_remarks, touches
-from vftcli.evaluation.references import zero_reference
+from vftcli.evaluation.references import touched_remarks, touches, zero_reference
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.remarks import sentence

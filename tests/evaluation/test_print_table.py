@@ -41,8 +41,8 @@ def test_sizes_and_winners_are_told() -> None:
     assert found.names == ("fdo", "gmo", "kfo-fe")
     assert "median 1.50" in text
     assert "J4 (gmo in print, kfo-fe here)" in text
-    assert "fdo and gmo agree here on J4, J5, J6" in text
-    assert "delay of 138 ms on J1" in text  # 137.5 ms in closed form
+    assert "fdo and gmo agree on J4, J5, J6" in text
+    assert "delay 138 ms on J1" in text  # 137.5 ms in closed form
 
 
 def test_the_discrete_reading_is_told() -> None:
@@ -50,7 +50,7 @@ def test_the_discrete_reading_is_told() -> None:
     observers = (*OBSERVERS[:2], kalman)
     tunings = {**TUNINGS, kalman.name: kalman.tuning(STEP, 6)}
     text = " ".join(map(str, compare_with("table1", errors(), observers, tunings).remarks))
-    assert "noise_convention=discrete: a delay of 39 ms on J1" in text
+    assert "noise_convention=discrete, delay 39 ms on J1" in text
 
 
 def test_printed_numbers() -> None:

@@ -95,11 +95,11 @@ def test_a_plain_model_is_chosen_where_nothing_more_is_there():
 
 @pytest.mark.slow
 def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
-    from vftcli.identification import whole_arm
+    from vftcli.identification import methods
 
     recording = log(rubbed(UR5, "coulomb-viscous-offset"))
     together = identify([recording], UR5, Task(method="base")).robot.friction
-    monkeypatch.setattr(whole_arm, "is_dissipative", lambda *_: False)
+    monkeypatch.setattr(methods, "is_dissipative", lambda *_: False)
     alone = identify([recording], UR5, Task(method="base")).robot.friction
     for one, other in zip(alone, together, strict=True):
         assert one.model == other.model

@@ -7,9 +7,9 @@ import pytest
 
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
+from vftcli.identification.methods import chosen_method
 from vftcli.identification.processing import Processing
 from vftcli.identification.training import prepare_training
-from vftcli.identification.whole_arm import chosen_method
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot

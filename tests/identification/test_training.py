@@ -8,22 +8,20 @@ import pytest
 from vftcli.identification import friction_fit
 from vftcli.identification.clean_fit import CleanFit
 from vftcli.identification.friction_fit import all_residuals, data_of_joint, fit_frictions
-from vftcli.identification.friction_method import (
+from vftcli.identification.links import stack
+from vftcli.identification.methods import (
     by_constant,
     check_friction,
     friction_method,
+    initial_columns,
     rotor_number,
     rotor_remarks,
-)
-from vftcli.identification.links import stack
-from vftcli.identification.processing import Processing
-from vftcli.identification.training import moving_joints, prepare_training
-from vftcli.identification.whole_arm import (
-    initial_columns,
     whole_arm,
     with_links,
     with_vector,
 )
+from vftcli.identification.processing import Processing
+from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError

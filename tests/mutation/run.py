@@ -35,7 +35,7 @@ ROOT = Path(__file__).parent.parent.parent
 ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     "observers": (
         ["observers/*.py"],
-        ["tests/observers", "tests/test_pipeline.py", "tests/refinement/test_tuning.py"],
+        ["tests/observers", "tests/test_pipeline.py"],
     ),
     "repetition": (
         ["repetition/*.py"],

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from made_runs import samples_of
 
-from vftcli.observers import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.observers.auto_tuning import (
     KINDS,
     bound_remarks,
@@ -18,8 +17,9 @@ from vftcli.observers.auto_tuning import (
     tune_to_spectra,
 )
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.robots.run import RunSamples
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.terms import DynamicsTerms
 
 STEP = 0.008
 
@@ -155,7 +155,7 @@ def test_a_bound_is_never_reached_in_silence() -> None:
     ]
     assert (slow.where.joints, fast.where.joints) == ((1, 4), (3,))
     assert (slow.values["rate_rad_s"], fast.values["rate_rad_s"]) == (1.0, 250.0)
-    assert str(fast).startswith("kfo-auto: tuning ran to the fastest it tries, 250 rad/s, on J3")
+    assert str(fast).startswith("kfo-auto: J3: noise missing from the free part")
 
 
 def test_best_keeps_a_push_where_the_log_shows_none(pushed: Pushed) -> None:

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.observers import BEST, DEFAULT, PAPER, LogSpectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
+from vftcli.observers.table import BEST, DEFAULT, PAPER, LogSpectra
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import PAPER, Setup, build_observers
-from vftcli.observers.matching import match_observers, parse_target
 from vftcli.observers.observer import Observer
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.observers.table import PAPER, Setup, build_observers
+from vftcli.observers.tuning import match_observers, parse_target
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.terms import DynamicsTerms
 
 GAINS = {
     "fdo": {"omega": 10.0},
@@ -68,7 +68,7 @@ def test_matched_fdo_and_gmo_are_one_filter() -> None:
     )
     assert [r.code for r in remarks] == ["delay-matched", "first-order-observers-alike"]
     assert remarks[0].values["delay_s"] == 0.05
-    assert "one and the same filter" in str(remarks[1])
+    assert "are one filter" in str(remarks[1])
 
 
 @pytest.mark.parametrize("goal", ["delay", "speed=3", "delay=-1", "delay=nan"])

@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.observers import (
+from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
+from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.table import (
     PAPER,
-    FilteredDynamicsObserver,
-    KalmanObserver,
-    MomentumObserver,
     Setup,
     build_observers,
+    load_gains,
+    overlay_gains,
+    parse_settings,
+    sections,
 )
-from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.settings import load_gains, overlay_gains, parse_settings
-from vftcli.observers.table import sections
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import ParameterError, VftError
 
@@ -56,7 +56,7 @@ def test_gains_nobody_gave_take_the_kalman_filters_delay_and_say_so() -> None:
     delay = fe.tuning(0.001, 7).delay
     np.testing.assert_allclose(gmo.tuning(0.001, 7).delay, delay, rtol=1e-12)
     np.testing.assert_allclose(1.0 / fdo.omega, np.mean(delay), rtol=1e-12)
-    assert any(str(remark).startswith("gmo.gain was not given") for remark in remarks)
+    assert any(str(remark).startswith("gmo.gain not given") for remark in remarks)
     given = {remark.values.get("parameter"): remark.code for remark in remarks}
     assert given["gmo.gain"] == "gain-from-kalman-delay"
 

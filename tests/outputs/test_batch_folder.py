@@ -6,7 +6,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from vftcli.outputs.batch_folder import FAILED, BatchFolder
+from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.signals.errors import OutputError
 
 KEY, OTHER = "ab" + 62 * "0", "cd" + 62 * "1"
@@ -22,18 +22,11 @@ def folder(tmp_path: Path) -> BatchFolder:
     made = BatchFolder(tmp_path / "out")
     with made.opened("options", {"command": "vftcli batch"}, force=False):
         made.put_rows(KEY, rows(KEY, 1, 2))
-        made.put_failure(OTHER, {"stage": "reading", "type": "LogError", "line": "no log"})
     return made
 
 
-def test_rows_and_failures_are_found_again(folder: BatchFolder) -> None:
+def test_rows_are_found_again(folder: BatchFolder) -> None:
     assert folder.keys() == {KEY}
-    assert folder.keys(FAILED) == {OTHER}
-    assert folder.failure(OTHER)["line"] == "no log"
-    folder.forget(OTHER)
-    folder.forget(OTHER)
-    assert folder.keys(FAILED) == set()
-    assert [path.name for path in folder.files_of(KEY)] == [f"{KEY}.parquet"]
 
 
 def test_the_table_is_in_the_order_of_the_logs_and_equal_logs_share_rows(

@@ -13,16 +13,15 @@ from vftcli.outputs.grid import (
     Column,
     Grid,
     GridCell,
+    csv_rows,
     escape_latex,
-    html,
     joint_columns,
+    json_rows,
     latex,
     markdown,
-    signed,
-    significant,
     terminal,
 )
-from vftcli.outputs.plain_rows import csv_rows, json_rows
+from vftcli.outputs.page.shell import table
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 
@@ -44,27 +43,6 @@ def grid() -> Grid:
         marked=True,
         swatches=True,
     )
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (0.42649, "0.426"),
-        (12.346, "12.3"),
-        (1234.5, "1234"),
-        (0.0027812, "0.00278"),
-        (0.9996, "1.00"),
-        (9.996, "10.0"),
-        (0.0, "0"),
-        (-1.234, "-1.23"),
-        (1.5e-7, "1.50e-07"),
-        (float("nan"), "–"),
-        (float("inf"), "–"),
-    ],
-)
-def test_three_significant_digits(value: float, text: str) -> None:
-    assert significant(value) == text
-    assert signed(value) == text.replace("-", "−")
 
 
 def test_the_terminal_keeps_digits_below_digits(grid: Grid) -> None:
@@ -203,7 +181,7 @@ class Cells(HTMLParser):
 
 
 def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) -> None:
-    found = Cells(html(grid))
+    found = Cells(table(grid))
     assert "b" not in [tag for tag, _ in found.elements]
     assert HOSTILE in found.words
     assert ("td", {"class": "best"}) in found.elements

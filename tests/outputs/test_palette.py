@@ -1,28 +1,20 @@
-import numpy as np
-
-from vftcli.outputs.palette import COLOURS, SPARE, colours_of, rgb
-from vftcli.signals.external_torque import ExternalTorque
-
-
-def named(*names: str) -> list[ExternalTorque]:
-    t = np.arange(3.0)
-    return [ExternalTorque(name=name, t=t, tau=np.zeros((3, 1))) for name in names]
+from vftcli.outputs.palette import COLOURS, SPARE, colours_of_names, rgb
 
 
 def test_observers_keep_their_colours_whatever_runs_beside_them() -> None:
-    assert colours_of(named("gmo"))["gmo"] == COLOURS["gmo"]
-    assert colours_of(named("mine", "gmo"))["gmo"] == COLOURS["gmo"]
+    assert colours_of_names(["gmo"])["gmo"] == COLOURS["gmo"]
+    assert colours_of_names(["mine", "gmo"])["gmo"] == COLOURS["gmo"]
 
 
 def test_others_get_colours_that_nobody_has() -> None:
-    found = colours_of(named("a", "fdo", "b", "gmo"))
+    found = colours_of_names(["a", "fdo", "b", "gmo"])
     assert len(set(found.values())) == 4
     assert found["a"] not in COLOURS.values() or found["a"] not in (COLOURS["fdo"], COLOURS["gmo"])
 
 
 def test_when_there_are_no_more_colours_they_come_again() -> None:
     names = [f"own {k}" for k in range(len(SPARE) + 1)]
-    found = colours_of(named(*names))
+    found = colours_of_names(names)
     assert len(set(found.values())) == len(SPARE)
     assert found[names[0]] == found[names[-1]]
 

@@ -6,25 +6,32 @@ import numpy as np
 import pytest
 from rerun_rows import rows_of
 
-from vftcli.outputs.arm import motion
 from vftcli.outputs.palette import rgb
 from vftcli.outputs.rerun_arm import (
     LINK,
     LONGEST,
+    MOST_POSES,
     PaintedSpan,
+    arm_length,
     arrow_scale,
+    capsules,
+    motion,
     send_arm,
     send_force,
-    turn_from_z,
 )
-from vftcli.outputs.rerun_file import rerun_file
-from vftcli.robots import load_robot
+from vftcli.outputs.rerun_file import Tab, rerun_file
+from vftcli.robots import PROFILES, load_robot
+from vftcli.robots.kinematics import link_poses
+
+UR5 = load_robot("ur5").chain
+POSES = motion(UR5, np.linspace(0.0, 4.0, 201), np.zeros((201, 6)))
+TABS = [Tab("none", [])]
 
 
 def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
     force = np.array([[2.0, 0.0, 0.0], [np.nan, 0.0, 0.0], [0.0, 0.0, -400.0]])
-    with rerun_file(tmp_path / "r.rrd", "r", [], {"Summary": ""}) as stream:
-        send_force(stream, "/force", np.arange(3.0), np.zeros((3, 3)), force, 0.01)
+    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+        send_force(stream, "/force", np.arange(3.0), np.zeros((3, 3)), force)
     # 200 N are a metre
     assert rows_of(tmp_path / "r.rrd", "/force", "Arrows3D:vectors") == [
         [[pytest.approx(0.01), 0.0, 0.0]],
@@ -33,11 +40,15 @@ def test_an_unknown_force_has_no_arrow(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0.6, 0, 0.8), (0, -0.6, -0.8)])
-def test_capsules_point_where_they_should(axis: tuple[float, ...]) -> None:
-    x, y, z, w = turn_from_z(np.array(axis, dtype=float))
-    turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
-    np.testing.assert_allclose(turned, axis, atol=1e-12)  # rounding
+def test_capsules_point_where_they_should(tmp_path: Path) -> None:
+    """Rerun's lie along z of their own axes; the upper arm is its link's longest shape."""
+    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+        send_arm(stream, UR5, POSES, {})
+    (turns,) = rows_of(tmp_path / "r.rrd", "/robot/link_2", "Capsules3D:quaternions")
+    for (x, y, z, w), shape in zip(turns, capsules(UR5)[2], strict=True):
+        turned = [2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)]
+        unit = shape.direction / np.linalg.norm(shape.direction)
+        np.testing.assert_allclose(turned, unit, atol=1e-6)  # Rerun holds them in float32
 
 
 @pytest.mark.parametrize(("hardest", "scale"), [(2.0, 5.0), (90.0, 200.0), (1e6, 2000.0)])
@@ -48,11 +59,9 @@ def test_the_hardest_force_fits(hardest: float, scale: float) -> None:
 
 def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     """Its own colour, then that of the span, then its own again; other links keep theirs."""
-    chain, t = load_robot("ur5").chain, np.linspace(0.0, 4.0, 201)
-    poses = motion(chain, t, np.zeros((201, 6)))
     painted = {2: [PaintedSpan(1.0, 2.0, "#dd6415")]}
-    with rerun_file(tmp_path / "r.rrd", "r", [], {"Summary": ""}) as stream:
-        send_arm(stream, "/robot", chain, poses, painted=painted)
+    with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
+        send_arm(stream, UR5, POSES, painted)
 
     def colours(link: int) -> list[list[int]]:
         return rows_of(tmp_path / "r.rrd", f"/robot/link_{link}", "Capsules3D:colors")
@@ -68,3 +77,32 @@ def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     assert word(LINK) in found[0]
     (still,) = [row for row in colours(3) if row is not None]
     assert word("#dd6415") not in still
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_capsules_join_the_joints(name: str) -> None:
+    """In every link the capsule ends where the next frame begins, if they are apart at all."""
+    chain = load_robot(name).chain
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    for shapes, offset in zip(capsules(chain), offsets, strict=True):
+        for shape in shapes:
+            if not shape.joint:
+                np.testing.assert_array_equal(shape.start + shape.direction, offset)
+        links = [shape for shape in shapes if not shape.joint]
+        assert bool(links) == (np.linalg.norm(offset) > 0.02 * arm_length(chain))
+
+
+def test_motion_follows_the_log_at_its_rate() -> None:
+    chain = load_robot("panda").chain
+    t = 0.001 * np.arange(5000)
+    q = np.sin(t[:, None] * np.arange(1, 8))
+    poses = motion(chain, t, q)
+    np.testing.assert_allclose(np.diff(poses.t), 0.02, atol=1e-9)
+    np.testing.assert_array_equal(poses.translation, link_poses(chain, q[::20]).translation)
+
+
+def test_of_a_long_log_no_more_poses_are_drawn_than_can_be_looked_at() -> None:
+    t = 0.02 * np.arange(50_001)  # 1000 s at the rate that is drawn
+    chain = load_robot("panda").chain
+    poses = motion(chain, t, np.zeros((len(t), chain.joints)))
+    assert MOST_POSES / 2 < len(poses.t) <= MOST_POSES

@@ -8,8 +8,11 @@ import pytest
 import rerun.chunk
 from rerun_rows import rows_of
 
-from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints, Tab
+from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
+    LogLine,
+    Tab,
     drawable,
     recording_id,
     rerun_file,
@@ -17,19 +20,24 @@ from vftcli.outputs.rerun_file import (
     title_of,
 )
 
+POSES = ArmPoses(np.zeros(1), np.ones((1, 2, 3)), np.ones((1, 2, 4)), np.zeros((1, 1)))
 
-def lines(path: str, values: np.ndarray) -> Lines:
-    shown = [PlotLine(f"line {k}", column, "#102030") for k, column in enumerate(values.T)]
-    return Lines(path, "what [N]", shown)
+
+def plot(path: str, values: np.ndarray, step: float = 1.0, *, family: int = 0) -> Chart:
+    """A plot of one line a column; 0 is no family."""
+    shown = [ChartLine(f"line {k}", x[:, None], "#102030") for k, x in enumerate(values.T)]
+    t = step * np.arange(float(len(values)))
+    return Chart(path, "what", ("N",), ("",), t, tuple(shown), (family,) * (family > 0))
 
 
 def test_plots_and_words_of_two_clocks_read_back(tmp_path: Path) -> None:
     first = np.arange(8.0).reshape(4, 2)
     tabs = [
-        Tab("one", np.arange(4.0), [lines("/one", first)]),
-        Tab("two", 0.5 * np.arange(3.0), [lines("/two", first[:3, :1])]),
+        Tab("one", [plot("/one", first)]),
+        Tab("two", [plot("/two", first[:3, :1], 0.5)]),
     ]
-    with rerun_file(tmp_path / "r.rrd", "名 title", tabs, {"Summary": "words → here"}):
+    words = {"Summary": "words → here"}
+    with rerun_file(tmp_path / "r.rrd", "名 title", tabs, words, POSES, "Arm"):
         pass
     assert rows_of(tmp_path / "r.rrd", "/one", "Scalars:scalars") == first.tolist()
     assert len(rows_of(tmp_path / "r.rrd", "/two", "Scalars:scalars")) == 3
@@ -55,25 +63,39 @@ def test_the_viewer_gets_letters_it_can_draw(text: str, drawn: str) -> None:
 
 def test_points_and_a_log_stand_beside_the_lines(tmp_path: Path) -> None:
     """Points have a clock of their own; lines of a log are sorted, whatever order they come in."""
-    points = PlotPoints("peaks", np.array([0.5]), np.array([7.0]), "#102030")
-    plot = lines("/force", np.arange(4.0)[:, None])._replace(points=points)
+    peaks = ChartLine("peaks", np.array([[7.0]]), "#102030", x=np.array([0.5]))
+    force = plot("/force", np.arange(4.0)[:, None])
+    force = force._replace(series=(*force.series, peaks))
     log = [
         LogLine("/contacts/2", 2.0, "second → end", "#102030"),
         LogLine("/remarks", 3.0, "last", "#102030", "WARN"),
         LogLine("/remarks", 1.0, "first", "#102030"),
     ]
-    tab = Tab("one", np.arange(4.0), [plot], log)
-    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, marked=(1.0, 2.0)):
+    tab = Tab("one", [force], log)
+    with rerun_file(tmp_path / "r.rrd", "r", [tab], {"Summary": ""}, POSES, "Arm", (1.0, 2.0)):
         pass
+    assert rows_of(tmp_path / "r.rrd", "/force", "Scalars:scalars") == [[0.0], [1.0], [2.0], [3.0]]
     assert rows_of(tmp_path / "r.rrd", "/force/points", "Scalars:scalars") == [[7.0]]
     assert rows_of(tmp_path / "r.rrd", "/contacts/2", "TextLog:text") == [["second -> end"]]
     assert rows_of(tmp_path / "r.rrd", "/remarks", "TextLog:text") == [["first"], ["last"]]
 
 
 def test_small_plots_say_where_their_axes_end() -> None:
-    plots = [lines(f"/a{k}", np.array([[0.0], [10.0 * k]])) for k in range(4)]
-    assert title_of(Tab("many", np.arange(2.0), plots), plots[3]) == "what [N], -1.5 to 31.5"
-    assert title_of(Tab("few", np.arange(2.0), plots[:3]), plots[2]) == "what [N]"
+    plots = [plot(f"/a{k}", np.array([[0.0], [10.0 * k]])) for k in range(4)]
+    assert title_of(Tab("many", plots), plots[3]) == "what [N], -1.5 to 31.5"
+    assert title_of(Tab("few", plots[:3]), plots[2]) == "what [N]"
+
+
+def test_plots_of_a_family_have_one_axis_and_show_points_too() -> None:
+    small, large = (plot("/a", np.array([[0.0], [high], [5.0]]), family=1) for high in (1.0, 10.0))
+    alone = plot("/b", np.array([[0.0], [1.0]]))
+    tab = Tab("torques", [small, large, alone])
+    # A twentieth of what is shown on either side.
+    assert tab.ends(small) == tab.ends(large) == pytest.approx((-0.5, 10.5))
+    assert tab.ends(alone) == pytest.approx((-0.05, 1.05))
+    peak = ChartLine("peaks", np.array([[20.0]]), "#102030", x=np.array([1.0]))
+    alone = alone._replace(series=(*alone.series, peak))
+    assert tab.ends(alone) == pytest.approx((-1.0, 21.0))
 
 
 def test_the_time_panel_marks_a_span_in_nanoseconds() -> None:
@@ -86,14 +108,17 @@ FULL = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from vftcli.outputs.plots import Lines, PlotLine, Tab
-from vftcli.outputs.rerun_file import rerun_file
+from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.rerun_arm import ArmPoses
+from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.signals.errors import OutputError
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]),) * 2)
-values = np.random.default_rng(1).normal(size=20000)
-lines = Lines("/one", "what [N]", [PlotLine("line", values, "#102030")])
+values = np.random.default_rng(1).normal(size=(20000, 1))
+line, t = ChartLine("line", values, "#102030"), np.arange(20000.0)
+tab = Tab("one", [Chart("/one", "what", ("N",), ("",), t, (line,))])
+poses = ArmPoses(np.zeros(1), np.ones((1, 2, 3)), np.ones((1, 2, 4)), np.zeros((1, 1)))
 try:
-    with rerun_file(Path(sys.argv[1]), "r", [Tab("one", np.arange(20000.0), [lines])], {"S": "w"}):
+    with rerun_file(Path(sys.argv[1]), "r", [tab], {"S": "w"}, poses, "Arm"):
         pass
 except OutputError as error:
     print(error)
@@ -118,11 +143,12 @@ def test_a_full_disk_is_one_error_at_once_and_nothing_is_said_beside_it(
 
 def test_a_recording_is_known_by_what_it_holds() -> None:
     """Equal data and words are one recording; another value, line or word is another."""
-    t, ramp = np.arange(3.0), np.arange(3.0)
+    ramp = np.arange(3.0)[:, None]
 
     def identity(values: np.ndarray = ramp, name: str = "gmo", text: str = "sha256 12") -> UUID:
-        lines = Lines("/tau_ext/J1", "J1", [PlotLine(name, values, "#000000")])
-        return recording_id("log", [Tab("Torque", t, [lines])], {"Summary": text})
+        line = ChartLine(name, values, "#000000")
+        one = plot("/tau_ext/J1", ramp)._replace(series=(line,))
+        return recording_id("log", [Tab("Torque", [one])], {"Summary": text})
 
     assert identity() == identity(ramp.copy())
     others = [identity(2 * ramp), identity(name="fdo"), identity(text="sha256 13")]

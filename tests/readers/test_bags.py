@@ -331,7 +331,7 @@ def test_unclosed_ros1_bags_are_read(tmp_path: Path) -> None:
     path.write_bytes(content)
     recording = read(path)
     assert_is_the_motion(recording)
-    assert any("not closed by its recorder" in told for told in recording.source.warnings)
+    assert any("did not close the file" in told for told in recording.source.warnings)
 
 
 def changed_index(path: Path, entry: Callable[[bytes], bytes]) -> Path:

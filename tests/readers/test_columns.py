@@ -119,7 +119,7 @@ def test_one_of_several_recordings(tmp_path: Path) -> None:
     second = read(path, columns="segment=2")
     assert second.samples == 30
     assert second.q[0, 0] == 1.0
-    assert "took recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
+    assert "read recording 2 of 3, rows 31 to 60 (segment)" in second.source.repairs
     told, *_ = read_first_recording(path).source.remarks
     assert (told.code, told.level) == ("time-reset", "warning")
     assert told.values["rows"] == [30, 60]

@@ -142,7 +142,7 @@ CUT = ["0.300,0.13", "0.300,0.1", "0.3", "0.300,0.1300,", "0.300,0.1300,0.1"]
 def test_a_cut_last_row_is_dropped_and_said(tmp_path: Path, last: str) -> None:
     recording = read(write(tmp_path / "x", table(rows()) + last))
     assert recording.samples == 30
-    assert "dropped the last row, which is cut" in recording.source.repairs
+    assert "dropped the last row: it is cut off" in recording.source.repairs
 
 
 def test_a_last_row_without_line_end_is_kept_if_its_digits_are_all_there(tmp_path: Path) -> None:
@@ -166,7 +166,7 @@ def test_repeated_stamps_with_other_values_are_suspicious(tmp_path: Path) -> Non
     lines = rows()
     lines.insert(10, lines[9].replace("0.1", "0.5", 1))
     recording = read(write(tmp_path / "x", table(lines)))
-    assert "carried other values" in recording.source.warnings[0]
+    assert "carry other values" in recording.source.warnings[0]
 
 
 def test_gaps_are_kept_and_reported(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_binary_records(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-10])
     recording = read(path)
     assert recording.samples == ROWS - 1
-    assert "cut last record" in recording.source.repairs[0]
+    assert "dropped the last record, 50 bytes" in recording.source.repairs[0]
 
 
 def test_binary_records_with_a_leading_identifier(tmp_path: Path) -> None:

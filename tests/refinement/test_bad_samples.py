@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.doctor.examiner import Examiner
+from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.reader import ReadChoice

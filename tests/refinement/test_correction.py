@@ -12,7 +12,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
-from vftcli.refinement import correction
+from vftcli.refinement import baseline
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
@@ -171,7 +171,7 @@ def test_a_fit_that_fails_is_said_and_costs_nothing_else(
     def fails(_run: object) -> None:
         raise MissingSignalError("no current")
 
-    monkeypatch.setattr(correction, "whole_log_bias", fails)
+    monkeypatch.setattr(baseline, "whole_log_bias", fails)
     analysis = analyse_log(FIXTURE, request_)
     (said,) = [r for r in analysis.remarks if r.code == "whole-log-bias-failed"]
     assert said.level == "caution"

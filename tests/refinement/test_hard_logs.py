@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from known_errors import drawn_error, wrong_run
 
-from vftcli.doctor.examiner import Examiner
+from vftcli.doctor.examination import Examiner
 from vftcli.observers import MomentumObserver
 from vftcli.observers.auto_tuning import noise_level
 from vftcli.observers.choice import ObserverChoice

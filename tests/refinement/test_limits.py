@@ -75,7 +75,9 @@ def test_the_largest_cause_of_each_joint_is_named() -> None:
     assert stuck.values["size_Nm"][0] == 9.0
     # 9 N·m beside the 5 of the other causes, and nothing beside the joint that moves
     np.testing.assert_allclose(stuck.values["total_Nm"], [np.sqrt(9.0**2 + 5.0**2), np.sqrt(0.31)])
-    assert str(stuck).startswith("gmo: what limits this log, from J1: stiction at rest, bandwidth")
+    assert str(stuck).startswith(
+        "gmo: largest error per joint, from J1: stiction at rest, bandwidth"
+    )
 
 
 def test_a_joint_at_rest_without_known_friction_is_not_limited_by_stiction() -> None:
@@ -100,7 +102,7 @@ def test_the_ratio_is_that_of_the_bands(analysis: Analysis) -> None:
     best, *paper = (np.sqrt(np.mean(e.error_sd**2, axis=0)).mean() for e in analysis.estimates)
     assert gap.values["ratio"] == pytest.approx(np.mean(paper) / best, rel=1e-12)
     assert set(gap.values["ratios"]) == {"fdo", "gmo", "kfo-fe", "kfo-zoh"}
-    assert "the paper's gains are " in str(gap)
+    assert "the paper's gains give " in str(gap)
     assert "(delay 39–333 ms)" in str(gap)
 
 

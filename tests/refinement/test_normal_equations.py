@@ -10,8 +10,7 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows, solve
-from vftcli.refinement.slow_load import slow_loads
+from vftcli.refinement.normal_equations import Rows, slow_loads, solve
 
 JOINTS, STRIDE = 4, 10
 

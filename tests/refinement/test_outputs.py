@@ -10,12 +10,11 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.estimates import estimates_table
-from vftcli.outputs.log.rerun_recording import line_groups
+from vftcli.outputs.log.rerun_recording import plot_groups
 from vftcli.outputs.log.run_record import run_record, to_json
 from vftcli.outputs.page.charts import observer_lines
-from vftcli.outputs.page.page import render
-from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import torque_chart
+from vftcli.outputs.page.log_charts import spectra_chart, torque_chart, tuning_chart
+from vftcli.outputs.page.pages import render
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 
@@ -51,8 +50,8 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
 
 
 def test_the_recording_shows_both_edges_of_the_last_band(worked_up: Analysis) -> None:
-    plot = next(iter(line_groups(worked_up)["Joint torques"]))
-    lines = {line.name: line.values for line in plot.lines}
+    plot = next(iter(plot_groups(worked_up)["Joint torques"]))
+    lines = {line.name: line.values[:, 0] for line in plot.series}
     upper, lower = (lines[f"rts-auto 95 % {edge}"] for edge in ("upper", "lower"))
     estimate = worked_up.estimates[-1]
     assert estimate.error_sd is not None

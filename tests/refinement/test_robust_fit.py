@@ -10,7 +10,7 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows
+from vftcli.refinement.normal_equations import Rows, slow_loads
 from vftcli.refinement.robust_fit import (
     LEAST_SCALE,
     LEAST_TORQUE,
@@ -19,7 +19,6 @@ from vftcli.refinement.robust_fit import (
     free_samples,
     largest_around,
 )
-from vftcli.refinement.slow_load import slow_loads
 from vftcli.signals.filters import zero_phase
 
 STRIDE = 3

@@ -5,7 +5,7 @@ import pinocchio as pin
 import pytest
 from known_errors import motion
 
-from vftcli.refinement.slow_load import (
+from vftcli.refinement.normal_equations import (
     FORCE,
     MOMENT,
     force_torque,

@@ -12,15 +12,14 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import fit_robustly
-from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import (
+from vftcli.refinement.normal_equations import Rows, slow_loads
+from vftcli.refinement.robust_fit import (
     LARGEST,
     SCALES,
     WORTH,
     WORTHLESS,
     faded,
+    fit_robustly,
     guarded,
 )
 from vftcli.signals.rest import MOVES

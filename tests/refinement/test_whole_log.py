@@ -95,7 +95,7 @@ def test_remarks_say_what_became_of_each_joint(found):
     assert applied.where.joints == tuple(int(j) + 1 for j in np.flatnonzero(found.applied))
     np.testing.assert_allclose(applied.values["changed_Nm"], rms(found.bias)[found.applied])
     assert all(share <= 0.9 for share in applied.values["unseen_share"])
-    assert "taken off J" in str(applied)
+    assert "subtracted on J" in str(applied)
 
 
 def test_the_same_log_gives_the_same_bias(run, found):
@@ -208,7 +208,7 @@ def test_a_held_pose_is_refused():
     assert remark.values["motion_s"] == pytest.approx(2.0, abs=0.5)
     (still,) = whole_log_bias(held(20.0, 0.0)).remarks
     assert (still.code, still.values["motion_s"]) == ("whole-log-at-rest", 0.0)
-    assert "no whole-log correction" in str(still)
+    assert "model error not corrected" in str(still)
 
 
 def test_a_log_that_moves_only_for_a_while_is_refused():

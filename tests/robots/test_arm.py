@@ -48,9 +48,8 @@ def test_what_was_taken_and_locked_is_one_line(tmp_path: Path) -> None:
     assert values["locked"] == {"finger_joint1": 0.0, "finger_joint2": 0.0}
     assert values["lumped_kg"] == {"joint7": pytest.approx(0.76)}
     assert str(found.remarks[0]) == (
-        "fingered: 7 joints joint1, joint2, joint3, joint4, joint5, joint6, joint7, flange link8, "
-        "gravity 0 0 -9.81 m/s² in base's axes; locked finger_joint1, finger_joint2 at 0; lumped: "
-        "0.76 kg into joint7"
+        "fingered: 7 joints joint1, joint2, joint3, joint4, joint5, joint6, joint7, flange link8; "
+        "locked finger_joint1, finger_joint2 at 0; lumped: 0.76 kg into joint7"
     )
 
 

@@ -8,10 +8,11 @@ import pytest
 
 from vftcli.robots import load_robot
 from vftcli.robots.drive import drive_torque
-from vftcli.robots.terms import DynamicsTerms, RunningTerms, dynamics_terms
+from vftcli.robots.terms import RunningTerms, dynamics_terms
 from vftcli.signals.errors import MissingSignalError, RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import clock_of
+from vftcli.signals.terms import DynamicsTerms
 
 
 def motion(joints: int, samples: int = 400, rate: float = 500.0) -> tuple[np.ndarray, ...]:

@@ -8,8 +8,7 @@ import pinocchio as pin
 import pytest
 from made_urdfs import SHAPES, agrees_with_pinocchio, arm, joint, link, robot, written
 
-from vftcli.outputs.log.description import urdf_text
-from vftcli.robots import PROFILES, load_robot
+from vftcli.robots import load_robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.errors import RobotError
 
@@ -158,18 +157,6 @@ def test_a_urdf_without_mass_is_refused(tmp_path: Path) -> None:
 def test_every_shape_is_read_as_pinocchio_reads_it(shape: str, tmp_path: Path) -> None:
     text = SHAPES[shape]()
     agrees_with_pinocchio(text, load_robot(written(tmp_path, text)))
-
-
-@pytest.mark.parametrize("name", PROFILES)
-def test_every_profile_written_as_urdf_is_read_as_pinocchio_reads_it(
-    name: str, tmp_path: Path
-) -> None:
-    profile = load_robot(name)
-    text = urdf_text(profile, profile.chain.names)
-    again = load_robot(written(tmp_path, text))
-    agrees_with_pinocchio(text, again)
-    # the URDF has 12 digits
-    np.testing.assert_allclose(again.chain.mass, profile.loaded_chain.mass, rtol=1e-11)
 
 
 def test_a_joint_and_a_link_may_share_a_name(tmp_path: Path) -> None:

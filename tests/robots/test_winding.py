@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from made_urdfs import arm, link, robot, written
 
-from vftcli.doctor.examiner import Examiner
+from vftcli.doctor.examination import Examiner
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.winding import unwound

@@ -19,7 +19,7 @@ def test_the_only_effort_is_taken_for_what_is_said() -> None:
     (remark,) = log.source.remarks
     assert (remark.code, remark.level) == ("effort-taken", "fact")
     assert str(remark) == (
-        "the motor currents of the log are taken for joint torques without gravity's, times -1"
+        "the motor currents of the log are read as joint torques without gravity's, times -1"
     )
 
 
@@ -34,13 +34,3 @@ def test_of_several_the_one_that_is_called_so_stays_alone() -> None:
         both.with_effort("torque_without_gravity")
     with pytest.raises(MissingSignalError, match="no effort"):
         Recording(t=T, q=Q).with_effort("torque")
-
-
-def test_a_signal_that_is_let_go_counts_as_there_but_reads_as_unknown() -> None:
-    log = Recording(t=T, q=Q, current=EFFORT, target_q=Q)
-    signals = log.signals
-    log.let_go(["target_q", "temperature"])
-    assert log.signals == signals
-    assert log.target_q is not None
-    assert np.isnan(log.target_q).all()
-    assert log.target_q.strides == (0, 0)  # one number stands for all of them

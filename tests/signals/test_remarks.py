@@ -1,5 +1,6 @@
 """Remarks: data in the code, words in the catalogue."""
 
+import re
 import string
 
 import pytest
@@ -59,3 +60,23 @@ def test_every_code_stands_once_and_its_templates_can_be_parsed() -> None:
             assert set(entry) <= {"short", "long", "name", "consequence", "remedy"}
             for template in entry.values():
                 assert list(string.Formatter().parse(template))
+
+
+#: A template's length as a reader meets it: a value counts as five characters.
+VALUE_LENGTH = 5
+RIDDLES = re.compile(
+    r"\b(told|untold|taken|laid over|whose|caught|stands|likewise|the same)\b", re.IGNORECASE
+)
+
+
+@pytest.mark.parametrize(
+    ("code", "entry"),
+    [item for text in remarks.catalogue() for item in remarks.parsed(text).items()],
+)
+def test_words_are_short_and_plain(code: str, entry: dict[str, str]) -> None:
+    for key, template in entry.items():
+        riddle = RIDDLES.search(template)
+        assert riddle is None, f"{code}.{key} says {riddle and riddle.group()!r}: say it plainly"
+    parts = string.Formatter().parse(entry["short"])
+    length = sum(len(words) + VALUE_LENGTH * (value is not None) for words, value, *_ in parts)
+    assert length <= 100, f"{code} has {length} characters: put detail into `long`"

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.terms import DynamicsTerms
 from vftcli.virtual_sensor.mean_disturbance import HALF, mean_disturbance
 
 

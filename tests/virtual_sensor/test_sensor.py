@@ -89,7 +89,7 @@ def test_a_pose_is_found_in_the_contacts_whatever_sign_they_are_logged_in(
     np.testing.assert_allclose(mounting.sensor.translation, POSE.translation, atol=1e-9)
     (remark,) = remarks
     np.testing.assert_allclose(remark.values["position_mm"], [10, -20, 40], atol=1e-6)
-    assert str(remark).startswith("sensor pose found from the log: x, y, z = 10.0 ± 0.0")
+    assert str(remark).startswith("sensor pose found from the log: 10.0 -20.0 40.0 mm")
 
 
 def test_a_pose_that_is_given_is_not_looked_for() -> None:

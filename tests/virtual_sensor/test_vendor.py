@@ -57,8 +57,8 @@ def ours_in_base(recording: Recording, flange: np.ndarray) -> Wrench:
     ("axes", "sign", "words"),
     [
         ("base", 1.0, "fits base axes, force on the robot"),
-        ("base", -1.0, "fits base axes, force BY the robot"),
-        ("flange", -1.0, "fits flange axes, force BY the robot"),
+        ("base", -1.0, "fits base axes with turned sign"),
+        ("flange", -1.0, "fits flange axes with turned sign"),
     ],
 )
 def test_a_vendors_frame_and_sign_are_told(axes: str, sign: float, words: str) -> None:

@@ -39,7 +39,7 @@ def test_the_drift_is_the_mean_of_the_span_and_its_removal_leaves_the_load() -> 
     clean = without_drift(wrench, drift)
     assert clean.force[wrench.t > 5.5, 2].mean() == pytest.approx(-9.2, rel=0.002)
     assert clean.remarks[-1].code == "zero-removed"
-    assert "zero drift over 1 to 4.5 s in base axes, removed" in str(clean.remarks[-1])
+    assert "drift of 1 to 4.5 s removed (base axes)" in str(clean.remarks[-1])
 
 
 def test_the_change_between_two_spans_is_told() -> None:

@@ -3,7 +3,6 @@
 import hashlib
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -19,6 +18,7 @@ from vftcli.batch.annotation import (
     force_columns,
 )
 from vftcli.batch.choice import WorkersChoice
+from vftcli.batch.cluster import run_tasks
 from vftcli.batch.datasets import Dataset, open_dataset
 from vftcli.batch.datasets.copying import (
     RECORD,
@@ -32,27 +32,16 @@ from vftcli.batch.datasets.copying import (
 )
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.statistics import statistics_of
-from vftcli.batch.engine import Outcome, begin, run_tasks
+from vftcli.batch.outcome import Outcome, begin
 from vftcli.outputs.files import put_text
 from vftcli.outputs.log.run_record import to_json, versions
 from vftcli.outputs.seals import digest
-from vftcli.signals.errors import LogError, ParameterError
+from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
 #: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
 FEW = 32
 HERE = WorkersChoice(workers=0)  #: This process alone.
-
-
-@dataclass(frozen=True, kw_only=True)
-class CopyChoice:
-    """How the copy is made."""
-
-    #: Whether frames of which nothing can be told are filled with zeros and marked, instead of
-    #: stopping the run.
-    allow_missing: bool = False
-    link: bool = True  #: Whether films may be second names of the dataset's files.
-    force: bool = False  #: Whether an earlier copy may be replaced.
 
 
 class FileTask(NamedTuple):
@@ -67,23 +56,24 @@ def annotate(
     path: Path,
     copy: Path,
     choice: ForceChoice,
-    how: CopyChoice,
     workers: WorkersChoice,
     command: str,
     tell: Callable[[str], None],
     progress: Callable[[str, float, float], None],
+    *,
+    allow_missing: bool = False,
+    force: bool = False,
 ) -> dict[str, Any]:
     """Write a copy of a dataset with the forces of every frame.
+
+    Frames of which nothing can be told stop the run, or with `allow_missing` are filled with zeros
+    and marked; `force` is whether an earlier copy may be replaced.
 
     Returns:
         What ``meta/vftcli.json`` holds.
     """
-    if workers.ship:
-        raise ParameterError(
-            "workers write the copy themselves, so they have to see its folder; leave --ship out"
-        )
     dataset = open_dataset(path, choice.read.columns)
-    check_copy(path, copy, force=how.force)
+    check_copy(path, copy, force=force)
     for _ in files_within(path):
         pass  # a link that leaves it is refused before anything is computed
     beside = [Path(n) for n in (choice.robot.name, choice.observers.gains_file) if n is not None]
@@ -93,17 +83,16 @@ def annotate(
         work = folder / WORK
         plan = Plan(dataset, work, key)
         run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
-        expected = force_columns(choice, (), derived=False, valid=how.allow_missing)
+        expected = force_columns(choice, (), derived=False, valid=allow_missing)
         outcomes = run(
             plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
         )
-        made = gathered(outcomes, how, progress)
-        told = first_known(made)
+        made = gathered(outcomes, allow_missing, progress)
         columns = force_columns(
             choice,
-            told["names"],
+            joint_names(made),
             derived=any(one.get("derived") for one in made.episodes),
-            valid=how.allow_missing,
+            valid=allow_missing,
         )
         write = partial(write_file, dataset, columns, choice.suffix)
         tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
@@ -114,7 +103,7 @@ def annotate(
             statistics |= outcome.value["statistics"]
         progress("writing descriptions", 0.9, 1.0)
         if path.is_dir():
-            copy_others(path, folder, plan.places, link=how.link)
+            copy_others(path, folder, plan.places)
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
         record = record_of_copy(path, command, choice, columns, made, plan.sources)
         with finished(folder / RECORD) as temporary:
@@ -184,7 +173,9 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 
 
 def gathered(
-    outcomes: Iterable[Outcome[Any]], how: CopyChoice, progress: Callable[[str, float, float], None]
+    outcomes: Iterable[Outcome[Any]],
+    allow_missing: bool,
+    progress: Callable[[str, float, float], None],
 ) -> Made:
     """All that is told of the episodes, in the order of their files."""
     episodes: list[dict[str, Any]] = []
@@ -192,7 +183,7 @@ def gathered(
     for outcome in outcomes:
         told = value_of(outcome)
         for record in told["episodes"]:
-            if not how.allow_missing:
+            if not allow_missing:
                 refuse_missing(record)
         episodes += told["episodes"]
         robot, observer = robot or told["robot"], observer or told["observer"]
@@ -224,7 +215,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
         )
 
 
-def first_known(made: Made) -> dict[str, Any]:
+def joint_names(made: Made) -> list[str]:
     """The names of the joints, of the first episode that tells any; all must have as many."""
     known = [one for one in made.episodes if one["status"] != "missing"]
     if not known:
@@ -238,8 +229,7 @@ def first_known(made: Made) -> dict[str, Any]:
         raise LogError(
             f"the episodes are of arms of {' and '.join(map(str, sorted(widths)))} joints"
         )
-    names = known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
-    return {"names": names}
+    return known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
 
 
 def write_file(

@@ -11,8 +11,8 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.batch.datasets.copying import put_rows, stored_rows
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single
-from vftcli.batch.engine import begin
-from vftcli.doctor.examiner import Examiner
+from vftcli.batch.outcome import begin
+from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import settling_samples
 from vftcli.observers.table import OBSERVERS

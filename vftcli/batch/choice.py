@@ -41,16 +41,6 @@ class WorkersChoice(Choice):
             "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
         ),
     ] = None
-    #: Whether logs are sent to workers that do not see the files, and results sent back.
-    ship: Annotated[
-        bool,
-        Option(
-            "--ship",
-            "",
-            "Send the logs to its workers. For those that do not see the files, at most 64 MB.",
-            seldom=True,
-        ),
-    ] = False
     #: What a worker of this machine may take before it is ended, None for its share. [GB]
     worker_memory: Annotated[
         float | None,
@@ -79,9 +69,9 @@ class WorkersChoice(Choice):
             raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
         if self.scheduler is not None:
             self._check_address(self.scheduler)
-        elif self.ship or self.tls:
+        elif self.tls:
             raise ParameterError(
-                "--ship and --tls-… are for the workers of a cluster; add --scheduler ADDRESS"
+                "--tls-… are for the workers of a cluster; add --scheduler ADDRESS"
             )
         if not self.in_process and not is_installed():
             raise ParameterError(

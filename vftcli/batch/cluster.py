@@ -1,4 +1,10 @@
-"""Dask distributed: a cluster of this machine's processes, or one that stands; its limits."""
+"""Pieces of work done here or on a Dask cluster, each told as soon as it ended.
+
+What is done is the caller's: a function of one task, at the top of a module, that writes its result
+itself (a temporary file, then a rename) before it returns. Results that only live in the engine are
+lost with a worker, and Dask then does the task again: the function looks first whether its result
+is there. A task is small, and can be pickled.
+"""
 
 import hashlib
 import logging
@@ -12,7 +18,7 @@ from itertools import count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vftcli.batch.choice import MEMORY, MOST_WORKERS, WorkersChoice
+from vftcli.batch.choice import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
 from vftcli.batch.outcome import (
     KILLED,
     Effort,
@@ -45,7 +51,6 @@ THREADS = {
 CONFIG: Mapping[str, object] = {
     "distributed.scheduler.worker-saturation": 1.0,  # else a neighbour is blamed for a death
     "distributed.scheduler.allowed-failures": DEATHS - 1,
-    "distributed.admin.large-graph-warning-threshold": "1GB",  # logs that are sent
     "distributed.worker.memory.target": False,  # results are small: nothing to spill
     "distributed.worker.memory.spill": False,
     "distributed.comm.timeouts.connect": f"{ANSWER:g}s",
@@ -61,6 +66,29 @@ HEAD = 4096  #: Bytes of a file by which workers are asked whether they see the 
 def dask_setup(_worker: object) -> None:
     """Leave Ctrl-C, which every process of a terminal gets, to the one that ends the others."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def run_tasks(
+    groups: Iterable[Sequence[Task]],
+    work: Work[Task],
+    choice: WorkersChoice,
+    tell: Callable[[str], None],
+    seen: Sequence[str] = (),
+) -> Iterator[Outcome[Task]]:
+    """Do some work on every task and tell how each ended, in the order in which they end.
+
+    An error of the work is an outcome like any other. A task whose worker dies is done again, three
+    times in all. Closing the iterator ends what has not begun.
+    """
+    if choice.in_process:
+        if choice.workers is None:
+            tell(f"one log after the other; to use every core: {EXTRA}")
+        for group in groups:
+            for task in group:
+                yield Outcome(task, *perform(work, task))
+        return
+    with connected(choice, seen, tell) as client:
+        yield from outcomes(client, groups, work, standing=choice.scheduler is not None)
 
 
 @contextmanager
@@ -79,8 +107,7 @@ def connected(
         else:
             with standing(choice, tell) as client:
                 check_versions(client)
-                if not choice.ship:
-                    check_sight(client, seen)
+                check_sight(client, seen)
                 yield client
 
 
@@ -186,8 +213,7 @@ def check_sight(client: "Client", seen: Sequence[str]) -> None:
         for path, head in here.items():
             if not isinstance(there, dict) or there.get(path) != head:
                 raise EngineError(
-                    f"worker {address} does not see {path} as it is here; share the folder, or "
-                    "send the logs there with --ship"
+                    f"worker {address} does not see {path} as it is here; share the folder with it"
                 )
 
 

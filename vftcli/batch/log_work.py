@@ -1,12 +1,11 @@
 """The work on one log of a batch: what `--do` asks, written before the task is told done."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from vftcli.analysis import Analysis
-from vftcli.batch.engine import begin
-from vftcli.doctor.examiner import Examiner
+from vftcli.batch.outcome import begin
+from vftcli.doctor.examination import Examiner
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
@@ -16,18 +15,20 @@ from vftcli.robots.run import Runs
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import check_known
 
+COMMANDS = ("estimate", "compare", "report", "contacts")  #: What may be done with a log.
+
 
 @dataclass(frozen=True, kw_only=True)
 class LogJob:
     """What is done with every log of a batch."""
 
-    do: str  #: A key of `WRITERS`.
+    do: str  #: One of `COMMANDS`.
     choice: AnalysisChoice  #: What is asked of each log.
     anyway: bool = False  #: Whether results are wanted even where a finding makes them meaningless.
     written: OutputChoice = PLAIN  #: What is written of each log besides what always is.
 
     def __post_init__(self) -> None:
-        check_known(self.do, tuple(WRITERS), f"--do {self.do!r}")
+        check_known(self.do, COMMANDS, f"--do {self.do!r}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +43,6 @@ class LogTask:
     label: str  #: What it is called.
     key: str  #: What its result is kept under.
     sha256: str  #: Of its file's bytes; "" for several files.
-    told_path: Path | None = None  #: Its path where the user has it, if it was sent.
 
 
 def work_on_log(task: LogTask) -> None:
@@ -52,7 +52,7 @@ def work_on_log(task: LogTask) -> None:
         return
     analysis = analysed(task)
     begin("writing")
-    WRITERS[task.job.do](folder.result(task.key), analysis, task)
+    write_result(folder.result(task.key), analysis, task)
     from vftcli.batch.rows import rows_of
 
     folder.put_rows(task.key, rows_of(analysis, task.key))
@@ -72,45 +72,27 @@ def analysed(task: LogTask) -> Analysis:
     recording = choice.library.open(task.path, choice.read)
     if task.sha256 and recording.source.sha256 != task.sha256:
         raise LogError(f"{task.path} was changed while the batch ran; run the command again")
-    source = replace(recording.source, label=task.label, path=task.told_path or task.path)
+    source = replace(recording.source, label=task.label, path=task.path)
     recording = replace(recording, source=source)
     begin("analysing")
     work: Analyser = list_touches if task.job.do == "contacts" else analyse
     return work(*prepared(recording, choice), choice, Runs())
 
 
-def write_estimates(folder: Path, analysis: Analysis, task: LogTask) -> None:
-    """What `vftcli estimate` writes."""
-    from vftcli.outputs.log.estimates import write_estimate_folder
+def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
+    """Write what the command of that name writes of a log; of `compare` the errors are the rows."""
+    job = task.job
+    if job.do == "estimate":
+        from vftcli.outputs.log.estimates import write_estimate_folder
 
-    write_estimate_folder(folder, analysis, task.command, task.job.written, force=True)
+        write_estimate_folder(folder, analysis, task.command, job.written, force=True)
+    elif job.do == "report":
+        from vftcli.outputs.log.report import write_report
 
+        write_report(folder, analysis, command=task.command, force=True, choice=job.written)
+    elif job.do == "contacts":
+        from vftcli.outputs.files import OutputFolder
+        from vftcli.outputs.log.report import CONTACTS, put_contacts
 
-def write_page(folder: Path, analysis: Analysis, task: LogTask) -> None:
-    """What `vftcli report` writes."""
-    from vftcli.outputs.log.report import write_report
-
-    written = task.job.written
-    write_report(folder, analysis, command=task.command, force=True, choice=written)
-
-
-def write_contacts(folder: Path, analysis: Analysis, _task: LogTask) -> None:
-    """The list as `vftcli contacts` prints it, as JSON and CSV."""
-    from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import CONTACTS, put_contacts
-
-    with OutputFolder(folder, True, CONTACTS) as files:
-        put_contacts(files, "", [analysis])
-
-
-def write_nothing(_folder: Path, _analysis: Analysis, _task: LogTask) -> None:
-    """Nothing: the errors are the rows."""
-
-
-#: What is done with a log → what it writes beside its rows.
-WRITERS: dict[str, Callable[[Path, Analysis, LogTask], None]] = {
-    "estimate": write_estimates,
-    "compare": write_nothing,
-    "report": write_page,
-    "contacts": write_contacts,
-}
+        with OutputFolder(folder, True, CONTACTS) as files:
+            put_contacts(files, "", [analysis])

@@ -1,22 +1,23 @@
 """A batch: every log of a collection done once, on an engine, and gathered in one table."""
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.engine import Effort, Failure, Outcome, run_tasks
+from vftcli.batch.cluster import run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import LogJob, LogTask, work_on_log
+from vftcli.batch.outcome import Effort, Failure, Outcome
 from vftcli.batch.rows import SCHEMA
-from vftcli.batch.shipping import Parcel, packed, work_on_parcel
-from vftcli.outputs.batch_folder import FAILED, BatchFolder
+from vftcli.outputs.batch_folder import BatchFolder
+from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
-from vftcli.outputs.page.batch_page import batch_lines, render_batch
-from vftcli.outputs.page.index_page import IndexLine
+from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.readers.collection import LogEntry
 from vftcli.readers.library import absolute, labelled
 
@@ -30,31 +31,13 @@ SHARES = 8  #: A worker gets at least so many groups, so that all end at about t
 Tell = Callable[[str], None]
 
 
-@dataclass(frozen=True, kw_only=True)
-class BatchPlan:
-    """What a batch is to do."""
-
-    logs: Sequence[LogEntry]  #: The logs.
-    job: LogJob  #: What is done with each.
-    folder: Path  #: Where it is written.
-    workers: WorkersChoice  #: Where it is done.
-    command: str  #: The command line, for the records.
-    retry_failed: bool = False  #: Whether logs that failed in an earlier run are done again.
-    #: How many logs may fail before the rest is left, None for all.
-    max_failures: int | None = None
-    force: bool = False  #: Whether a batch with other options may be gone on with.
-    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
-    #: Who is told after each log how many are done.
-    progress: "Callable[[BatchCount], None]" = field(repr=False)
-
-
 class BatchCount(NamedTuple):
     """How far a batch is."""
 
     logs: int  #: How many logs there are.
     before: int = 0  #: How many of them an earlier run did.
     done: int = 0  #: How many this run did.
-    failed: int = 0  #: How many failed, in this run or, not tried again, before.
+    failed: int = 0  #: How many failed.
     seconds: float = 0.0  #: Time since its start. [s]
 
     @property
@@ -63,19 +46,27 @@ class BatchCount(NamedTuple):
         return self.logs - self.before - self.done - self.failed
 
 
-class _Run:
-    """One run of a plan: which logs are done, which failed, what each took."""
+@dataclass(kw_only=True)
+class BatchRun:
+    """A batch and one run of it: which logs are done, which failed, what each took."""
 
-    def __init__(self, plan: BatchPlan) -> None:
-        self.plan = plan
-        self.folder = BatchFolder(absolute(plan.folder))
-        choice = with_files(plan.job.choice, absolute)
-        self.job = replace(plan.job, choice=choice)
+    logs: Sequence[LogEntry]  #: The logs.
+    job: LogJob  #: What is done with each.
+    folder: BatchFolder  #: Where it is written.
+    workers: WorkersChoice  #: Where it is done.
+    command: str  #: The command line, for the records.
+    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
+    #: Who is told after each log how many are done.
+    progress: Callable[[BatchCount], None] = field(repr=False)
+
+    def __post_init__(self) -> None:
+        # A worker of a cluster may stand in another folder.
+        self.job = replace(self.job, choice=with_files(self.job.choice, absolute))
         self.options = options_digest(self.job)
-        names = labelled(entry.path for entry in plan.logs)
+        names = labelled(entry.path for entry in self.logs)
         self.labels = [
             names[e.path] if e.episode is None else f"{names[e.path]} episode {e.episode}"
-            for e in plan.logs
+            for e in self.logs
         ]
         self.keys: dict[int, str] = {}
         self.failures: dict[int, Failure] = {}
@@ -83,11 +74,14 @@ class _Run:
         self.before, self.began = 0, time.monotonic()
         self.done: set[str] = set()
 
-    def waiting(self) -> Iterator[tuple[int, LogTask]]:
-        """The logs that are to be done, with their numbers; those of equal bytes once."""
-        failed = self.folder.keys(FAILED)
+    def groups(self) -> Iterator[list[LogTask]]:
+        """The logs that are to be done, those of equal bytes once; small ones go together."""
         there, begun = self.folder.keys(), set[str]()
-        for number, entry in enumerate(self.plan.logs):
+        workers = max(1, self.workers.workers or 4)
+        most = max(1, min(TOGETHER, len(self.logs) // (SHARES * workers)))
+        group: list[LogTask] = []
+        room = float(most)
+        for number, entry in enumerate(self.logs):
             try:
                 content = content_digest(entry.files)
             except OSError as error:
@@ -95,107 +89,84 @@ class _Run:
                 self.failures[number] = Failure("finding", type(error).__name__, line)
                 continue
             key = self.keys[number] = key_of(content, self.options, entry.episode)
-            if key in there:
-                self.before += 1
-                continue
-            if key in failed and not self.plan.retry_failed:
-                self.failures[number] = Failure(**self.folder.failure(key))
-                continue
-            if key in begun:
+            self.before += key in there
+            if key in there or key in begun:
                 continue
             begun.add(key)
-            yield (
-                number,
+            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
+            if group and share > room:
+                yield group
+                group, room = [], float(most)
+            room -= share
+            group.append(
                 LogTask(
                     job=self.job,
                     folder=self.folder.path,
-                    command=self.plan.command,
+                    command=self.command,
                     path=entry.path,
                     episode=entry.episode,
                     label=self.labels[number],
                     key=key,
                     sha256=content if entry.files == (entry.path,) else "",
-                ),
+                )
             )
-
-    def grouped(self, waiting: Iterable[tuple[int, LogTask]]) -> Iterator[list[LogTask | Parcel]]:
-        """The same in groups: small logs go together."""
-        workers = max(1, self.plan.workers.workers or 4)
-        most = max(1, min(TOGETHER, len(self.plan.logs) // (SHARES * workers)))
-        group: list[LogTask | Parcel] = []
-        room = float(most)
-        for number, task in waiting:
-            entry = self.plan.logs[number]
-            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
-            if group and share > room:
-                yield group
-                group, room = [], float(most)
-            group.append(packed(task, entry.files) if self.plan.workers.ship else task)
-            room -= share
         if group:
             yield group
 
+    def run(self, *, force: bool) -> "tuple[pl.DataFrame, BatchCount]":
+        """Do what is left of the batch, and gather all of it.
+
+        `force` is whether a batch with other options may be gone on with.
+
+        Returns:
+            Why logs failed (columns log, key, stage, error, line), and how many did.
+        """
+        record = {"command": self.command, "do": self.job.do, "versions": versions()}
+        with self.folder.opened(self.options, record, force=force):
+            self.work()
+            return self.gather()
+
     def work(self) -> None:
         """Do what is left of the batch."""
-        groups = self.grouped(self.waiting())
+        groups = self.groups()
         first = next(groups, None)
         if first is None:
-            self.plan.progress(self.count())
+            self.progress(self.count())
             return
-        ship, seen = self.plan.workers.ship, [str(self.folder.path), *self.named(first)]
+        # What every worker has to see: the folder, the first log, and what the options name.
+        seen = [str(self.folder.path), str(first[0].path)]
 
-        def every() -> Iterator[list[LogTask | Parcel]]:
-            yield first
-            yield from groups
+        def noted(path: Path) -> Path:
+            seen.append(str(path))
+            return path
 
-        ended = run_tasks(
-            every(), done_there if ship else done_here, self.plan.workers, self.plan.tell, seen
-        )
+        with_files(self.job.choice, noted)
+        every = chain([first], groups)
+        ended = run_tasks(every, work_on_log, self.workers, self.tell, seen)
         # A batch that stops early takes its cluster down at once.
         with closing(ended):  # type: ignore[type-var]
             for outcome in ended:
                 self.take(outcome)
-                self.plan.progress(self.count())
-                most = self.plan.max_failures
-                if most is not None and len(self.failures) >= most:
-                    self.plan.tell(f"stopped after {len(self.failures)} failures")
-                    return
+                self.progress(self.count())
 
-    def named(self, group: Sequence[LogTask | Parcel]) -> list[str]:
-        """The files that every worker has to see: the first log, and what the options name."""
-        found: list[str] = []
-
-        def noted(path: Path) -> Path:
-            found.append(str(path))
-            return path
-
-        with_files(self.job.choice, noted)
-        return [*found, *(str(task.path) for task in group[:1] if isinstance(task, LogTask))]
-
-    def take(self, outcome: "Outcome[LogTask | Parcel]") -> None:
-        """Keep what a log came to: its files where they were sent, why it failed, what it took."""
-        task = outcome.task.task if isinstance(outcome.task, Parcel) else outcome.task
+    def take(self, outcome: Outcome[LogTask]) -> None:
+        """Keep what a log came to: why it failed, what it took."""
+        task = outcome.task
         if outcome.effort is not None:
             self.efforts[task.key] = outcome.effort
         failure = outcome.failure
         if failure is None:
-            for name, content in (outcome.value or {}).items():
-                self.folder.put(name, content)
-            self.folder.forget(task.key)
             self.done.add(task.key)
             return
         for name in (f"{task.path}: ", f"{task.label}: "):  # it is told with the log's name
             failure = failure._replace(line=failure.line.removeprefix(name))
         for number in [n for n, key in self.keys.items() if key == task.key]:
             self.failures[number] = failure
-        # A log that vanished, or changed, may be there again: that is no property of its bytes.
-        if task.path.exists() and failure.stage != "sending":
-            self.folder.put_failure(task.key, failure._asdict())
 
     def count(self) -> BatchCount:
         """How far it is."""
         return BatchCount(
-            logs=len(self.plan.logs),
+            logs=len(self.logs),
             before=self.before,
             done=len(self.done),
             failed=len(self.failures),
@@ -214,7 +185,7 @@ class _Run:
         logs = pl.DataFrame(
             {
                 "log": [self.labels[n] for n in finished],
-                "episode": [self.plan.logs[n].episode for n in finished],
+                "episode": [self.logs[n].episode for n in finished],
                 "key": [self.keys[n] for n in finished],
             },
             schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
@@ -233,9 +204,8 @@ class _Run:
             },
             orient="row",
         )
-        missing = set(range(len(self.plan.logs))) - set(finished) - self.failures.keys()
         count = self.count()._replace(done=len(finished) - self.before)
-        pages, lines = self.pages(finished), list[IndexLine]()
+        pages, lines = self.pages(finished), list[LogSummary]()
 
         def noted() -> "Iterator[pl.DataFrame]":
             for piece in self.folder.gather(logs, SCHEMA):
@@ -246,7 +216,7 @@ class _Run:
             noted(),
             failures,
             lambda: render_batch(lines, failures),
-            self.record(count, len(missing)),
+            self.record(count),
         )
         return failures, count
 
@@ -256,12 +226,12 @@ class _Run:
             return {}
         return {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in finished}
 
-    def record(self, count: BatchCount, left: int) -> dict[str, Any]:
+    def record(self, count: BatchCount) -> dict[str, Any]:
         """What `run.json` holds: all that depends on when and where a log was done."""
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
         return {
-            "command": self.plan.command,
+            "command": self.command,
             "versions": versions(),
             "do": self.job.do,
             "options_sha256": self.options,
@@ -269,7 +239,6 @@ class _Run:
             "done_before": count.before,
             "done_now": count.done,
             "failed": count.failed,
-            "not_begun": left,
             "in_task_s": sum(e.seconds for e in self.efforts.values()),
             "in_task_cpu_s": sum(e.cpu_seconds for e in self.efforts.values()),
             "first_to_last_s": max(b for _, b in spans) - min(a for a, _ in spans)
@@ -280,30 +249,6 @@ class _Run:
                 for key, effort in self.efforts.items()
             ],
         }
-
-
-def run_batch(plan: BatchPlan) -> "tuple[pl.DataFrame, BatchCount]":
-    """Do what is left of a batch, and gather all of it.
-
-    Returns:
-        Why logs failed (columns log, key, stage, error, line), and how many did.
-    """
-    run = _Run(plan)
-    record = {"command": plan.command, "do": plan.job.do, "versions": versions()}
-    with run.folder.opened(run.options, record, force=plan.force):
-        run.work()
-        return run.gather()
-
-
-def done_here(task: "LogTask | Parcel") -> None:
-    """Do the work on a log that the worker sees."""
-    if isinstance(task, LogTask):
-        work_on_log(task)
-
-
-def done_there(task: "LogTask | Parcel") -> dict[str, bytes]:
-    """Do the work on a log that was sent."""
-    return work_on_parcel(task) if isinstance(task, Parcel) else {}
 
 
 def size_of(entry: LogEntry) -> int:

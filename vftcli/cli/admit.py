@@ -94,17 +94,17 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    Traditional ones and variable-parameter ones. Writes DIR/index.html, recording.rrd,
-    motion.parquet, comparison.{csv,json} and run.json. The
-    force is that of one observer, kfo-fe unless another is named. --set also takes the controllers'
-    parameters: position.stiffness=12, rz.threshold=4, admittance.xi=1.
+    Traditional ones and variable-parameter ones. Writes DIR/index.html, motion.parquet,
+    comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe unless another
+    is named. --set also takes the controllers' parameters:
+    position.stiffness=12, rz.threshold=4, admittance.xi=1.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
     from vftcli.admittance.choice import split_settings
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
-    from vftcli.outputs.admittance.files import files_of_replay, write_admittance
+    from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
@@ -300,13 +300,13 @@ def looped(
 def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> None:
     """The comparison on stdout, remarks on stderr."""
     from vftcli.cli.console import detail, say
-    from vftcli.outputs.admittance.tables import (
+    from vftcli.outputs.admittance_tables import (
         comparison_text,
         latency_text,
         latex_text,
         parameter_text,
     )
-    from vftcli.outputs.plain_rows import json_rows
+    from vftcli.outputs.grid import json_rows
 
     if shown.json:
         typer.echo(json_rows(result.rows).rstrip("\n"))

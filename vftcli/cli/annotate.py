@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class ColumnOptions(opt.Bundle):
-    """Which columns are added, and how the copy is made."""
+    """Which columns are added."""
 
     sd: Annotated[
         bool,
@@ -43,15 +43,6 @@ class ColumnOptions(opt.Bundle):
             "",
             "Write 0 where nothing can be told. Columns …_valid say where; without it, such a "
             "frame stops the run.",
-            group=WRITE,
-        ),
-    ]
-    copy: Annotated[
-        bool,
-        Option(
-            "--copy",
-            "",
-            "Copy videos too. They are linked else, where that can be.",
             group=WRITE,
         ),
     ]
@@ -82,7 +73,7 @@ def annotate_dataset(
 
     Example: vftcli annotate fixtures/panda_episodes -o forces
     """
-    from vftcli.batch.annotated_copy import CopyChoice, annotate
+    from vftcli.batch.annotated_copy import annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.cli.console import command_line, detail, say, say_json, stages
 
@@ -97,16 +88,16 @@ def annotate_dataset(
     )
     engine = workers.choice()
     engine.check_closed(anyway=anyway)
-    how = CopyChoice(allow_missing=columns.allow_missing, link=not columns.copy, force=force)
     record = annotate(
         dataset,
         output,
         asked,
-        how,
         engine,
         command=command_line(),
         tell=detail,
         progress=stages(),
+        allow_missing=columns.allow_missing,
+        force=force,
     )
     if json:
         say_json(record)

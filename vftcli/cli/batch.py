@@ -21,21 +21,6 @@ WITHOUT_REFERENCE = ("estimate", "contacts")
 SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 
 
-class ResumeOptions(opt.Bundle):
-    """Which logs are done, in a second run and at all."""
-
-    limit: Annotated[
-        int | None, Option("--limit", "N", "Only the first N logs.", seldom=True, least=1)
-    ]
-    retry_failed: Annotated[
-        bool, Option("--retry-failed", "", "Also logs that failed in an earlier run.")
-    ]
-    max_failures: Annotated[
-        int | None,
-        Option("--max-failures", "N", "Stop when so many logs failed.", seldom=True, least=1),
-    ]
-
-
 @opt.command
 def batch(
     logs: Annotated[
@@ -45,7 +30,6 @@ def batch(
     output: opt.Folder,
     do: Annotated[str, Option("--do", "COMMAND", "estimate, compare, report or contacts.")],
     workers: opt.Typed[WorkersChoice],
-    resume: ResumeOptions,
     reference: opt.Typed[ReferenceChoice],
     analysis: opt.AnalysisOptions,
     also: opt.ExtraOptions,
@@ -53,19 +37,20 @@ def batch(
 ) -> None:
     """Ask many logs the same, on every core or on a cluster.
 
-    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does no
-    finished log again. Exit code 3: some failed.
+    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does what
+    is missing or failed. Exit code 3: some failed.
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
     from vftcli.batch.kinds import for_comparison, for_estimates
     from vftcli.batch.log_work import LogJob
-    from vftcli.batch.run import BatchPlan, run_batch
+    from vftcli.batch.run import BatchRun
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.doctor.examination import Examiner
+    from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.collection import LogCollection
-    from vftcli.readers.library import Library
+    from vftcli.readers.library import Library, absolute
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.progress import no_stage
 
@@ -84,25 +69,22 @@ def batch(
     engine = workers.choice()
     engine.check_closed(anyway=analysis.anyway)
     collection = LogCollection(choice.read, output)
-    found = list(collection.find(logs))[: resume.limit]
+    found = list(collection.find(logs))
     say_passed([path.name for path in collection.passed])
     if not found:
         raise LogError(
             f"no log in {', '.join(map(str, logs[:3]))}; give files, folders or patterns of logs"
         )
-    plan = BatchPlan(
+    asked = BatchRun(
         logs=found,
         job=job,
-        folder=output,
+        folder=BatchFolder(absolute(output)),
         workers=engine,
         command=command_line(),
-        retry_failed=resume.retry_failed,
-        max_failures=resume.max_failures,
-        force=force,
         tell=say,
         progress=progress_line(),
     )
-    failures, count = run_batch(plan)
+    failures, count = asked.run(force=force)
     STAGES.end()
     for name, reason in failures.select("log", "line").head(MOST_TOLD).iter_rows():
         say(f"error: {name}: {reason}")

@@ -137,7 +137,7 @@ def say_recording(recording: "Recording") -> None:
     rate = f", {1.0 / recording.median_step:.4g} Hz" if recording.samples > 1 else ""
     detail(
         f"{recording.name}: {source.format}, {recording.joints} joints, "
-        f"{recording.all_samples} samples, {recording.duration:.1f} s{rate}"
+        f"{recording.samples} samples, {recording.duration:.1f} s{rate}"
     )
     # That a part was taken is said with the health of the log.
     others = [remark for remark in source.remarks if remark.code not in PARTS]
@@ -149,7 +149,7 @@ def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
     """The examiner of a command's logs: it prints one line on the health of each."""
-    from vftcli.doctor.examiner import Examiner
+    from vftcli.doctor.examination import Examiner
     from vftcli.outputs.examination import health_line
 
     def tell(examination: "Examination") -> None:

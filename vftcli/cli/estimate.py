@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,11 +10,10 @@ from vftcli.cli import options as opt
 from vftcli.signals.option import WRITE, Option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterator, Sequence
 
     from vftcli.analysis import Analysis
-    from vftcli.pipeline import AnalysisChoice
-    from vftcli.signals.recording import Recording
+    from vftcli.outputs.log.estimates import Group
 
 
 @opt.command
@@ -39,12 +38,14 @@ def estimate(
     from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line, say_left_out
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files
+    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
+    from vftcli.pipeline import analyse, prepared
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
     from vftcli.signals.names import EXAMINED
     from vftcli.signals.packages import check_installed
+    from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
     written = also.choice(csv=csv, rrd=rrd or show)
     if "rrd" in written.extras:
@@ -55,18 +56,16 @@ def estimate(
     if analysis.reading.words["columns"] is None:
         refuse_estimates(log)
     library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
-    # What needs no complete log comes in blocks, so that memory does not grow with it.
-    in_blocks = causal and set(written.extras) <= {"csv"} and not chosen.interval
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:
-        made, record = write_estimates(
-            library.open(log, replace(chosen, blocks=in_blocks)),
-            lambda: library.open(log, chosen),
-            choice,
-            output,
-            {"command": command_line(), "choice": written, "force": force},
-        )
+        recording = library.open(log, chosen)
+        # What needs no complete log comes in blocks, so that memory does not grow with it.
+        if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
+            found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
+        else:
+            found = analyse(*prepared(recording, choice), choice)
+        made, record = write_estimate_folder(output, found, command_line(), written, force)
     except JacobianError as found:
         from vftcli.cli.jacobian import write_by_jacobian
 
@@ -83,38 +82,10 @@ def estimate(
         open_made(output)
 
 
-def write_estimates(
-    recording: "Recording",
-    whole: "Callable[[], Recording]",
-    choice: "AnalysisChoice",
-    output: Path,
-    how: dict[str, Any],
-) -> "tuple[Analysis, str]":
-    """Analyse a log, in one piece or block by block, and write its estimates.
-
-    Returns:
-        The analysis, and the record that was written.
-    """
-    from vftcli.outputs.log.estimates import write_estimate_folder, write_long_estimates
-    from vftcli.pipeline import analyse, prepared
-
-    log, robot = prepared(recording, choice)
-    if recording.long is not None:
-        from vftcli.streaming import BlockAnalysis, comes_in_blocks
-
-        if comes_in_blocks(log, robot, choice):
-            run = BlockAnalysis(analyse(log, robot, choice), choice)
-            record = write_long_estimates(output, run.blocks(), lambda: run.made, **how)
-            return run.made, record
-        log, robot = prepared(whole(), choice)
-    made = analyse(log, robot, choice)
-    return made, write_estimate_folder(output, made, **how)
-
-
 def show_estimates(made: "Analysis", output: Path, files: "Sequence[str]") -> None:
     """Print what was found in short, and what was written."""
     from vftcli.cli.console import canvas, say_analysis, show
-    from vftcli.outputs.short_screen import short_screen, written_lines
+    from vftcli.outputs.screen import short_screen, written_lines
 
     say_analysis(made)
     screen = canvas()

@@ -98,25 +98,21 @@ def identify_robot(
 ) -> None:
     """Make a robot file from logs: friction, inertias, payload.
 
-    Writes FILE.toml for --robot, and FILE.html, FILE.rrd and FILE.run.json beside it. With
-    --find-payload a LOG may be a dataset, of which every episode counts.
+    Writes FILE.toml for --robot, and FILE.html and FILE.run.json beside it. With --find-payload
+    a LOG may be a dataset, of which every episode counts.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import (
-        command_line,
-        detail,
-        health_of,
-        say,
-        say_left_out,
-        say_recording,
-        say_robots,
-    )
+    from vftcli.cli.console import command_line, detail, health_of, say, say_recording, say_robots
     from vftcli.cli.opening import open_made
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.identification.files import beside, files_beside, write_identification
-    from vftcli.outputs.identification.tables import tables_text
+    from vftcli.outputs.identification import (
+        beside,
+        files_beside,
+        tables_text,
+        write_identification,
+    )
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=robot.words["friction"] != "none")
@@ -152,9 +148,7 @@ def identify_robot(
     say_robots(examiner.robots)
     for remark in found.remarks:
         detail(f"note: {remark}")
-    files = list(beside(output).values())
-    say(f"wrote {', '.join(str(file) for file in files if file.exists())}")
-    say_left_out(files)
+    say(f"wrote {', '.join(map(str, beside(output).values()))}")
     typer.echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))

@@ -47,8 +47,7 @@ def observers(json: opt.Json) -> None:
     Example: vftcli observers
     """
     from vftcli.cli.console import say_json
-    from vftcli.observers import OBSERVERS
-    from vftcli.observers.settings import PARAMETERS
+    from vftcli.observers.table import OBSERVERS, PARAMETERS
 
     rows = [
         {

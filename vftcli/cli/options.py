@@ -145,22 +145,11 @@ class ExtraOptions(Bundle):
             group=WRITE,
         ),
     ]
-    layouts: Annotated[
-        bool,
-        Option(
-            "--layouts",
-            "",
-            "Also write its layouts for Foxglove and PlotJuggler; implies --mcap.",
-            seldom=True,
-            group=WRITE,
-        ),
-    ]
     written: Typed[OutputChoice]
 
     def choice(self, **others: bool) -> OutputChoice:
         """What is written, with what the command's own options ask for."""
-        asked = {**others, "mcap": self.mcap or self.layouts, "layouts": self.layouts}
-        extras = tuple(name for name, wanted in asked.items() if wanted)
+        extras = tuple(name for name, asked in {**others, "mcap": self.mcap}.items() if asked)
         return replace(self.written.choice(), extras=extras)
 
 

@@ -56,7 +56,7 @@ def report(
     written, form = also.choice(), checked_form(figures)
     names = report_files([library.label(log) for log in logs], written.extras, form)
     OutputFolder(output, force, names).check()
-    choice = replace(analysis.choice(library, reference, on_screen=not json), spares_memory=True)
+    choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
         check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
@@ -126,8 +126,7 @@ def show_report(
     from vftcli.outputs.log.report import FILES, SUMMARY_FILES
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.log.wrench_tables import paper_bounds
-    from vftcli.outputs.screen import log_screen, logs_screen
-    from vftcli.outputs.short_screen import written_lines
+    from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))

@@ -46,15 +46,15 @@ def tune_gains(
     """
     from vftcli.cli.console import command_line, detail, health_of, say, say_json, say_recording
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
+    from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.outputs.examination import health_record, overridden_lines
-    from vftcli.outputs.figures.tuned import write_tuned
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
+    from vftcli.outputs.log.figures import write_tuned
     from vftcli.outputs.log.run_record import jsonable
     from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
     from vftcli.readers.library import Library
-    from vftcli.refinement.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from vftcli.contacts.places import ArmPart
     from vftcli.contacts.untouched import Basis
-    from vftcli.contacts.windows import ContactPrior
+    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.
@@ -219,7 +219,7 @@ class ContactModel(Shown):
     """What the list rests on."""
 
     #: How the wrench of the contacts moves, None where it was not learned.
-    prior: "ContactPrior | None"
+    prior: "WrenchPrior | None"
     noise_sd: Array  #: √R of each joint. (n,) [N·m]
     error_sd: Array  #: Standard deviation of the model error. (n,) [N·m]
     error_time: Array  #: Its correlation time. (n,) [s]

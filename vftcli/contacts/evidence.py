@@ -15,17 +15,17 @@ from vftcli.contacts.places import ContactPlace
 from vftcli.contacts.windows import (
     BlockLog,
     BlockSpan,
-    ContactPrior,
     Lane,
     assembled,
     batches,
-    gate_of,
     likelihoods,
     padding,
     window_of,
 )
 from vftcli.signals.arrays import Array
+from vftcli.signals.intervals import covered
 from vftcli.signals.linear_model import SPIKE
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free motion one
 #: reversal of friction reached 15, everything else but abrupt stops stayed below 6.
@@ -42,19 +42,19 @@ LASTING, STEADY_TIME = 1.5, 100.0
 
 
 def evidence(
-    log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[BlockSpan], prior: ContactPrior
+    log: BlockLog, places: Sequence[ContactPlace], runs: Sequence[BlockSpan], prior: WrenchPrior
 ) -> Array:
     """Evidence ln p(d | contact there) − ln p(d | nothing) of the best size. (C, places) [nats]"""
     count = len(log.blocks.t)
-    every = gate_of(count, runs)
+    every = covered(runs, count, 1)
     nothing, touched, owner = [], [], []
     for number, run in enumerate(runs):
-        window, gate = window_of(log.blocks.t, run), gate_of(count, [run])
+        window, gate = window_of(log.blocks.t, run), covered([run], count, 1)
         hidden = every & ~gate
         nothing.append(Lane(window, gate, hidden, places[0].jacobian, None))
         for k, place in enumerate(places):
             for time, force in courses(prior, log.blocks.t[run[1] - 1] - log.blocks.t[run[0]]):
-                tried = ContactPrior(time, force, place.lever * force)
+                tried = WrenchPrior(time, force, place.lever * force)
                 touched.append(Lane(window, gate, hidden, place.jacobian, tried))
                 owner.append((number, k))
     each = np.full((len(runs), len(places)), -np.inf)
@@ -63,7 +63,7 @@ def evidence(
     return found
 
 
-def courses(prior: ContactPrior, lasts: float) -> list[tuple[float, float]]:
+def courses(prior: WrenchPrior, lasts: float) -> list[tuple[float, float]]:
     """Correlation time [s] and standard deviation [N] of the forces that are tried.
 
     Args:

@@ -28,7 +28,7 @@ from vftcli.contacts.untouched import (
     observed,
     untouched_motion,
 )
-from vftcli.contacts.windows import BlockLog, BlockSpan, gate_of
+from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
@@ -37,6 +37,7 @@ from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.intervals import covered
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
@@ -142,7 +143,9 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
         recording=run.name,
         duration=run.recording.duration,
         contacts=numbered(told),
-        candidates=numbered(sorted((replace(row, inferred=True) for row in weak), key=start_of)),
+        candidates=numbered(
+            sorted((replace(row, inferred=True) for row in weak), key=lambda row: row.start)
+        ),
         basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
@@ -171,11 +174,6 @@ def carried(load: FreeLoad, run: Run) -> CarriedLoad:
     name = min(apart, key=lambda key: apart[key], default=None)
     alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
     return CarriedLoad(load.mass, load.sd, run.robot.name, name if alike else None, span)
-
-
-def start_of(row: Contact) -> float:
-    """When a contact begins. [s]"""
-    return row.start
 
 
 def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:
@@ -239,7 +237,7 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
     spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
     course = error_course(fine.noise, blocks)
-    others = gate_of(len(blocks.t), [spans[k] for k in range(len(spans)) if k not in set(brief)])
+    others = covered([spans[k] for k in range(len(spans)) if k not in set(brief)], len(blocks.t), 1)
     white = np.where(others[:, None], UNKNOWN, course.white)
     some = found.kept(brief)._replace(
         log=BlockLog.of(blocks, course._replace(white=white)),

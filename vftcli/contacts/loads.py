@@ -5,13 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.contacts.contact_list import Contact
-from vftcli.contacts.rows import NORMAL, force_course, with_drives
+from vftcli.contacts.rows import NORMAL, force_course
 from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import REST, faster
-from vftcli.virtual_sensor.smoother.smoothing import DRIVES, SmoothedWrench, smooth_wrench
+from vftcli.virtual_sensor.smoother.smoothing import (
+    DRIVES,
+    SmoothedWrench,
+    hidden_by_blocks,
+    smooth_wrench,
+)
 
 #: Share of the time since the first motion that contacts must fill together to be a load.
 SHARE = 0.5
@@ -72,7 +77,9 @@ def load_row(motion: FreeMotion, contacts: tuple[Contact, ...]) -> Contact:
         mean_force=mean[:3],
         impulse=mean[:3] * (stop - start),
         anywhere=(max(size - band, 0.0), size + band),
-        course=force_course(wrench.t[lasts], forces, with_drives(forces, covariance)),
+        course=force_course(
+            wrench.t[lasts], forces, covariance + hidden_by_blocks(forces, bent=0.0)
+        ),
         where="wrist" if "wrist" in {contact.where for contact in contacts} else "cannot tell",
     )
 

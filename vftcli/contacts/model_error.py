@@ -26,10 +26,10 @@ from vftcli.virtual_sensor.smoother.noise import (
     UNSEEN_SHARE,
     UNSEEN_TIME,
     fit_joints,
+    long_stretches,
     steps,
 )
 
-LEAST_STRETCH = 20  #: Fewest blocks in a row that a spectrum is learned from.
 #: Share of the free part's blocks in which a joint must move for its reversals to be bridged.
 MOVES = 0.3
 #: Shares of the normalised squares ν²/S, and where χ² of one degree has them.
@@ -86,16 +86,13 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
         free: Blocks of every free piece.
         dry: F_c of each joint. (n,) [N·m]
     """
-    pieces = [piece.part(slice(*run)) for piece in free for run in stretches(piece)]
+    pieces = [stretch for piece in free for stretch in long_stretches(piece)]
     if not pieces:
         return None
     moving = ~np.concatenate([piece.rests for piece in pieces])
     share = moving.mean(axis=0)
     bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
-    each = fit_joints(bridged)
-    white, variance, time = (np.array(v) for v in zip(*each, strict=True))
-    # An offset is an error too.
-    variance += np.concatenate([piece.d for piece in bridged]).mean(axis=0) ** 2
+    white, variance, time = fit_joints(bridged)
     found = ErrorNoise(
         white=white,
         variance=variance,
@@ -147,11 +144,6 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
         seen=np.ones(len(dry)),
         free_seconds=0.0 if learned is None else learned.free_seconds,
     )
-
-
-def stretches(piece: Blocks) -> list[tuple[int, int]]:
-    """Where the stretches of known blocks that a spectrum can be learned from begin and end."""
-    return [run for run in runs_of(piece.known) if run[1] - run[0] >= LEAST_STRETCH]
 
 
 def without_reversals(piece: Blocks, joints: Mask) -> Blocks:

@@ -22,13 +22,15 @@ from vftcli.contacts.places import (
 from vftcli.contacts.search import Found
 from vftcli.contacts.sizes import learn_prior, smooth_contacts
 from vftcli.contacts.untouched import SelfTest, Untouched, self_test
-from vftcli.contacts.windows import BlockLog, ContactPrior, WindowWrench, gate_of
+from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.intervals import covered
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import median_step
-from vftcli.virtual_sensor.smoother.smoothing import BENT, DRIVES, hidden_by_blocks
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the error of the
 #: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
@@ -58,7 +60,7 @@ class Measurer:
     run: Run  #: The log with its robot's model.
     found: Found  #: The contacts that were kept.
     log: BlockLog  #: The log in blocks; joints at rest may settle anew under a contact.
-    prior: ContactPrior  #: How the wrench of the contacts moves.
+    prior: WrenchPrior  #: How the wrench of the contacts moves.
     test: SelfTest  #: How well free motion lets a wrench be told.
     #: Mean and variance of what the model errs by, bridged across the contacts. (K, n) [N·m], (K,
     #: n) [(N·m)²]
@@ -71,7 +73,7 @@ class Measurer:
     ) -> "Measurer":
         """Learn what the contacts' wrench is like, and how well free motion lets it be told."""
         blocks, J = found.log.blocks, found.places[0].jacobian
-        gate = gate_of(len(blocks.t), found.runs)
+        gate = covered(found.runs, len(blocks.t), 1)
         course = error_course(free.noise, blocks, gate)._replace(white=found.log.course.white)
         log = BlockLog.of(blocks, course)
         bent = BENT
@@ -98,7 +100,7 @@ class Measurer:
         return replace(other, bent=self.bent)
 
     @cached_property
-    def priors(self) -> list[ContactPrior]:
+    def priors(self) -> list[WrenchPrior]:
         """How the wrench of every contact may move: one that is short moves faster."""
         blocks, own = self.found.log.blocks, loosened(self.prior)
         lasts = [float(blocks.length[slice(*run)].sum()) for run in self.found.runs]
@@ -228,7 +230,7 @@ class Measurer:
         return where, named, best[named] - max(v for part, v in best.items() if part != named)
 
 
-def loosened(prior: ContactPrior) -> ContactPrior:
+def loosened(prior: WrenchPrior) -> WrenchPrior:
     """The prior under which the size of a contact is told."""
     return prior._replace(force=LOOSER * prior.force)
 
@@ -304,13 +306,6 @@ def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     u = force / np.maximum(size, 1e-12)[:, None]
     variance = np.einsum("ki,kij,kj->k", u, covariance, u)
     return ForceCourse(t, size, NORMAL * np.sqrt(variance))
-
-
-def with_drives(force: Array, covariance: Array) -> Array:
-    """Covariances of forces with the share of them that the drives' constants hide. (K, 3, 3)"""
-    share: Array = DRIVES * force
-    found: Array = covariance + share[:, :, None] * share[:, None, :]
-    return found
 
 
 def vendor_force(run: Run, J: Array, peak: int, t: Array) -> float | None:

@@ -11,11 +11,12 @@ from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, spike
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
-from vftcli.contacts.windows import BlockLog, BlockSpan, ContactPrior
+from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
 #: observer's lag is over, friction has turned. [s]
@@ -31,7 +32,7 @@ class Found(NamedTuple):
     evidence: Array  #: Of every candidate at every place. (C, places) [nats]
     #: Of every candidate whether a joint's torque is beyond its threshold in it.
     beyond: list[bool]
-    prior: ContactPrior  #: How the wrench of the candidates moves.
+    prior: WrenchPrior  #: How the wrench of the candidates moves.
 
     @property
     def best(self) -> Array:

@@ -13,18 +13,17 @@ from vftcli.contacts.windows import (
     MARGIN,
     BlockLog,
     BlockSpan,
-    ContactPrior,
     Lane,
     WindowWrench,
-    gate_of,
     likelihoods,
     smooth_lanes,
     window_of,
 )
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.intervals import covered, runs_of
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
-START = ContactPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
+START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]
 NEAR = 0.4  #: How far a window reaches beyond its contact where only the prior is learned. [s]
 FORCES, MOMENTS = (3.0, 300.0), (0.1, 50.0)  #: Smallest and largest standard deviation. [N], [N·m]
@@ -40,7 +39,7 @@ def smooth_contacts(
     log: BlockLog,
     jacobians: Sequence[Array],
     runs: Sequence[BlockSpan],
-    priors: Sequence[ContactPrior],
+    priors: Sequence[WrenchPrior],
 ) -> list[WindowWrench]:
     """The wrench in the window of every contact.
 
@@ -57,7 +56,7 @@ def contact_lanes(
     log: BlockLog,
     jacobians: Sequence[Array],
     runs: Sequence[BlockSpan],
-    priors: Sequence[ContactPrior],
+    priors: Sequence[WrenchPrior],
     margin: float = MARGIN,
 ) -> list[Lane]:
     """A lane for every contact, the others hidden.
@@ -70,17 +69,17 @@ def contact_lanes(
         margin: How far a lane reaches beyond its contact. [s]
     """
     count = len(log.blocks.t)
-    every, lanes = gate_of(count, runs), []
+    every, lanes = covered(runs, count, 1), []
     for run, jacobian, prior in zip(runs, jacobians, priors, strict=True):
-        gate = gate_of(count, [run])
+        gate = covered([run], count, 1)
         window = window_of(log.blocks.t, run, margin)
         lanes.append(Lane(window, gate, every & ~gate, jacobian, prior))
     return lanes
 
 
 def learn_prior(
-    log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: ContactPrior, rounds: int
-) -> ContactPrior:
+    log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: WrenchPrior, rounds: int
+) -> WrenchPrior:
     """The prior by expectation and maximisation: τ_w by likelihood, then σ_f and σ_m by the mean.
 
     Args:
@@ -106,7 +105,7 @@ def learn_prior(
         covariance = np.concatenate([course.covariance for course in inside])
         power = (values**2 + np.diagonal(covariance, axis1=1, axis2=2)).mean(axis=0)
         force, moment = np.sqrt(power[:3].mean()), np.sqrt(power[3:].mean())
-        prior = ContactPrior(time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS)))
+        prior = WrenchPrior(time, float(np.clip(force, *FORCES)), float(np.clip(moment, *MOMENTS)))
     return prior
 
 

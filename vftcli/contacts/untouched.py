@@ -18,9 +18,7 @@ from vftcli.contacts.model_error import (
 from vftcli.contacts.places import places
 from vftcli.contacts.windows import (
     BlockLog,
-    ContactPrior,
     Lane,
-    gate_of,
     smooth_lanes,
     window_of,
 )
@@ -35,11 +33,12 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.intervals import near, runs_of
+from vftcli.signals.intervals import covered, near, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
@@ -178,25 +177,24 @@ def noise_of(
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
-    """What is free of contact, None where nothing is known to be.
+    """The free part of a log, None where there is none, or it is found and to be doubted.
 
-    Where in a free run or cycle the log's own motion lies does not matter here: nothing is paired.
+    Its remarks say of free runs that they are: nothing is paired with them.
     """
-    own, log, choice = motion.within_spans, motion.log, motion.choice
-    remarks = [fact("free-span", begin_s=begin, end_s=end) for begin, end in choice.spans]
-    if choice.cycles or not (choice.is_given or motion.runs):
-        if not choice.cycles and not repeats(motion):
-            return None
-        found = motion.free_cycles
-        own = own | np.isin(motion.cycles.number(log.t), found.numbers)
-        if not choice.cycles and is_touched(log, own):
-            return None
-        remarks.append(found.remark(motion.cycles.whole))
-    pieces = [RunSamples(log, own)] if own.any() else []
-    for run in motion.runs:
-        pieces.append(RunSamples(run.run, np.ones(run.recording.samples, dtype=bool)))
-        remarks.append(fact("free-log", Where(about=run.recording.name)))
-    return FreePart(tuple(pieces), own, tuple(remarks))
+    try:
+        part = motion.known
+    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
+        if motion.choice.is_given:
+            raise
+        return None
+    if part.doubted and (
+        motion.cycles.whole < LEAST_CYCLES
+        or not motion.free_cycles.numbers
+        or is_touched(motion.log, part.own)
+    ):
+        return None
+    runs = (fact("free-log", Where(about=run.recording.name)) for run in motion.runs)
+    return part._replace(remarks=(*part.remarks, *runs))
 
 
 def is_touched(log: Run, own: Mask) -> bool:
@@ -207,14 +205,6 @@ def is_touched(log: Run, own: Mask) -> bool:
     try:
         return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
     except ParameterError:  # too short for a spectrum
-        return False
-
-
-def repeats(motion: FreeMotion) -> bool:
-    """Whether the log has two cycles at least, and the quietest of them can be told."""
-    try:
-        return motion.cycles.whole >= LEAST_CYCLES and len(motion.free_cycles.numbers) > 0
-    except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded
         return False
 
 
@@ -276,7 +266,7 @@ class SelfTest(NamedTuple):
     smallest_force: float  #: |F| that 95 % of the blocks stay below. [N]
 
 
-def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
+def self_test(free: Untouched, robot: Robot, prior: WrenchPrior) -> SelfTest:
     """Make contacts up in free motion, whose wrench is zero, and see what is measured."""
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
@@ -284,11 +274,11 @@ def self_test(free: Untouched, robot: Robot, prior: ContactPrior) -> SelfTest:
         made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
         if not made_up:
             continue
-        course = error_course(free.noise, blocks, gate_of(count, made_up))
+        course = error_course(free.noise, blocks, covered(made_up, count, 1))
         J = places(robot.loaded_chain, blocks.q)[0].jacobian
         nowhere = np.zeros(count, dtype=bool)
         lanes = [
-            Lane(window_of(blocks.t, run), gate_of(count, [run]), nowhere, J, prior)
+            Lane(window_of(blocks.t, run), covered([run], count, 1), nowhere, J, prior)
             for run in made_up
         ]
         measured = smooth_lanes(BlockLog.of(blocks, course), lanes)

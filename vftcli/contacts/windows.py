@@ -15,18 +15,11 @@ from vftcli.signals.linear_model import (
     smoothed,
 )
 from vftcli.virtual_sensor.smoother.noise import steps
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
 BlockSpan = tuple[int, int]  #: Number of the first block, and of the one behind the last.
-
-
-class ContactPrior(NamedTuple):
-    """An Ornstein–Uhlenbeck prior of a contact's wrench in base axes."""
-
-    time: float  #: Correlation time τ_w. [s]
-    force: float  #: Standard deviation σ_f of each component of the force. [N]
-    moment: float  #: That of the moment, σ_m. [N·m]
 
 
 class BlockLog(NamedTuple):
@@ -49,7 +42,7 @@ class Lane(NamedTuple):
     gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
     hidden: Mask  #: Blocks of the log that say nothing. (K,)
     jacobian: Array  #: J along the log. (K, 6, n)
-    prior: ContactPrior | None  #: How the wrench may move; None where nothing touches.
+    prior: WrenchPrior | None  #: How the wrench may move; None where nothing touches.
 
 
 def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
@@ -57,14 +50,6 @@ def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
     first = int(np.searchsorted(t, t[run[0]] - margin))
     last = int(np.searchsorted(t, t[run[1] - 1] + margin, side="right"))
     return first, last
-
-
-def gate_of(count: int, runs: Sequence[BlockSpan]) -> Mask:
-    """The blocks of some runs and one on either side. (K,)"""
-    inside = np.zeros(count, dtype=bool)
-    for start, stop in runs:
-        inside[max(start - 1, 0) : stop + 1] = True
-    return inside
 
 
 def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
@@ -105,11 +90,9 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
             continue
         jacobian[:count, i] = lane.jacobian[span]
         inside = lane.gate[span]
-        goes_on = inside & np.concatenate([[False], inside[:-1]])
-        stays = np.where(goes_on, np.exp(-log.step[span] / lane.prior.time), 0.0)
-        variance = np.repeat([lane.prior.force**2, lane.prior.moment**2], 3)
+        stays = lane.prior.decay(inside, log.step[span])
         decay[:count, i, :6] = stays[:, None]
-        added[:count, i, :6] = np.where(inside, 1.0 - stays**2, 0.0)[:, None] * variance
+        added[:count, i, :6] = np.where(inside, 1.0 - stays**2, 0.0)[:, None] * lane.prior.variance
     return LinearModel(d, beside_errors(jacobian), white, decay, added)
 
 

@@ -15,9 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.stuck import TRAVEL
-from vftcli.doctor.windows import Windows, solve, spread, terms, up_axes, windows_of
+from vftcli.doctor.windows import Case, Windows, size_of, solve, spread, terms, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.drive import effort_name
 from vftcli.robots.friction import steady_torque
@@ -312,7 +311,13 @@ TRIALS = (tilted, turned_or_swapped, shifted, scaled)
 
 def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
     """The cause that leaves least, if it leaves little, and the next."""
-    found = sorted((c for c in found if is_accepted(case, c)), key=lambda cause: cause.misfit)
+
+    def explains(cause: Cause) -> bool:
+        limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
+        little = cause.misfit < limit * case.misfit or is_plain(case, cause)
+        return cause.misfit <= OPEN and little
+
+    found = sorted(filter(explains, found), key=lambda cause: cause.misfit)
     if not found:
         return Diagnosis(case)
     best = found[0]
@@ -324,13 +329,6 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
     implied = {best.code, "joint-sign" if best.code == "effort-sign" else ""}
     near = (c for c in found if c.misfit < AMBIGUOUS * best.misfit and c.code not in implied)
     return Diagnosis(case, best, next(near, None))
-
-
-def is_accepted(case: Case, cause: Cause) -> bool:
-    """Whether a cause leaves little enough to be named."""
-    limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
-    little = cause.misfit < limit * case.misfit or is_plain(case, cause)
-    return cause.misfit <= OPEN and little
 
 
 def is_plain(case: Case, cause: Cause) -> bool:

@@ -10,13 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.clock import GAP_STEPS
+from vftcli.doctor.signals import GAP_STEPS
 from vftcli.doctor.stuck import repeated_rows
 from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask, median
-from vftcli.signals.errors import ExaminationError
 from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
@@ -74,22 +73,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
         if 0 < np.mean(fresh.any(axis=1)) <= bad.most:
             cuts += cuts_of(log.t, bad, fresh)
             rows |= fresh.any(axis=1)
-    kept = log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
-    if recording.long is None:
-        return kept
-    return kept.changed(lambda: lambda block: sound_block(block, robot))
-
-
-def sound_block(block: Recording, robot: Robot) -> Recording:
-    """A block of a long log as it is."""
-    sound = without_bad_samples(block, robot)
-    if sound is block:
-        return block
-    found = next(iter((*cut_findings(sound), *reversed(sound.source.remarks))))
-    raise ExaminationError(
-        f"{block.name}: {found}. A log that is read in blocks cannot be mended: leave out "
-        "--causal, or leave that part out with --interval."
-    )
+    return log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
 
 
 def cut_findings(recording: Recording) -> Iterator[Remark]:
@@ -215,8 +199,7 @@ def frozen_rows(recording: Recording) -> Mask:
 def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     """Changes of position beyond what the velocities say, and which of them are jumps.
 
-    The sample before each (K,), their sizes (K, n) [rad], and the jumps among them (K, n). A step
-    of time may be off by what the steps around it are, and by a sample that was late.
+    The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be off.
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step

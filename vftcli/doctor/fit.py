@@ -13,13 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.case import Case, size_of
 from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
-from vftcli.doctor.windows import Windows, windows_of
+from vftcli.doctor.windows import Case, Windows, size_of, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
@@ -91,7 +90,7 @@ def profiles() -> dict[str, Robot]:
 def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMatch, ...]]:
     """The profile that a log is from where the maker's own model settles it, and all fits.
 
-    A measured effort settles nothing: friction and loads leave several per cent of it open.
+    A measured effort settles nothing: friction and loads leave too much open.
     """
     fits = ranking(recording, profiles().values())
     if not fits or not fits[0].by_maker or fits[0].misfit > GUESSED:
@@ -286,7 +285,10 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     found = []
     for robot in (robots[fit.robot] for fit in tried):
         diagnosis = diagnose(recording, robot, ignored)
-        if diagnosis is not None and (fits[0].fits or is_mistaken(diagnosis)):
+        if diagnosis is None:
+            continue
+        mistaken = diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
+        if fits[0].fits or mistaken:
             found.append((diagnosis.healed.misfit, robot, diagnosis))
     if found:
         _, robot, diagnosis = min(found, key=lambda one: one[0])
@@ -298,11 +300,6 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     # Without an arm the work of its effort is all that tells its sign.
     remark = warning(code, ranked="; ".join(map(str, fits)))
     return ArmFindings((*inverted_effort(recording), remark), fits)
-
-
-def is_mistaken(diagnosis: Diagnosis) -> bool:
-    """Whether a cause explains a log so well that its arm is believed, which nobody named."""
-    return diagnosis.cause is not None and diagnosis.healed.misfit < MISTAKEN
 
 
 def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:

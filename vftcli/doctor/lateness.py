@@ -190,8 +190,7 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
 def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
     """First samples of windows that lie on an even clock at every lag. (W,)
 
-    The clock is t (T,) [s]; a window has so many steps, lags go from one number of samples, which
-    is negative, to another.
+    The clock is t (T,) [s]; lags go from one number of samples, negative, to another.
     """
     starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
     starts = starts[spread(len(starts), WINDOWS, BLOCK)]

@@ -5,10 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.doctor.case import Case
 from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
-from vftcli.doctor.windows import RobustFit, solve
+from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots import Robot
 from vftcli.robots.drive import gain_sd
 from vftcli.signals.arrays import Array, Mask
@@ -44,8 +43,7 @@ RATIO = 0.05
 def drive_constants(recording: Recording) -> Array:
     """The controller's own torque per current, target_torque over target_current. (n,) [N·m/A]
 
-    The controller adds friction to its current while it moves, so only resting samples count; NaN
-    where they carry too little current, or where the log lacks either.
+    Of resting samples, as friction is fed forward in motion; NaN where they carry too little.
     """
     current, torque = recording.target_current, recording.target_torque
     constants = np.full(recording.joints, np.nan)

@@ -285,8 +285,7 @@ def exchanged(fit: VelocityFit) -> list[int]:
 def held_shares(recording: Recording) -> dict[int, float]:
     """Joints with a velocity that stays for some samples and then jumps while they move on.
 
-    Each with the share of its moving steps in which its velocity repeats itself [%]. A constant
-    speed repeats for longer; one of coarse resolution mostly changes by a step of it.
+    Each with the share of its moving steps in which its velocity repeats itself, for short. [%]
     """
     t, q, dq = recording.t, recording.q, recording.require("dq")
     first = spread(recording.samples - 1, STEPS, BLOCK)

@@ -149,7 +149,15 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
         x[~answered] = 0.0
         squares = x - y[:, None]
         squares *= squares
-        paired, own = draw_blocks(squares)
+        # In the longest blocks, and in each observer's own.
+        lengths = block_lengths(squares).tolist() if len(squares) else []
+        paired = Resampled(np.ones((1, len(names))), 0)
+        own = tuple(resample(x[:, None], n) for x, n in zip(squares.T, lengths, strict=False))
+        if lengths:
+            paired = resample(squares, max(lengths))
+        floor = float("nan") if reference.floor is None else float(reference.floor[j])
+        if reference.floor is not None and reference.sd is not None and known.any():
+            floor = float(np.sqrt(np.nanmean(reference.sd[known, j] ** 2)))
         yield Scored(
             names=names,
             joint=j + 1,
@@ -157,49 +165,19 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             missing=np.count_nonzero(~answered, axis=0).astype(np.float64),
             reference=y,
             moving=moving[known, j],
-            floor=floor_over(reference, j, known),
+            floor=floor,
             paired=paired,
-            own=own,
+            own=own or (paired,) * len(names),
             lag=lag[:, j],
             within=np.array([within[j] for within, _ in covered]),
             banded=np.array([banded[j] for _, banded in covered]),
         )
 
 
-def draw_blocks(squares: Array) -> tuple[Resampled, tuple[Resampled, ...]]:
-    """Bootstrap draws of mean squares, in the longest blocks and in each column's own.
-
-    Args:
-        squares: Squared errors, one column an observer. (T, m) [(N·m)²]
-    """
-    if not len(squares):
-        none = Resampled(np.ones((1, squares.shape[1])), 0)
-        return none, (none,) * squares.shape[1]
-    lengths = [int(length) for length in block_lengths(squares)]
-    own = tuple(resample(x[:, None], n) for x, n in zip(squares.T, lengths, strict=True))
-    return resample(squares, max(lengths)), own
-
-
-def floor_over(reference: ExternalTorque, joint: int, known: Mask) -> float:
-    """The reference's own error on one joint over the compared samples, NaN if unknown. [N·m]
-
-    Args:
-        reference: What estimates are judged by.
-        joint: Joint number, from 0.
-        known: The compared samples. (T,)
-    """
-    if reference.floor is None:
-        return float("nan")
-    if reference.sd is None or not known.any():
-        return float(reference.floor[joint])
-    return float(np.sqrt(np.nanmean(reference.sd[known, joint] ** 2)))
-
-
 def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> tuple[Array, Array]:
     """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (n,), (n,)
 
-    Samples in which the joint rests do not count: stiction hides there what the band cannot know.
-    Without a band none counts; a sample without an answer is in no band.
+    Where the joint rests, or without a band, none counts; one without an answer is in no band.
     """
     if estimate.error_sd is None:
         return np.zeros(estimate.joints), np.zeros(estimate.joints)
@@ -297,8 +275,7 @@ class PoolMember(NamedTuple):
 def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
     """Rows over all samples of several logs together, each log resampled on its own.
 
-    An error is an arm's: logs of two arms are not pooled, nor those of other observers; the table
-    is then empty, as it is for fewer than two logs.
+    Logs of two arms, or of other observers, are not pooled, nor fewer than two: the table is empty.
     """
     kinds = {(m.robot, m.reference.joints, tuple(e.name for e in m.estimates)) for m in members}
     if len(members) < 2 or len(kinds) != 1:

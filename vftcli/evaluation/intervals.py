@@ -81,8 +81,8 @@ def block_lengths(squares: Array) -> NDArray[np.intp]:
 def correlation_time(x: Array) -> Array:
     """Integral of each column's autocorrelation up to its first value below 0.05. (m,) [samples]
 
-    1 for white noise. Lags are looked at `FIRST_LAGS` at first, then four times as many, until
-    every column has fallen or half of the log is reached.
+    1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or half of
+    the log is reached.
     """
     most = max(len(x) // 2, 1)
     columns = np.ascontiguousarray((x - x.mean(axis=0)).T)

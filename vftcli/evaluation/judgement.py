@@ -89,8 +89,7 @@ def reference_wrench(
 ) -> Wrench:
     """The wrench that estimates are judged by, in the virtual sensor's frame.
 
-    A sensor's and a file's wrench stay as they are; any other reference is a torque, and goes
-    through least squares. Samples in which the pose cannot tell a wrench are masked alike.
+    A sensor's or a file's stays; any other reference is a torque, solved by least squares.
     """
     torque = reference.torque
     # Plain least squares whatever the estimates' solver is: a reference is not to be smoothed.

@@ -67,7 +67,7 @@ def evaluate_wrenches(
 def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | None:
     """Share of the known samples with an error within 1.96 standard deviations.
 
-    A sample without an answer has an error of NaN, which lies in no band.
+    An error of NaN lies in no band.
     """
     if wrench.sd is None or not known.any():
         return None

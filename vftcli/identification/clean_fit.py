@@ -106,8 +106,7 @@ class ContactSpan(NamedTuple):
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
     """Stretches with a residual far outside the rest of the log, neighbours joined.
 
-    Near a reversal a joint may stick, and the residual be as large as its dry friction: only what
-    exceeds that counts there.
+    Near a reversal a joint may stick: only what exceeds its dry friction counts there.
 
     Args:
         motion: The prepared log.
@@ -209,8 +208,7 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
     """Remarks on logs with friction that falls from third to third.
 
-    Of what the fit leaves, the part that goes with the direction is the dry friction that a third
-    has beyond the whole log's. A gear that warms up rubs less and less.
+    What the fit leaves along the direction is what a third has beyond the whole log's dry friction.
     """
     models = [JointFriction() if fit is None else fit.friction for fit in fits]
     dry = dry_friction(models, data.robot.joints)

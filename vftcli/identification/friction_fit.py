@@ -224,9 +224,8 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
 def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
     """Choose one presliding length for the whole arm by cross-validation, or none.
 
-    It is chosen in the band in which an observer listens: what the play operator leaves at a
-    reversal is a slow step, which a wider band drowns in noise. Of the nearly best the shortest is
-    used, which forgets soonest that it started undeflected.
+    It is chosen in the band in which an observer listens: a slow step drowns in a wider one's
+    noise. Of the nearly best it is the shortest, which forgets its start soonest.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
     # Of a joint that goes one way the play operator is a constant.
@@ -361,8 +360,8 @@ def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
 def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
     """A shape's fit; with presliding, without the dry terms that come out negative.
 
-    Presliding and the smoothed sign share one dry torque: where one of them takes more than all of
-    it, the other is left out.
+    Presliding and the smoothed sign share one dry torque: one that takes too much excludes the
+    other.
     """
     fit = data.fit(shape)
     pushing = pushing_terms(shape, fit.values)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import polars as pl
 
-from vftcli.identification.friction_method import friction_method
+from vftcli.identification.methods import chosen_method, friction_method, whole_arm
 from vftcli.identification.payload import (
     LoadFit,
     NotSameMotionError,
@@ -24,14 +24,12 @@ from vftcli.identification.result import (
     SHAPE_CHOICES,
     Identification,
     MethodResult,
-    Number,
     number,
     score,
     score_remarks,
 )
 from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
-from vftcli.identification.whole_arm import chosen_method, whole_arm
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
 from vftcli.signals.errors import IdentificationError, ParameterError
@@ -94,13 +92,14 @@ def identify(
         MissingSignalError: If a signal is missing.
         ParameterError: If two logs are the same run: it would count as two.
     """
-    refuse_repeated_logs(logs if free is None else [*logs, free])
+    sources = logs if free is None else [*logs, free]
+    refuse_repeated_logs(sources)
     refuse_repeated_logs(held_out, "--validate")
     load = find_load(logs, robot, free) if task.find_payload else None
-    train = free_logs(logs, free, load)
-    if task.method is None or not train:
-        result = MethodResult("payload", robot)
-    else:
+    train = logs if free is None or load is None else [free]
+    train = [log for log in train if load is None or not load.carried_by(log)]
+    result = MethodResult("payload", robot)
+    if task.method is not None and train:
         data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
         result = METHODS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
@@ -113,7 +112,10 @@ def identify(
     remarks += score_remarks(new, traces)
     if load is not None:
         new = new.with_payload(load.payload)
-        numbers += load_numbers(load, robot.joints - 1)
+        last, mass, sd = robot.joints - 1, load.payload.mass, load.mass_sd
+        numbers.append(number(last, "mass", mass, sd, np.nan, sd < 0.2 * mass))
+        for axis, value, sd in zip("xyz", load.payload.com, load.com_sd, strict=True):
+            numbers.append(number(last, f"com_{axis}", value, sd, np.nan, sd < 0.05))
         remarks.append(load.origin)
     rows = [row for k, trace in enumerate(traces, start=1) for row in trace.rows(k)]
     found = Identification(
@@ -128,7 +130,6 @@ def identify(
         processing=task.processing.settings_record(logs[0].median_step),
         remarks=tuple(remarks),
     )
-    sources = logs if free is None else [*logs, free]
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))
 
 
@@ -154,27 +155,6 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
         return payload_from_poses(logs, bare)
     except TooFewPosesError:
         return payload_from_motion(logs, bare)
-
-
-def free_logs(
-    logs: Sequence[Recording], free: Recording | None, load: LoadFit | None
-) -> tuple[Recording, ...]:
-    """The logs that carry no unknown load: what the arm itself is identified from."""
-    if load is None:
-        return tuple(logs)
-    if free is not None:
-        return (free,)
-    return tuple(log for log in logs if not load.carried_by(log))
-
-
-def load_numbers(load: LoadFit, j: int) -> list[Number]:
-    """A load's mass and centre beside the other numbers, as of joint j (from 0)."""
-    mass, nothing = load.payload.mass, float("nan")
-    centre = zip(("com_x", "com_y", "com_z"), load.payload.com, load.com_sd, strict=True)
-    return [
-        number(j, "mass", mass, load.mass_sd, nothing, load.mass_sd < 0.2 * mass),
-        *(number(j, key, value, sd, nothing, sd < 0.05) for key, value, sd in centre),
-    ]
 
 
 def with_provenance(

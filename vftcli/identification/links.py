@@ -246,8 +246,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     """Base parameters by weighted least squares, as rows of `BASE`.
 
-    Directions without data keep the start; a parameter that lies mostly in them has an infinite
-    standard deviation.
+    Directions without data keep the start; a parameter mostly in them has an infinite deviation.
 
     Args:
         triangles: The stacked equations.

@@ -142,8 +142,8 @@ class JointsFit(NamedTuple):
     def motion_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x fitted to a motion, by its `STRETCHES` and its drives. (k, k)
 
-        Friction that another temperature changed, or a model that misses, lasts as long as a motion
-        goes one way; the residual's own correlation time, some tenths of a second, would not count.
+        Friction of another temperature lasts as long as a motion goes one way: longer than
+        residuals do.
         """
         stretches = folds(len(self.A), STRETCHES)
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
@@ -151,9 +151,8 @@ class JointsFit(NamedTuple):
     def gain_covariance(self, y: Array, gain: float) -> Array:
         """Covariance of x by drive constants that are not known exactly. (k, k)
 
-        Half of their variance counts as all joints' together (one gear, one warmth of the
-        magnets), half as each joint's own: the first scales a load's mass, the second also moves
-        its centre.
+        Half of their variance is all joints' (gear, warmth), which scales the mass; half is each
+        one's.
 
         Args:
             y: The torque that is explained. (N, n)
@@ -186,8 +185,7 @@ def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
     """A load from the same motion with and without it; which is which shows by itself.
 
-    The torque difference at the same phase is the load's, since friction and model errors are
-    alike in both, but for friction that grows with the load: that is fitted along.
+    The torque difference at the same phase is the load's, and friction's that grows with it.
     """
     for loaded, free in ((second, first), (first, second)):
         fit, sd, origin = solve_pair(loaded, free, robot)

@@ -71,7 +71,7 @@ def is_physical(phi: Array) -> bool:
 def thicken_links(phi: Array) -> Array:
     """The nearest parameters with some mass and some thickness in every link. (10n,)
 
-    Profiles from rounded tables, or with point masses, touch the edge of what is physical.
+    Rounded tables and point masses touch the edge of what is physical.
     """
     out = phi.reshape(-1, LINK).copy()
     for row in out:

@@ -213,8 +213,7 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
 def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
     """Causes of a held-out log's residual where it is much larger than in training.
 
-    A load on the flange explains all joints at once and is looked for first; what is left is
-    looked at joint by joint.
+    A load on the flange, which explains all joints at once, is looked for first.
 
     Args:
         robot: The identified robot.
@@ -281,8 +280,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
     """Share of the test's moving samples that lie on the training log's path through (q, q̇).
 
-    A log that repeats the training's trajectory is no test of a model made from it: whatever error
-    the model has along that path, it has fitted.
+    Such a log is no test: whatever error the model has along that path, it has fitted.
     """
     from scipy.spatial import cKDTree
 

@@ -13,12 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, is_dissipative
-from vftcli.identification.friction_method import (
-    identified_friction,
-    profile_constant,
-    profile_friction,
-    temperature_remarks,
-)
 from vftcli.identification.friction_shapes import (
     LOGARITHMIC_VELOCITIES,
     FrictionColumns,
@@ -26,6 +20,12 @@ from vftcli.identification.friction_shapes import (
     bent,
     friction_columns,
     round_digits,
+)
+from vftcli.identification.methods import (
+    identified_friction,
+    profile_constant,
+    profile_friction,
+    temperature_remarks,
 )
 from vftcli.identification.processing import (
     Processing,

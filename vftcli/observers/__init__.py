@@ -7,31 +7,13 @@ from vftcli.signals.packages import door
 if TYPE_CHECKING:
     from vftcli.observers.observer import Observer, Tuning
     from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
-    from vftcli.observers.settings import Settings
-    from vftcli.observers.table import (
-        BEST,
-        DEFAULT,
-        OBSERVERS,
-        PAPER,
-        LogSpectra,
-        Setup,
-        build_observers,
-    )
 else:
-    __getattr__ = door(__name__, "observer", "paper", "settings", "table")
+    __getattr__ = door(__name__, "observer", "paper")
 
 __all__ = [
-    "BEST",
-    "DEFAULT",
-    "OBSERVERS",
-    "PAPER",
     "FilteredDynamicsObserver",
     "KalmanObserver",
-    "LogSpectra",
     "MomentumObserver",
     "Observer",
-    "Settings",
-    "Setup",
     "Tuning",
-    "build_observers",
 ]

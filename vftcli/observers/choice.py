@@ -10,14 +10,13 @@ from vftcli.signals.option import ESTIMATE, Choice, Option
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
-    from vftcli.observers.matching import Goal
     from vftcli.observers.observer import Observer
-    from vftcli.observers.settings import Gains, Settings
-    from vftcli.observers.table import LogSpectra
+    from vftcli.observers.table import Gains, LogSpectra, Settings
+    from vftcli.observers.tuning import Goal
     from vftcli.robots.robot import Robot
-    from vftcli.robots.terms import DynamicsTerms
     from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.remarks import Remark
+    from vftcli.signals.terms import DynamicsTerms
 
 PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.
@@ -29,15 +28,14 @@ def settings_of(words: Sequence[str]) -> "Settings":
     Raises:
         ParameterError: If there is no such parameter, or a value is malformed.
     """
-    from vftcli.observers.settings import parse_settings
-    from vftcli.observers.table import sections
+    from vftcli.observers.table import parse_settings, sections
 
     return parse_settings(words, sections())
 
 
 def goal_of(text: str) -> "Goal":
     """What ``delay=S`` or ``bandwidth=HZ`` asks of every observer alike."""
-    from vftcli.observers.matching import parse_target
+    from vftcli.observers.tuning import parse_target
 
     return parse_target(text)
 
@@ -195,13 +193,12 @@ class ObserverChoice(Choice):
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
         """
-        from vftcli.observers.settings import check_gains
-        from vftcli.observers.table import NOT_SHOWN, Setup, build_observers, read_as, sections
+        from vftcli.observers import table
         from vftcli.signals.remarks import caution
 
-        shown = shown or NOT_SHOWN
-        check_gains(robot.gains, sections(), str(robot.path or robot.name))
-        setup = Setup(
+        shown = shown or table.NOT_SHOWN
+        table.check_gains(robot.gains, table.sections(), str(robot.path or robot.name))
+        setup = table.Setup(
             gains=self.gains_over(robot.gains, shown),
             settings=self.settings,
             joints=robot.joints,
@@ -210,13 +207,15 @@ class ObserverChoice(Choice):
             shown=shown,
         )
         if self.gains_of_log:
-            setup = read_as("density", setup)  # what a log tunes, and so what it falls back to
-        observers, remarks = build_observers(self.names, setup)
+            setup = table.read_as(
+                "density", setup
+            )  # what a log tunes, and so what it falls back to
+        observers, remarks = table.build_observers(self.names, setup)
         if self.gains_of_log and shown.gains is None:
             remarks = (*remarks, caution("gains-without-free-part"))
         if self.match is None:
             return observers, remarks
-        from vftcli.observers.matching import match_observers
+        from vftcli.observers.tuning import match_observers
 
         observers, on_match = match_observers(observers, self.match, setup)
         return observers, (*remarks, *on_match)
@@ -229,8 +228,7 @@ class ObserverChoice(Choice):
 
     def gains_over(self, gains: "Gains", shown: "LogSpectra | None" = None) -> "Gains":
         """A robot's gains with those of the log or of the gains file put over them."""
-        from vftcli.observers.settings import load_gains, overlay_gains
-        from vftcli.observers.table import sections
+        from vftcli.observers.table import load_gains, overlay_gains, sections
 
         if self.gains_of_log and shown is not None and shown.gains is not None:
             return overlay_gains(gains, shown.gains)

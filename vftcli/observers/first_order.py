@@ -6,10 +6,10 @@ import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.uneven import Fold, run_blocks, spans
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.terms import DynamicsTerms
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 
@@ -39,10 +39,9 @@ def run_first_order(
 ) -> tuple[Array, FirstOrderState]:
     """Run τ̂ᵗ = (1−a)/(1+a) τ̂ᵗ⁻¹ + rate/(1+a) dᵗ with a = rate·Ts/2 over a block of a log. (T, n)
 
-    Past a gap so long that a > 1 the state would change its sign: there the filter starts afresh,
-    and a remark says so. A gap is a step of more than `GAP` nominal ones: on a slow clock that
-    jitters, a passes 1 in many a step that misses nothing. Gains that give a > 1 at the nominal
-    sample time are the user's own choice and restart nothing.
+    Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign: there the
+    filter starts afresh, and a remark says so. Gains with a > 1 at the nominal step restart
+    nothing.
 
     Args:
         terms: The block.

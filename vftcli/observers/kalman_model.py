@@ -80,24 +80,19 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
     some = np.where(x > 0.0, a, 1.0)
     reach = np.where(x > 0.0, -np.expm1(-x) / some, step)
     squared = np.where(x > 0.0, -np.expm1(-2.0 * x) / (2.0 * some), step)
+    # ∫E² ds = (Ts − 2E + ∫e^{−2as})/a², as a series for small aTs.
+    series = step**3 * (1 / 3 - x / 4 + 7 * x**2 / 60 - x**3 / 24 + 31 * x**4 / 2520)
+    large = np.where(x > SERIES, a, 1.0)
+    integral = np.where(x > SERIES, (step - 2.0 * reach + squared) / large**2, series)
     return Discrete(
         step=step,
         a12=reach,
         a22=np.exp(-x),
-        q11=step * d.q_p + d.q_tau * integral_of_reach_squared(step, a, reach, squared),
+        q11=step * d.q_p + d.q_tau * integral,
         q12=0.5 * d.q_tau * reach**2,
         q22=d.q_tau * squared,
         r=np.broadcast_to(d.r, shape),
     )
-
-
-def integral_of_reach_squared(step: Array, a: Array, reach: Array, squared: Array) -> Array:
-    """∫₀^Ts ((1 − e^{−as})/a)² ds = (Ts − 2E + ∫e^{−2as})/a², as a series for small aTs."""
-    x = a * step
-    series = step**3 * (1 / 3 - x / 4 + 7 * x**2 / 60 - x**3 / 24 + 31 * x**4 / 2520)
-    large = np.where(x > SERIES, a, 1.0)
-    result: Array = np.where(x > SERIES, (step - 2.0 * reach + squared) / large**2, series)
-    return result
 
 
 Discretisation = Callable[[Array, Densities], Discrete]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.terms import DynamicsTerms
 
 LEAD = 60.0  #: For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log.
 LONGEST = 1 << 17  #: Samples of that time at most.
@@ -27,8 +27,7 @@ def led(terms: DynamicsTerms, count: int) -> DynamicsTerms:
 def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorque:
     """Run an observer as if the log's first sample had lasted for long: τ̂⁰ = −μ⁰ where unbiased.
 
-    An observer that starts at zero shows a log that begins in contact as a rise over some delays,
-    which nothing touched. With ṗ = μ + τ_ext, a first sample that lasts is explained by −μ⁰.
+    From zero a log that begins in contact rises over some delays; with ṗ = μ + τ_ext it is −μ⁰.
     """
     count = lead_samples(observer, terms.clock.step, terms.joints)
     found = observer.estimate(led(terms, count))

@@ -55,7 +55,6 @@ from vftcli.observers.observer import (
     per_joint,
 )
 from vftcli.observers.uneven import kalman_steps
-from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import ExternalTorque
@@ -63,6 +62,7 @@ from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Where, warning
 from vftcli.signals.series import Clock
 from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.terms import DynamicsTerms, one_sample_earlier
 
 #: Weights that pick the external torque out of a Kalman filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])
@@ -127,8 +127,7 @@ class MomentumObserver(BlockObserver):
 
         rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
 
-    (35) as printed feeds back r^{i−1} + r^{i−2}, which oscillates above K·Ts = 0.343 and is
-    unstable from 2 on; that form runs with `as_printed`.
+    (35) as printed feeds back one sample late, unstable from K·Ts = 2 on: `as_printed`.
 
     Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
 

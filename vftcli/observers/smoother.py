@@ -16,7 +16,6 @@ References:
     Int. J. Control 18(1), 1973, for the form used here.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,11 +24,11 @@ from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_lo
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.observers.uneven import gain_sequence, recursion
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.terms import DynamicsTerms
 
 #: Share of the smoother's settled information that may be missing where it counts as settled.
 SETTLED = 1e-16
@@ -48,11 +47,31 @@ class KalmanSmoother(Shown):
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """Smooth a whole log; `sd` is the smoother's own √P₂₂."""
         if self.filter.is_steady(terms.clock):
-            run = SteadyRun(self, terms.clock.step, terms.joints)
-            (whole,) = (*run.take(terms), *run.end())
-            return whole
-        tau, sd = self._step_by_step(terms)
+            tau, sd = self._steady(terms)
+        else:
+            tau, sd = self._step_by_step(terms)
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
+
+    def _steady(self, terms: DynamicsTerms) -> tuple[Array, Array]:
+        """Smooth with settled gains. (T, n) each"""
+        samples, n = terms.p.shape
+        settled = self.filter.steady(terms.clock.step, n)
+        model = self.filter.model(terms.clock.step, n)
+        gains, S = settled.gains, settled.prior.p11 + model.r
+        (F, g), d = error_filter(gains, model.a12, model.a22), self.filter.unexplained(terms)
+        tau, _ = steady_filter(F, g, d, np.zeros((2, n)), wanted=TORQUE)
+        nu = innovations(tau, gains.l2 * S, model.a22)  # ν/S
+        backward, b = backward_filter(gains, model.a12, model.a22)
+        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
+        driven = np.zeros_like(nu)
+        driven[1:] = nu[:0:-1]
+        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
+        correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
+        tau -= correction[::-1]
+        deviation, sd = steady_deviation(gains, model, S, samples), empty_series(samples, n)
+        sd[:] = deviation[-1]
+        sd[samples - len(deviation) :] = deviation[::-1]
+        return tau, sd
 
     def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
         """Smooth with gains that follow each step's own sample time. (T, n) each"""
@@ -100,79 +119,6 @@ class KalmanSmoother(Shown):
         return response
 
 
-class SteadyRun:
-    """The smoother with settled gains, block by block of a log; a whole log is one block.
-
-    The backward recursion forgets: started from zero `look_ahead` samples behind a sample it errs
-    there by `SETTLED`. So it goes along in one pass, as many samples behind.
-
-    Args:
-        smoother: The smoother.
-        step: Sample time. [s]
-        joints: Number of joints n.
-    """
-
-    def __init__(self, smoother: KalmanSmoother, step: float, joints: int) -> None:
-        self._smoother, self._model = smoother, smoother.filter.model(step, joints)
-        settled = smoother.filter.steady(step, joints)
-        self._gains, self._S = settled.gains, settled.prior.p11 + self._model.r
-        self._ahead = look_ahead(smoother, step, joints)
-        self._state = np.zeros((2, joints))
-        self._blocks: list[tuple[Array, Array, Array]] = []
-
-    def take(self, terms: DynamicsTerms) -> Iterator[ExternalTorque]:
-        """Take up the next block; the estimates of earlier blocks that are known by it."""
-        gains, (a12, a22) = self._gains, (self._model.a12, self._model.a22)
-        (F, g), d = error_filter(gains, a12, a22), self._smoother.filter.unexplained(terms)
-        before = self._state[1]
-        tau, self._state = steady_filter(F, g, d, self._state, wanted=TORQUE)
-        driving = innovations(tau, gains.l2 * self._S, a22, before)  # ν/S
-        self._blocks.append((terms.t, tau, driving))
-        while sum(len(t) for t, _, _ in self._blocks[1:]) > self._ahead:
-            yield self._smoothed()
-
-    def end(self) -> Iterator[ExternalTorque]:
-        """The estimates of the blocks that are left, up to the log's end."""
-        while self._blocks:
-            yield self._smoothed()
-
-    def _smoothed(self) -> ExternalTorque:
-        """The estimate of the first block that waits, by those behind it."""
-        gains, model = self._gains, self._model
-        waiting = [nu for _, _, nu in self._blocks]
-        nu = np.concatenate(waiting) if waiting[1:] else waiting[0]
-        t, tau, _ = self._blocks.pop(0)
-        known, seen = len(nu), int(min(len(nu), len(t) + self._ahead + 1))
-        backward, b = backward_filter(gains, model.a12, model.a22)
-        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
-        driven = np.zeros_like(nu[:seen])
-        driven[1:] = nu[seen - 1 : 0 : -1]
-        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
-        correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
-        tau -= correction[::-1][: len(t)]
-        deviation, sd = steady_deviation(gains, model, self._S, known), empty_series(*tau.shape)
-        sd[:] = deviation[-1]
-        near = deviation[known - len(t) : known]
-        sd[len(t) - len(near) :] = near[::-1]
-        return ExternalTorque(
-            name=self._smoother.name, t=t, tau=handed_over(tau), sd=handed_over(sd)
-        )
-
-
-def look_ahead(smoother: KalmanSmoother, step: float, joints: int) -> float:
-    """Samples after which the backward recursion has forgotten where it began, L.
-
-    Args:
-        smoother: The smoother.
-        step: Sample time. [s]
-        joints: Number of joints n.
-    """
-    gains, model = smoother.filter.steady(step, joints).gains, smoother.filter.model(step, joints)
-    F = np.moveaxis(closed_loop(gains, model.a12, model.a22), -1, 0)
-    pole = float(np.max(np.abs(np.linalg.eigvals(F))))
-    return float(np.ceil(np.log(SETTLED) / np.log(pole))) if pole < 1.0 else np.inf
-
-
 def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
     """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
     step = information_step(gains, model.a12, model.a22)
@@ -180,18 +126,16 @@ def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> A
     return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
 
 
-def innovations(tau: Array, l2: Array, a22: Array, before: Array | float = 0.0) -> Array:
+def innovations(tau: Array, l2: Array, a22: Array) -> Array:
     """ν of the steady filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
 
     Args:
         tau: τ̂. (T, n)
         l2: Its gain L₂. (n,)
         a22: A₂₂ of its model. (n,)
-        before: τ̂ before the first sample. (n,)
     """
     nu = tau.copy(order="K")
     nu[1:] -= a22 * tau[:-1]
-    nu[0] -= a22 * before
     nu /= l2
     return nu
 

@@ -74,8 +74,7 @@ class Spectra:
     def excess(self) -> Array:
         """(S_d − S_n)₊, what the loaded part has beyond the free one. (F, n) [(N·m)²/Hz]
 
-        The difference is averaged over neighbouring frequencies before it is cut at zero: bin by
-        bin, chance would count where it is positive and not where it is negative.
+        The difference is averaged over neighbouring frequencies first: chance counts both ways.
         """
         return handed_over(np.maximum(neighbour_mean(self.loaded - self.free), 0.0))
 
@@ -155,8 +154,7 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """The spectra of a loaded part and a free one, by the same estimator.
 
-    A loaded part of short impacts is widened until it holds a second in a row: its excess over the
-    free part is then that of the impacts, thinned by what stands around them, and set right.
+    Short impacts are widened to a second in a row, and their excess, thinned by that, set right.
     """
     t = loaded.run.t
     nominal = median_step(t) if len(t) > 1 else 0.0

@@ -5,7 +5,7 @@ is complete. ``logs/<key[:2]>/<key>/`` holds what else was made of the log.
 """
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +26,6 @@ TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
 GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files that are made anew by every run.
 PIECE = 500  #: Logs whose rows are in memory at a time.
-DONE, FAILED = ".parquet", ".failed.json"  #: Endings of what a log leaves in ``rows/``.
 
 
 class BatchFolder:
@@ -36,9 +35,9 @@ class BatchFolder:
         self.path = Path(path)
         self.rows = self.path / "rows"
 
-    def row_file(self, key: str, ending: str = DONE) -> Path:
-        """Where the rows of a log are, or why it failed."""
-        return self.rows / key[:2] / f"{key}{ending}"
+    def row_file(self, key: str) -> Path:
+        """Where the rows of a log are."""
+        return self.rows / key[:2] / f"{key}.parquet"
 
     def result(self, key: str) -> Path:
         """Where what else is made of a log is."""
@@ -58,8 +57,8 @@ class BatchFolder:
             self.rows.mkdir(parents=True, exist_ok=True)
             check_writable(self.rows)
             with held(self.rows, wait=False):
-                text = to_json({**record, "options_sha256": options})
-                self.put(MARKER, text.encode())
+                with atomic(self.path / MARKER, force=True) as temporary:
+                    put_text(temporary, to_json({**record, "options_sha256": options}))
                 yield
         except BlockingIOError:
             raise OutputError(
@@ -90,17 +89,10 @@ class BatchFolder:
                 "another -o, or --force: finished logs of those options are kept beside"
             )
 
-    def keys(self, ending: str = DONE) -> set[str]:
-        """The keys of all logs that are done, or that failed."""
-        found = self.rows.glob(f"*/*{ending}") if self.rows.is_dir() else ()
-        return {path.name.removesuffix(ending) for path in found}
-
-    def put(self, name: str, content: bytes) -> None:
-        """Write a file, whole or not at all, over what an earlier run of the batch left."""
-        path = self.path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with atomic(path, force=True) as temporary:
-            temporary.write_bytes(content)
+    def keys(self) -> set[str]:
+        """The keys of all logs that are done."""
+        found = self.rows.glob("*/*.parquet") if self.rows.is_dir() else ()
+        return {path.stem for path in found}
 
     def put_rows(self, key: str, rows: "pl.DataFrame") -> None:
         """Write a log's rows: with them its result is complete."""
@@ -108,20 +100,6 @@ class BatchFolder:
         path.parent.mkdir(parents=True, exist_ok=True)
         with atomic(path, force=True) as temporary, table_file(temporary) as file:
             rows.write_parquet(file, compression="zstd", statistics=False)
-
-    def put_failure(self, key: str, record: Mapping[str, str]) -> None:
-        """Write why a log failed, so that the next run does not try it again unasked."""
-        name = self.row_file(key, FAILED).relative_to(self.path).as_posix()
-        self.put(name, json.dumps(dict(record), ensure_ascii=False).encode("utf-8", "replace"))
-
-    def failure(self, key: str) -> dict[str, str]:
-        """Why a log failed in this run or an earlier one."""
-        text = self.row_file(key, FAILED).read_text(encoding="utf-8")
-        return {str(name): str(value) for name, value in json.loads(text).items()}
-
-    def forget(self, key: str) -> None:
-        """Take away why a log failed."""
-        self.row_file(key, FAILED).unlink(missing_ok=True)
 
     def gather(self, logs: "pl.DataFrame", schema: "Mapping[str, Any]") -> "Iterator[pl.DataFrame]":
         """The rows of all logs, `PIECE` logs at a time, in the logs' order whatever ended first."""
@@ -149,11 +127,6 @@ class BatchFolder:
         files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
         with atomic(self.path / SEAL, force=True) as temporary:
             put_text(temporary, to_json({**record, "files": files}))
-
-    def files_of(self, key: str) -> Sequence[Path]:
-        """Every file of a log's result, its rows last."""
-        found = sorted(path for path in self.result(key).rglob("*") if path.is_file())
-        return [*found, self.row_file(key)]
 
 
 def put_pieces(path: Path, pieces: "Iterable[pl.DataFrame]") -> None:

@@ -54,7 +54,7 @@ def rate_of(recording: Recording) -> float | None:
 
 def largest_step(recording: Recording) -> float | None:
     """The longest time between two samples, or None for a single one. [s]"""
-    return float(np.max(recording.steps[:, 0])) if recording.samples > 1 else None
+    return float(np.max(np.diff(recording.t))) if recording.samples > 1 else None
 
 
 def examination_text(examination: Examination) -> str:

@@ -1,28 +1,30 @@
 """Grid: one table of results, shown on the terminal, in Markdown, in LaTeX or in HTML.
 
-Whoever has a table to show makes a Grid of it; how a table looks is decided here alone, and so is
-what must be escaped: names and words come from files, and may hold any letter. Rows for machines,
-whose values are not rounded, are written by `csv_rows` and `json_rows`.
+Whoever has a table to show makes a Grid of it; how a table looks is decided here and, for HTML, in
+the pages' templates, and so is what must be escaped: names and words come from files, and may hold
+any letter. Rows for machines, whose values are not rounded, are written by `csv_rows` and
+`json_rows`: what is not known is null or empty.
 """
 
+import csv
+import io
+import json
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.letters import printable
 
-DASH = "–"  #: What stands where nothing is known.
 #: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
 #: What stands, unseen, where a number has fewer decimals than others of its column.
 DECIMALS = "." + 20 * "0"
 #: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
-BEST = ' class="best"'  #: What the style sheet makes bold.
 
 
 class GridCell(NamedTuple):
@@ -36,24 +38,6 @@ class GridCell(NamedTuple):
 
 
 Entry = GridCell | str | float | None
-
-
-def significant(value: float, digits: int = 3) -> str:
-    """A number with three significant digits and no exponent where one can do without."""
-    if not np.isfinite(value):
-        return DASH
-    if value == 0.0:
-        return "0"
-    # Rounding comes first: 9.996 has its three digits as 10.0.
-    exponent = int(np.floor(np.log10(abs(float(f"{value:.{digits - 1}e}")))))
-    if exponent < -4:
-        return f"{value:.{digits - 1}e}"
-    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
-
-
-def signed(value: float) -> str:
-    """Three significant digits with a true minus sign, for the page."""
-    return significant(value).replace("-", "−")
 
 
 class Column(NamedTuple):
@@ -245,44 +229,6 @@ def bold(text: str, best: bool, form: str) -> str:
     return form.format(text) if best else text
 
 
-def html(grid: Grid) -> str:
-    """A table for the page, which scrolls by itself where the page is narrow."""
-    heads = [column.heading for column in grid.columns]
-    heads[0] = heads[0][:1].upper() + heads[0][1:]
-    head = "".join(
-        f'<th scope="col"{words_class(column)}>{escape(text)}</th>'
-        for column, text in zip(grid.columns, heads, strict=True)
-    )
-    first_summary = len(grid.rows) - grid.summaries
-    rows = "".join(
-        html_line(grid, row, ' class="floor"' if k >= first_summary else "")
-        for k, row in enumerate(grid.cells)
-    )
-    caption = f"<caption>{escape(grid.caption)}</caption>" if grid.caption else ""
-    return (
-        f'<div class="scroll"><table>{caption}<thead><tr>{head}</tr></thead>'
-        f"<tbody>{rows}</tbody></table></div>"
-    )
-
-
-def html_line(grid: Grid, row: Sequence[GridCell], kind: str) -> str:
-    """One row of a table: its head, then its entries."""
-    first, *rest = row
-    # The page's script paints the observer's colour before every head that names one.
-    swatch = f' data-swatch="{escape(first.text)}"' if grid.swatches and not kind else ""
-    head = f'<th scope="row"{swatch}>{first.html or escape(first.text)}</th>'
-    entries = "".join(
-        f"<td{BEST if cell.best else words_class(column)}>{cell.html or escape(cell.text)}</td>"
-        for cell, column in zip(rest, grid.columns[1:], strict=True)
-    )
-    return f"<tr{kind}>{head}{entries}</tr>"
-
-
-def words_class(column: Column) -> str:
-    """The class of a column of words, which the style sheet sets to the left."""
-    return ' class="text"' if column.words else ""
-
-
 def escape_markdown(text: str) -> str:
     """Text that Markdown shows as it is."""
     text = printable(text)
@@ -325,7 +271,46 @@ def escape_latex(text: str) -> str:
     """Text that LaTeX prints as it is."""
     text = printable(text)
     if text.startswith("-") and NUMBER.fullmatch(text):
-        text = f"−{text[1:]}"
+        text = minus(text)
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
     text = "".join(LATEX_LETTERS.get(letter, letter) for letter in text)
     return text.replace("$<$ ", r"$<$\,")
+
+
+def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows as a JSON array of objects; what is not known is null."""
+    known = [{k: known_or_none(v) for k, v in row.items()} for row in rows]
+    return json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
+    """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
+
+    A text that a spreadsheet would run as a formula, as a file's name may be, begins with "'".
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(keys)
+    for row in rows:
+        values = (known_or_none(row[key]) for key in keys)
+        writer.writerow(csv_cell(value) for value in values)
+    return text.getvalue()
+
+
+#: How a text begins that spreadsheets run: the list of OWASP's "CSV Injection".
+FORMULA = ("=", "+", "-", "@", "\t", "\r")
+
+
+def csv_cell(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
+    """A value as a cell of CSV holds it."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if not isinstance(value, str):
+        return value
+    text = value.replace("\r", r"\r")  # unquoted before Python 3.13: it would end the row
+    return f"'{text}" if value.startswith(FORMULA) else text
+
+
+def known_or_none(value: Any) -> Any:  # noqa: ANN401 - whatever a row holds
+    """A value, None for a number that is not finite."""
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
 
 if TYPE_CHECKING:
-    from vftcli.refinement.tuning import Tuned
+    from vftcli.observers.tuning import Tuned
     from vftcli.robots.robot import Robot
 
 

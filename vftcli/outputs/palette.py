@@ -2,8 +2,6 @@
 
 from collections.abc import Sequence
 
-from vftcli.signals.external_torque import ExternalTorque
-
 #: Okabe and Ito's hues, in tones that stand out from white and from black paper alike.
 COLOURS = {
     "best": "#d3224b",
@@ -26,27 +24,16 @@ PLACES = {
     "upper arm": "#c95fa4",
     "cannot tell": "#c8a200",
 }
-DASHED = ("kfo-zoh", "rts-auto")  #: Drawn dashed: where they lie on their neighbour, both are seen.
-
-
-def colours_of(estimates: Sequence[ExternalTorque]) -> dict[str, str]:
-    """One colour for each estimate's name; two get the same only when there are no more."""
-    return colours_of_names([estimate.name for estimate in estimates])
 
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
-    """The same of the names alone."""
+    """One colour for each estimate's name; two get the same only when there are no more."""
     taken = {COLOURS[name] for name in names if name in COLOURS}
     # An estimate without a colour of its own does not get one that another has.
     free = [colour for colour in SPARE if colour not in taken] or list(SPARE)
     others = [name for name in names if name not in COLOURS]
     spare = {name: free[k % len(free)] for k, name in enumerate(others)}
     return {name: COLOURS.get(name) or spare[name] for name in names}
-
-
-def styles_of(estimates: Sequence[ExternalTorque]) -> dict[str, tuple[str, bool]]:
-    """Each estimate's colour, and whether its line is dashed."""
-    return {name: (colour, name in DASHED) for name, colour in colours_of(estimates).items()}
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -1,22 +1,91 @@
-"""Arms and forces in a Rerun recording: shapes, poses and colours over time, arrows."""
+"""The arm and forces in a Rerun recording: shapes, poses and colours over time, arrows.
+
+The arm is made of capsules, from the chain's own geometry.
+"""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+import rerun as rr
 
-from vftcli.outputs.arm import ArmPoses, Capsule, capsules
 from vftcli.outputs.palette import rgb
-from vftcli.outputs.rerun_file import Stream
 from vftcli.robots.chain import Chain
+from vftcli.robots.kinematics import link_poses
 from vftcli.signals.arrays import Array
+from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
+Stream = rr.RecordingStream  #: A recording that is being made.
+
+ROBOT = "/robot"  #: Below it stands the arm.
+#: Radius of the first and of the last link, as a share of the arm's length.
+THICKNESS = (0.048, 0.030)
+RATE = 50.0  #: Poses a second that are drawn. [Hz]
+MOST_POSES = 20_000  #: Poses that are drawn, however long the log is.
+SHORTEST = 0.02  #: A link shorter than this share of the arm's length is not drawn: its joints are.
 NEWTON_PER_METRE = 200.0  #: Length of a force arrow where nothing else is said: 200 N are 1 m.
 #: Colours of links, joints and the force arrow.
 LINK, JOINT, FORCE = "#b0b8c0", "#4e5c6a", "#dd6415"
 #: Lengths that a force arrow may have. [N/m]
 SCALES = (5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0, 2000.0)
+SHAFT = 0.012  #: Radius of a force arrow. [m]
 LONGEST = 0.5  #: The hardest force's arrow is as long at most. [m]
+
+
+class Capsule(NamedTuple):
+    """A cylinder with round ends, in the axes of the frame it moves with."""
+
+    start: Array  #: Centre of one end. (3,) [m]
+    direction: Array  #: From one end's centre to the other's. (3,) [m]
+    radius: float  #: Radius. [m]
+    joint: bool  #: Whether it stands for a joint rather than for a link.
+
+
+class ArmPoses(NamedTuple):
+    """Poses of the links over time."""
+
+    t: Array  #: Time. (S,) [s]
+    translation: Array  #: Origins in the base frame, the flange last. (S, n+1, 3) [m]
+    quat_xyzw: Array  #: Orientations as unit quaternions. (S, n+1, 4)
+    q: Array  #: Joint positions. (S, n) [rad]
+
+
+def arm_length(chain: Chain) -> float:
+    """Length of the stretched arm, base to flange. [m]"""
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    return float(np.linalg.norm(offsets, axis=1).sum())
+
+
+def capsules(chain: Chain) -> list[list[Capsule]]:
+    """What moves with the base and with each link: n + 1 lists, base first."""
+    n, length = chain.joints, arm_length(chain)
+    offsets = np.vstack([chain.translation, chain.flange_translation])
+    radii = length * np.linspace(*THICKNESS, n + 1)
+    shapes: list[list[Capsule]] = []
+    for j in range(n + 1):
+        shapes.append([])
+        # A joint is a short thick cylinder about its axis, which is z of the link that it moves.
+        if j > 0:
+            half = 1.1 * radii[j]
+            axis = np.array([0.0, 0.0, 2.0 * half])
+            shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], joint=True))
+        if np.linalg.norm(offsets[j]) > SHORTEST * length:
+            shapes[j].append(Capsule(np.zeros(3), offsets[j], radii[j], joint=False))
+    return shapes
+
+
+def motion(chain: Chain, t: Array, q: Array) -> ArmPoses:
+    """Poses of all links at about `RATE` samples a second, `MOST_POSES` of them at most."""
+    # At least each sample: a slow log is drawn as it is.
+    every = max(1, int(len(t) / max(float(t[-1] - t[0]) * RATE, 1.0)), -(-len(t) // MOST_POSES))
+    t, q = t[::every], np.ascontiguousarray(q[::every])
+    poses = link_poses(chain, q)
+    return ArmPoses(t, poses.translation, xyzw(poses.rotation), q)
+
+
+def xyzw(rotation: Array) -> Array:
+    """Unit quaternions of rotation matrices, the scalar last as Rerun has it. (…, 4)"""
+    return np.roll(matrix_quaternion(rotation), -1, axis=-1)
 
 
 class PaintedSpan(NamedTuple):
@@ -33,44 +102,30 @@ def arrow_scale(hardest: float) -> float:
 
 
 def send_arm(
-    stream: Stream,
-    path: str,
-    chain: Chain,
-    poses: ArmPoses,
-    ghost: tuple[int, ...] | None = None,
-    painted: Mapping[int, Sequence[PaintedSpan]] | None = None,
+    stream: Stream, chain: Chain, poses: ArmPoses, painted: Mapping[int, Sequence[PaintedSpan]]
 ) -> None:
-    """Send an arm's shape once and its poses over time."""
-    import rerun as rr
-
+    """Send the arm's shape once, its poses over time, and when links have another colour."""
     time = rr.TimeColumn("t", duration=poses.t)
     for j, shapes in enumerate(capsules(chain)):
-        link = f"{path}/link_{j}" if j else f"{path}/base"
+        link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
         if shapes:
-            stream.log(link, capsule_batch(shapes, ghost), static=True)
-            own = [ghost or rgb(JOINT if shape.joint else LINK) for shape in shapes]
-            send_colours(stream, link, own, float(poses.t[0]), (painted or {}).get(j, ()))
+            # Rerun's own capsules lie along z from one end.
+            turns = np.array([rotation_onto(shape.direction) for shape in shapes])
+            batch = rr.Capsules3D(
+                lengths=[np.linalg.norm(shape.direction) for shape in shapes],
+                radii=[shape.radius for shape in shapes],
+                translations=np.array([shape.start for shape in shapes]),
+                quaternions=xyzw(turns),
+                fill_mode="solid",
+            )
+            stream.log(link, batch, static=True)
+            own = [rgb(JOINT if shape.joint else LINK) for shape in shapes]
+            send_colours(stream, link, own, float(poses.t[0]), painted.get(j, ()))
         if j:
             columns = rr.Transform3D.columns(
                 translation=poses.translation[:, j - 1], quaternion=poses.quat_xyzw[:, j - 1]
             )
             stream.send_columns(link, [time], columns)
-
-
-def capsule_batch(shapes: Sequence[Capsule], ghost: tuple[int, ...] | None) -> Any:  # noqa: ANN401
-    """Capsules in the axes of the link they move with; Rerun's own lie along z from one end."""
-    import rerun as rr
-
-    directions = np.array([shape.direction for shape in shapes])
-    lengths = np.linalg.norm(directions, axis=1)
-    slimmer = 1.0 if ghost is None else 0.8  # ghosts that overlap are told apart
-    return rr.Capsules3D(
-        lengths=lengths,
-        radii=[slimmer * shape.radius for shape in shapes],
-        translations=np.array([shape.start for shape in shapes]),
-        quaternions=[turn_from_z(d / s) for d, s in zip(directions, lengths, strict=True)],
-        fill_mode="solid",
-    )
 
 
 def send_colours(
@@ -85,12 +140,10 @@ def send_colours(
     Args:
         stream: The recording.
         link: Entity of the link.
-        own: Red, green and blue of each shape, perhaps opacity.
+        own: Red, green and blue of each shape.
         start: The first pose's time. [s]
         painted: The spans in which all of them have another colour, in order.
     """
-    import rerun as rr
-
     if not painted:
         stream.log(link, rr.Capsules3D.from_fields(colors=own), static=True)
         return
@@ -103,23 +156,12 @@ def send_colours(
     stream.send_columns(link, [rr.TimeColumn("t", duration=sorted(changes))], columns)
 
 
-def turn_from_z(unit: Array) -> Array:
-    """Quaternion (x, y, z, w) that turns z to a unit vector the short way. (4,)"""
-    # Straight down every turn by half is as short; the formula below would divide by zero.
-    if unit[2] < -1.0 + 1e-9:
-        return np.array([1.0, 0.0, 0.0, 0.0])
-    turn = np.array([-unit[1], unit[0], 0.0, 1.0 + unit[2]])
-    turned: Array = turn / np.linalg.norm(turn)
-    return turned
-
-
 def send_force(
     stream: Stream,
     path: str,
     t: Array,
     origin: Array,
     force: Array,
-    radius: float,
     *,
     scale: float = NEWTON_PER_METRE,
     colour: str = FORCE,
@@ -132,18 +174,15 @@ def send_force(
         t: Time. (S,) [s]
         origin: Where it acts, in base axes. (S, 3) [m]
         force: In base axes, NaN where not known. (S, 3) [N]
-        radius: Of the arrow's shaft. [m]
         scale: Newtons that are 1 m.
         colour: ``#rrggbb``.
     """
-    import rerun as rr
-
     known = np.all(np.isfinite(force), axis=1)
     count = int(known.sum())
     columns = rr.Arrows3D.columns(
         origins=origin[known],
         vectors=force[known] / scale,
-        radii=np.full(count, radius),
+        radii=np.full(count, SHAFT),
         colors=np.tile(np.array([*rgb(colour), 255], dtype=np.uint8), (count, 1)),
     ).partition(known.astype(int))
     stream.send_columns(path, [rr.TimeColumn("t", duration=t)], columns)

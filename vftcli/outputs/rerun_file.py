@@ -1,7 +1,7 @@
-"""A Rerun recording: plots, words and arms in one file that opens arranged.
+"""A Rerun recording: plots, words and the arm in one file that opens arranged.
 
-Every plot is one entity holding one scalar a line, on the timeline `t` in seconds from the log's
-first sample; words are Markdown documents.
+Every plot is a chart of one panel and one entity, its key, holding one scalar a line, on the
+timeline `t` in seconds from the log's first sample; words are Markdown documents.
 """
 
 import hashlib
@@ -13,24 +13,61 @@ from typing import Any, NamedTuple
 from uuid import UUID
 
 import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
 
-from vftcli.outputs.arm import ArmPoses
+from vftcli.outputs.decimation import level_rows
 from vftcli.outputs.files import unwritable
+from vftcli.outputs.page.charts import INK, REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.svg import Span, ends_of_family
+from vftcli.outputs.palette import REFERENCE as GREY
 from vftcli.outputs.palette import rgb
-from vftcli.outputs.plots import Lines, LogLine, Tab
-from vftcli.signals.arrays import Array
-from vftcli.signals.packages import check_installed
+from vftcli.outputs.rerun_arm import ROBOT, ArmPoses, Stream
 
 CONTACTS = "/contacts"  #: Below it stand the contacts: `/contacts/1` is that of number 1.
+#: How the names of lines begin that are drawn as bars, and how those end that are a band's edges.
+BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 
-Stream = Any
+
+class LogLine(NamedTuple):
+    """One line of a text log."""
+
+    path: str  #: The entity.
+    t: float  #: When. [s]
+    text: str  #: What happened.
+    colour: str  #: ``#rrggbb``.
+    level: str = "INFO"  #: How much it matters: INFO, WARN or ERROR.
 
 
-class ArmView(NamedTuple):
-    """The space in which arms stand."""
+class Tab(NamedTuple):
+    """Plots shown together."""
 
-    name: str  #: What it is called.
-    poses: ArmPoses  #: Where an arm has been, so that the eye sees all of it.
+    name: str  #: The tab's name.
+    plots: Sequence[Chart]  #: Of one panel each; lines with places of their own are points.
+    log: Sequence[LogLine] = ()  #: A text log below them, or none.
+
+    def ends(self, plot: Chart) -> Span:
+        """Both ends of a plot's vertical axis: those of its whole family."""
+        alike = [p for p in self.plots if p.families and p.families == plot.families] or [plot]
+        low, high = zip(*(ends_of_family(one, 0) for one in alike), strict=True)
+        return Span(min(low), max(high))
+
+
+def lines_of(plot: Chart) -> list[ChartLine]:
+    """The lines of a plot, without its points."""
+    return [line for line in plot.series if line.x is None]
+
+
+def thinned(plot: Chart, stretches: int, whole: Sequence[tuple[float, float]]) -> Chart:
+    """The plot with the samples that `level_rows` keeps; all of them where nothing is gained."""
+    values = np.hstack([line.values for line in lines_of(plot)])
+    rows = level_rows(plot.x, values, stretches, whole)
+    if rows is None:
+        return plot
+    series = tuple(
+        line._replace(values=line.values[rows]) if line.x is None else line for line in plot.series
+    )
+    return plot._replace(x=plot.x[rows], series=series)
 
 
 @contextmanager
@@ -39,22 +76,21 @@ def rerun_file(
     title: str,
     tabs: Sequence[Tab],
     words: Mapping[str, str],
-    view: ArmView | None = None,
+    poses: ArmPoses,
+    space: str,
     marked: tuple[float, float] | None = None,
 ) -> Iterator[Stream]:
-    """Write a recording with its plots and words; yield its stream, to draw arms into it.
+    """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
     Args:
         path: Where to; an existing file is replaced.
         title: Name of the recording.
         tabs: The plots.
         words: Name of a document → its Markdown.
-        view: Where arms will be drawn, None if there are none.
+        poses: Where the arm has been, so that the eye sees all of it.
+        space: What the space is called in which it stands.
         marked: The span that the time panel marks, None if there is none. [s]
     """
-    check_installed("rerun", path.name)
-    import rerun as rr
-
     # The same data make the same recording: no random id, and no time at which it was made.
     identity = recording_id(title, tabs, words)
     # Nor rows put together by how much time has gone by.
@@ -64,18 +100,17 @@ def rerun_file(
     )
     # Into memory: Rerun writes a file in a thread, which on a full disk stops and is waited for.
     made = stream.memory_recording()
-    shown = blueprint(tabs, list(words), view, marked)
+    shown = blueprint(tabs, list(words), arm_view(poses, space), marked)
     stream.send_blueprint(shown, make_active=False, make_default=True)
     stream.send_recording_name(drawable(title))
     for tab in tabs:
-        for lines in tab.plots:
-            send_lines(stream, tab.t if lines.t is None else lines.t, lines)
+        for plot in tab.plots:
+            send_plot(stream, plot)
         send_log(stream, tab.log)
     for name, text in words.items():
         document = rr.TextDocument(drawable(text), media_type="text/markdown")
         stream.log(f"/{name.lower()}", document, static=True)
-    if view is not None:
-        stream.log("/robot", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    stream.log(ROBOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     yield stream
     try:
         path.write_bytes(made.drain_as_bytes())
@@ -90,33 +125,30 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
     """
     found = hashlib.sha256("\0".join([title, *words, *words.values()]).encode("utf-8", "replace"))
     for tab in tabs:
-        for lines in tab.plots:
-            found.update("\0".join([lines.path, *(line.name for line in lines.lines)]).encode())
-            found.update(lines.values.tobytes())
+        for plot in tab.plots:
+            found.update("\0".join([plot.key, *(line.name for line in plot.series)]).encode())
+            for line in plot.series:
+                found.update(line.values.tobytes())
     return UUID(bytes=found.digest()[:16])
 
 
 def blueprint(
     tabs: Sequence[Tab],
     words: Sequence[str],
-    view: ArmView | None,
-    marked: tuple[float, float] | None = None,
-) -> Any:  # noqa: ANN401 - Rerun is untyped
-    """How the recording opens: arms and words to the left, plots to the right, paused.
+    space: rrb.Spatial3DView,
+    marked: tuple[float, float] | None,
+) -> rrb.Blueprint:
+    """How the recording opens: the arm's space and words to the left, plots to the right, paused.
 
     Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
     span stands out in the time panel, and a click on a time of the text log goes there.
     """
-    import rerun.blueprint as rrb
-
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
-    left: Any = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
-    if view is not None:
-        left = rrb.Vertical(arm_view(view), left, row_shares=[3, 2])
-    plots = [grid_of(tab) for tab in tabs]
-    shown = rrb.Horizontal(left, rrb.Tabs(*plots, active_tab=0), column_shares=[2, 5])
+    said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
+    left = rrb.Vertical(space, said, row_shares=[3, 2])
+    plots = rrb.Tabs(*map(grid_of, tabs), active_tab=0)
     return rrb.Blueprint(
-        shown if plots else left,
+        rrb.Horizontal(left, plots, column_shares=[2, 5]),
         time_panel(marked),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -125,10 +157,8 @@ def blueprint(
     )
 
 
-def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rerun is untyped
+def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
     """The time panel, paused on the log's own clock, with a span selected in it."""
-    import rerun.blueprint as rrb
-
     span: dict[str, Any] = {}
     # An unstable part of the viewer's: a version without it opens the recording all the same.
     if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
@@ -137,37 +167,36 @@ def time_panel(marked: tuple[float, float] | None) -> Any:  # noqa: ANN401 - Rer
     return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
 
 
-def arm_view(view: ArmView) -> Any:  # noqa: ANN401 - Rerun is untyped
+def arm_view(poses: ArmPoses, name: str) -> rrb.Spatial3DView:
     """The space with an eye that sees the base and all places where the links have been."""
-    import rerun.blueprint as rrb
-
-    corners = view.poses.translation.reshape(-1, 3)
+    corners = poses.translation.reshape(-1, 3)
     # The base stands at the origin and shall be seen too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
     return rrb.Spatial3DView(
-        origin="/robot",
-        contents=["/robot/**", f"{CONTACTS}/**"],
-        name=view.name,
+        origin=ROBOT,
+        contents=[f"{ROBOT}/**", f"{CONTACTS}/**"],
+        name=name,
         eye_controls=rrb.EyeControls3D(position=eye.tolist(), look_target=centre.tolist()),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
     )
 
 
-def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
+def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if there are many plots; the first one's legend holds for all."""
-    import rerun.blueprint as rrb
-
     views = [
         rrb.TimeSeriesView(
-            origin=lines.path,
-            name=drawable(title_of(tab, lines)),
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=k == 0 and lines.legend),
+            origin=plot.key,
+            name=drawable(title_of(tab, plot)),
+            # It would cover a corner; of a plot with points the title says it all.
+            plot_legend=rrb.PlotLegend(
+                rrb.Corner2D.LeftTop, visible=k == 0 and len(lines_of(plot)) == len(plot.series)
+            ),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
-            axis_y=rrb.ScalarAxis(range=tab.ends(lines)),
+            axis_y=rrb.ScalarAxis(range=tab.ends(plot)),
         )
-        for k, lines in enumerate(tab.plots)
+        for k, plot in enumerate(tab.plots)
     ]
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
     if not tab.log:
@@ -175,18 +204,17 @@ def grid_of(tab: Tab) -> Any:  # noqa: ANN401 - Rerun is untyped
     return rrb.Vertical(plots, log_view(tab.log), row_shares=[2, 1], name=tab.name)
 
 
-def title_of(tab: Tab, lines: Lines) -> str:
+def title_of(tab: Tab, plot: Chart) -> str:
     """A plot's title; in small plots the viewer labels few ticks, so the axis' ends stand in it."""
+    title = f"{plot.title} [{plot.units[0]}]"
     if len(tab.plots) <= 3:
-        return lines.title
-    low, high = tab.ends(lines)
-    return f"{lines.title}, {low:.3g} to {high:.3g}"
+        return title
+    low, high = tab.ends(plot)
+    return f"{title}, {low:.3g} to {high:.3g}"
 
 
-def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
+def log_view(log: Sequence[LogLine]) -> rrb.TextLogView:
     """A text log: time and words."""
-    import rerun.blueprint as rrb
-
     columns: dict[str, Any] = {}
     # The path says nothing that the words do not; versions without the choice show it.
     if hasattr(rrb, "TextLogColumns"):
@@ -196,38 +224,44 @@ def log_view(log: Sequence[LogLine]) -> Any:  # noqa: ANN401 - Rerun is untyped
     return rrb.TextLogView(origin="/", contents=paths, name="Log", **columns)
 
 
-def send_lines(stream: Stream, t: Array, lines: Lines) -> None:
-    """Send one plot: names and colours once, then all samples in one batch."""
-    import rerun as rr
-
+def send_plot(stream: Stream, plot: Chart) -> None:
+    """Send one plot: names and colours once, then all samples in one batch; then its points."""
+    lines = lines_of(plot)
     style = rr.SeriesLines(
-        names=[drawable(line.name) for line in lines.lines],
-        colors=[rgb(line.colour) for line in lines.lines],
-        widths=[line.width for line in lines.lines],
+        names=[drawable(line.name) for line in lines],
+        colors=[rgb(GREY if line.colour in {INK, REFERENCE} else line.colour) for line in lines],
+        widths=[width_of(line) for line in lines],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
-    stream.log(lines.path, style, static=True)
-    values = lines.values
-    counts = np.full(len(values), len(lines.lines))
-    scalars = rr.Scalars.columns(scalars=values.ravel()).partition(counts)
-    stream.send_columns(lines.path, [rr.TimeColumn("t", duration=t)], scalars)
-    if (points := lines.points) is not None:
-        path = f"{lines.path}/points"
-        marks = rr.SeriesPoints(
-            names=drawable(points.name),
-            colors=rgb(points.colour),
-            markers="diamond",
-            marker_sizes=6.0,
-        )
-        stream.log(path, marks, static=True)
-        single = rr.Scalars.columns(scalars=points.values)
-        stream.send_columns(path, [rr.TimeColumn("t", duration=points.t)], single)
+    stream.log(plot.key, style, static=True)
+    values = np.hstack([line.values for line in lines])
+    scalars = rr.Scalars.columns(scalars=values.ravel()).partition(np.full(len(values), len(lines)))
+    stream.send_columns(plot.key, [rr.TimeColumn("t", duration=plot.x)], scalars)
+    for points in plot.series:
+        if points.x is not None:
+            path = f"{plot.key}/points"
+            marks = rr.SeriesPoints(
+                names=drawable(points.name),
+                colors=rgb(points.colour),
+                markers="diamond",
+                marker_sizes=6.0,
+            )
+            stream.log(path, marks, static=True)
+            single = rr.Scalars.columns(scalars=points.values.ravel())
+            stream.send_columns(path, [rr.TimeColumn("t", duration=points.x)], single)
+
+
+def width_of(line: ChartLine) -> float:
+    """How broad a line is drawn. [px]"""
+    if line.name.endswith(EDGES):
+        return 0.6
+    if line.name.startswith(BAR):
+        return 6.0
+    return 2.5 if line.colour == REFERENCE else 2.0 if line.leads else 1.2
 
 
 def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
     """Send the lines of a text log, each to its entity, in the order of time."""
-    import rerun as rr
-
     for path in dict.fromkeys(line.path for line in log):
         own = sorted((line for line in log if line.path == path), key=lambda line: line.t)
         rows = rr.TextLog.columns(

@@ -4,25 +4,28 @@ Facts, the answer in a sentence, |F| over time, the contacts, whether it can be 
 against a reference, and what was written: forty lines at most, whatever the number of logs.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
+from vftcli.outputs.answer import answer, headline, otherwise
 from vftcli.outputs.believability import (
     MARKS,
-    SEVERITY,
     Ground,
+    LogSummary,
     grounds,
     health,
-    otherwise,
+    log_line,
+    own_match,
 )
 from vftcli.outputs.canvas import Canvas
-from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, hardest_words
+from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
 from vftcli.outputs.force_bars import force_bars, forces_of_list
-from vftcli.outputs.grid import Column, Grid, significant, terminal
+from vftcli.outputs.grid import Column, Grid, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks
 from vftcli.outputs.log.wrench_tables import contact_grids
-from vftcli.outputs.short_screen import answer_lines, doubt_lines, facts
+from vftcli.outputs.quantity import DASH, percent, significant
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
 
@@ -40,6 +43,13 @@ SUBJECT = 17  #: Columns of what a ground is about.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
+
+
+def short_screen(analysis: Analysis, below: Sequence[str], canvas: Canvas) -> str:
+    """Facts, the answer and what was written."""
+    head = canvas.painted(facts(analysis), "bold")
+    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis), *below]
+    return canvas.shown("\n".join(lines)) + "\n"
 
 
 def log_screen(
@@ -67,6 +77,53 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
     rows = list_lines(found, None if every else MOST_ROWS, canvas)
     end = "Whether it can be believed, and |F| over time: vftcli contacts on the log itself"
     return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
+
+
+def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
+    """The answer in a sentence."""
+    lines = canvas.wrapped(printable(headline(analysis)), 2)
+    return [f"  {line.strip()}" for line in lines]
+
+
+def facts(analysis: Analysis) -> str:
+    """Which log, which arm and how well it fits, how long, how fast."""
+    recording, match = analysis.recording, own_match(analysis)
+    fit = ""
+    if match is not None:
+        left = percent(match.misfit)
+        fit = f" (fits {left})" if match.fits else f" (does not fit: {left} unexplained)"
+    span = f"{recording.duration:.1f} s"
+    if recording.samples > 1:
+        rate = 1.0 / recording.median_step
+        span += f" at {rate:.0f} Hz" if rate >= 100.0 else f" at {rate:.3g} Hz"
+    return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
+
+
+def doubt_lines(analysis: Analysis) -> list[str]:
+    """What is said where results mean nothing and are made anyway."""
+    codes = [f.code for one in analysis.examinations for f in one.refusals()]
+    if not codes:
+        return []
+    return [f"MEANINGLESS unless this is wrong (--anyway): {', '.join(dict.fromkeys(codes))}"]
+
+
+def written_lines(
+    folder: Path,
+    names: Iterable[str],
+    canvas: Canvas,
+    open_with: str = "",
+    *,
+    several: bool = False,
+) -> list[str]:
+    """What was written, as far as it is there, and how to open it."""
+    there = [name for name in names if (folder / name).exists()]
+    there += ["one folder a log"] * several
+    lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
+    # A page that this run did not write is another run's.
+    if open_with or "index.html" in there:
+        what = f"{open_with} {folder}" if open_with else str(folder / "index.html")
+        lines.append(f"Open: {printable(what)}        More here: --details")
+    return lines
 
 
 def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
@@ -179,23 +236,24 @@ def logs_screen(
     """The screen of several logs: one line a log, then the worst findings."""
     found = [(analysis, grounds(analysis)) for analysis in analyses]
     lines = [canvas.painted(logs_facts(analyses, len(failed)), "bold"), ""]
-    shown = found if every or len(found) <= MOST_LOGS else worst_logs(found)
+    shown = found
+    if not every and len(found) > MOST_LOGS:
+        # The worst and hardest, in the order of the logs.
+        ranks = sorted(range(len(found)), key=lambda k: log_line(*found[k]).rank)
+        shown = [found[k] for k in sorted(ranks[:MOST_LOGS])]
     lines += [f"  {line}" for line in log_table(shown, failed, canvas)]
     if len(shown) < len(found):
         lines.append(f"  the {len(shown)} worst and hardest of {len(found)}; --details shows all")
-    findings = sorted(
-        (
-            (ground, analysis)
-            for analysis, all_grounds in found
-            for ground in all_grounds
-            if ground.of_log and ground.standing in {"bad", "caution"}
-        ),
-        key=lambda pair: pair[0].standing != "bad",
-    )
+    findings = [
+        (ground, analysis.recording.name)
+        for standing in ("bad", "caution")
+        for analysis, all_grounds in found
+        for ground in all_grounds
+        if ground.of_log and ground.standing == standing
+    ]
     if findings:
         lines += ["", "Can it be believed?"]
-        for ground, analysis in findings if every else findings[:WORST]:
-            name = analysis.recording.name
+        for ground, name in findings if every else findings[:WORST]:
             lines += ground_lines(ground, canvas, None if every else 2, name)
         if len(findings) > WORST and not every:
             lines.append(f"  and {len(findings) - WORST} more: --details")
@@ -208,27 +266,12 @@ def logs_facts(analyses: Sequence[Analysis], failed: int) -> str:
     """How many logs, of which arms, and what free motion the sizes rest on."""
     arms = list(dict.fromkeys(analysis.robot.name for analysis in analyses))
     free = list(dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs))
-    count = len(analyses) + failed
-    parts = [f"{count} logs", " and ".join(arms)]
+    parts = [f"{len(analyses) + failed} logs", " and ".join(arms)]
     if failed:
         parts.append(f"{failed} left out")
     if free:
         parts.append(f"free motion from {', '.join(free)}")
     return printable(" · ".join(part for part in parts if part))
-
-
-def worst_logs(
-    found: Sequence[tuple[Analysis, tuple[Ground, ...]]],
-) -> list[tuple[Analysis, tuple[Ground, ...]]]:
-    """The `MOST_LOGS` logs with the worst health, then the hardest contacts, in their order."""
-
-    def rank(k: int) -> tuple[int, float]:
-        analysis, all_grounds = found[k]
-        hardest = analysis.contacts.hardest if analysis.contacts is not None else None
-        size = hardest.peak_force if hardest is not None else None
-        return SEVERITY.index(health(all_grounds).standing), -(size or 0.0)
-
-    return [found[k] for k in sorted(sorted(range(len(found)), key=rank)[:MOST_LOGS])]
 
 
 def log_table(
@@ -238,14 +281,11 @@ def log_table(
 ) -> list[str]:
     """One line a log: what touched the arm, and whether the log is sound."""
     judged = any(analysis.errors is not None for analysis, _ in found)
-    rows = [log_row(analysis, judged=judged) for analysis, _ in found]
-    rows += [[name, *[""] * (4 + judged)] for name in failed]
-    heads = ("span", "contacts", "hardest", "else")
-    columns = [Column("log", words=True)]
-    columns += [Column(head, words=head == "hardest") for head in heads]
-    columns += [Column("error")] * judged
-    grid = Grid(columns=tuple(columns), rows=tuple(rows))
-    head, *table = terminal(grid, canvas.shown).splitlines()
+    heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
+    rows = [log_row(each[0], log_line(*each))[: len(heads)] for each in found]
+    rows += [[name, *[""] * (len(heads) - 1)] for name in failed]
+    columns = tuple(Column(head, words=head in {"log", "hardest"}) for head in heads)
+    head, *table = terminal(Grid(columns=columns, rows=tuple(rows)), canvas.shown).splitlines()
     room = max(len(line) for line in (head, *table)) + 2
     worst = [health(each) for _, each in found]
     states = [(g.standing, "sound" if g.standing == "good" else g.subject) for g in worst]
@@ -257,22 +297,12 @@ def log_table(
     return lines
 
 
-def log_row(analysis: Analysis, *, judged: bool) -> list[str]:
+def log_row(analysis: Analysis, line: LogSummary) -> list[str]:
     """What one line tells of a log, its health left out."""
-    found, recording = analysis.contacts, analysis.recording
-    count, hardest, rest = "–", "–", "–"
-    if found is not None:
-        load = any(contact.is_load for contact in found.contacts)
-        count = "load" if load else str(len(found.contacts))
-        hardest = hardest_words(found)
-        if found.told_force is not None and found.basis == "free motion" and not load:
-            rest = f"{found.told_force:.0f} N"
-    row = [recording.name, f"{recording.duration:.1f} s", count, hardest, rest]
-    if judged:
-        means = (
-            [m for b in blocks(analysis.errors)[:1] for m in b.means.errors.values()]
-            if (analysis.errors is not None)
-            else []
-        )
-        row.append(f"{significant(means[0], 2)} N·m" if means else "–")
-    return row
+    found, rest, error = analysis.contacts, DASH, DASH
+    if found is not None and found.told_force is not None and found.tells_untouched:
+        rest = f"{found.told_force:.0f} N"
+    for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
+        for value in [*block.means.errors.values()][:1]:
+            error = f"{significant(value, 2)} N·m"
+    return [line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error]

@@ -14,11 +14,11 @@ from vftcli.contacts.contact_list import (
     ContactModel,
     Unexplained,
 )
-from vftcli.contacts.windows import ContactPrior
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, Where
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 
 def stored_record(estimates: Path) -> dict[str, Any]:
@@ -59,7 +59,7 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
         load=None if load is None else stored_load(load),
         stops=tuple(record["stops_s"]),
         model=ContactModel(
-            prior=None if None in prior else ContactPrior(*prior),
+            prior=None if None in prior else WrenchPrior(*prior),
             noise_sd=numbers(model["noise_sd_Nm"]),
             error_sd=numbers(model["friction_sd_Nm"]),
             error_time=numbers(model["friction_time_s"]),

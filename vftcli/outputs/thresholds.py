@@ -6,7 +6,8 @@ from typing import Any, NamedTuple
 
 from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
-from vftcli.outputs.grid import DASH, Column, Grid, joint_columns, significant, terminal
+from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
+from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.writing import lines_of
 
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre.
@@ -112,7 +113,7 @@ def check_line(check: ContactCheck) -> str:
     if check.reference is None:
         count = len(check.contacts)
         least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
-        return f"{check.log}: {count} alarm{'s' * (count != 1)}{least}"
+        return f"{check.log}: {counted(count, 'alarm')}{least}"
     caught, all_of_them = len(check.caught), len(check.contacts)
     words = [f"{check.log}: {caught} of {all_of_them} contacts caught"]
     if caught:
@@ -184,21 +185,19 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
         "largest_missed_N": check.largest_missed,
         "false_alarms": check.false_alarms,
         "untouched_h": check.untouched_h,
-        "contacts": [contact_record(k, c) for k, c in enumerate(check.contacts, start=1)],
+        "contacts": [
+            {
+                "number": number,
+                "start_s": contact.start,
+                "stop_s": contact.stop,
+                "peak_force_N": contact.peak_force,
+                "delay_s": contact.delay,
+                "by": contact.by or None,
+                "alarm_was_on": contact.was_on,
+            }
+            for number, contact in enumerate(check.contacts, start=1)
+        ],
         "remarks": list(check.remarks),
-    }
-
-
-def contact_record(number: int, contact: CheckedContact) -> dict[str, Any]:
-    """One contact of a check for machines."""
-    return {
-        "number": number,
-        "start_s": contact.start,
-        "stop_s": contact.stop,
-        "peak_force_N": contact.peak_force,
-        "delay_s": contact.delay,
-        "by": contact.by or None,
-        "alarm_was_on": contact.was_on,
     }
 
 

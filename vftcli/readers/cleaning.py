@@ -1,14 +1,22 @@
 """Cleaning: what every log goes through on its way to a Recording. Nothing is repaired silently."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from vftcli.readers.joining import joined
 from vftcli.readers.reader import RawLog
-from vftcli.signals.arrays import Array, Indices, Mask, handed_over, median
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    handed_over,
+    median,
+    pieces,
+)
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
@@ -19,11 +27,19 @@ from vftcli.signals.source import Source
 def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
     """The log with some of its rows only, and what is to be said of the others."""
     rows = np.arange(len(raw.stamps)) if raw.rows is None else raw.rows
+    if isinstance(keep, slice):
+        signals = {name: value[keep] for name, value in raw.signals.items()}
+    else:
+        parts = zip(pieces(keep), *map(pieces, raw.signals.values()), strict=True)
+        signals = joined(
+            dict(zip(raw.signals, (value[here] for value in values), strict=True))
+            for here, *values in parts
+        )
     return replace(
         raw,
         rows=rows[keep],
         stamps=raw.stamps[keep],
-        signals={name: value[keep] for name, value in raw.signals.items()},
+        signals=signals,
         remarks=(*raw.remarks, *remarks),
     )
 
@@ -32,7 +48,7 @@ def without_unknown_rows(raw: RawLog) -> RawLog:
     """Leave out rows with a value that is no number, and say so; as it is if that is every row."""
     known = np.isfinite(raw.stamps)
     for value in raw.signals.values():
-        known &= np.isfinite(value).all(axis=1)
+        known &= np.concatenate([np.isfinite(rows).all(axis=1) for rows in pieces(value)])
     if known.all() or not known.any():
         return raw
     unknown = np.flatnonzero(~known)
@@ -88,18 +104,36 @@ def cleaned(
     fresh = without_repeats(raw, path)
     if raw.degrees_possible:
         refuse_degrees(fresh, path)
-    t = seconds(fresh)
-    gaps = gaps_of(t, GAP_STEPS)
-    of_gaps = told_gaps(np.column_stack([np.diff(t)[gaps], t[gaps]])) if len(t) > 2 else ()
-    source = source_of(raw, path, format_name, sha256, label)
-    source = replace(
-        source,
+    t, counts = seconds(fresh), raw.stamps.dtype.kind in "iu" and not raw.origin
+    # In whole nanoseconds, where the log counts its stamps in them.
+    per_tick = round(raw.tick * 1e9) if counts else 0
+    source = Source(
+        path=path,
+        label=f"{label or path.name} {raw.part}" if raw.part else label,
+        part=raw.part,
+        format=format_name,
+        sha256=sha256,
+        clock=raw.clock,
+        t0=float(raw.stamps[0]) * raw.tick + raw.origin,
+        t0_ns=int(raw.stamps[0]) * per_tick if per_tick >= 1 else None,
         rows=rows,
         duplicates=len(raw.stamps) - len(fresh.stamps),
         row_samples=row_samples(fresh, rows),
-        remarks=(*fresh.remarks, *of_gaps),
+        remarks=(*fresh.remarks, *gap_remarks(t)),
     )
-    return recording_of(raw, t, fresh.signals, source)
+    arrays: dict[str, Any] = {
+        name: handed_over(np.ascontiguousarray(v)) for name, v in fresh.signals.items()
+    }
+    return Recording(
+        t=handed_over(t),
+        **arrays,
+        wrench_frame=raw.wrench_frame if "wrench" in arrays else None,
+        joint_names=raw.joint_names,
+        robot_hint=raw.robot_hint,
+        payload_mass=raw.payload_mass,
+        payload_com=raw.payload_com,
+        source=source,
+    )
 
 
 def measured(raw: RawLog, path: Path) -> RawLog:
@@ -113,42 +147,6 @@ def measured(raw: RawLog, path: Path) -> RawLog:
     refuse_backward_steps(raw, path)
     refuse_standing_clock(raw, path)
     return raw
-
-
-def source_of(
-    raw: RawLog, path: Path, format_name: str, sha256: str | Callable[[], str], label: str
-) -> Source:
-    """Where a log came from, by its first samples."""
-    # In whole nanoseconds, where the log counts its stamps in them.
-    counts = raw.stamps.dtype.kind in "iu" and not raw.origin
-    per_tick = round(raw.tick * 1e9) if counts else 0
-    return Source(
-        path=path,
-        label=f"{label or path.name} {raw.part}" if raw.part else label,
-        part=raw.part,
-        format=format_name,
-        sha256=sha256,
-        clock=raw.clock,
-        t0=float(raw.stamps[0]) * raw.tick + raw.origin,
-        t0_ns=int(raw.stamps[0]) * per_tick if per_tick >= 1 else None,
-    )
-
-
-def recording_of(raw: RawLog, t: Array, signals: Mapping[str, Array], source: Source) -> Recording:
-    """The recording of clean samples, with all else that a log says."""
-    arrays: dict[str, Any] = {
-        name: handed_over(np.ascontiguousarray(v)) for name, v in signals.items()
-    }
-    return Recording(
-        t=handed_over(t),
-        **arrays,
-        wrench_frame=raw.wrench_frame if "wrench" in arrays else None,
-        joint_names=raw.joint_names,
-        robot_hint=raw.robot_hint,
-        payload_mass=raw.payload_mass,
-        payload_com=raw.payload_com,
-        source=source,
-    )
 
 
 def seconds(raw: RawLog) -> Array:
@@ -174,7 +172,10 @@ def without_empty_joints(raw: RawLog) -> RawLog:
     told = fact("joints-empty", joints=[names[k] for k in np.flatnonzero(empty)])
     return replace(
         raw,
-        signals={n: v[:, keep] if n in joints else v for n, v in raw.signals.items()},
+        signals=joined(
+            {n: v[:, keep] if n in joints else v for n, v in zip(raw.signals, values, strict=True)}
+            for values in zip(*map(pieces, raw.signals.values()), strict=True)
+        ),
         joint_names=tuple(names[k] for k in keep),
         remarks=(*raw.remarks, told),
     )
@@ -234,7 +235,7 @@ def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
     for name, value in raw.signals.items():
         # the largest tells whether all are finite; the slow look is only for the message
-        if max(float(np.max(value)), -float(np.min(value))) < ABSURD:
+        if all(max(float(np.max(x)), -float(np.min(x))) < ABSURD for x in pieces(value)):
             continue
         unknown = ~(np.abs(value) < ABSURD)
         row, column = (int(k) for k in np.argwhere(unknown)[0])
@@ -348,28 +349,25 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
             "have the stamp of the row before but other values. Name a finer column as t with "
             "--columns, or state the rate of a log without a clock, as in t@125Hz."
         )
-    return kept(raw, fresh, *told_repeats(again.size, int(changed.sum())))
-
-
-def told_repeats(repeats: int, different: int) -> list[Remark]:
-    """What is said of rows that were dropped, of which so many had other values."""
+    repeats, different = again.size, int(changed.sum())
     remarks = [fact("repeats-dropped" if repeats > 1 else "repeat-dropped", rows=repeats)]
     if different:
         remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
-    return remarks
+    return kept(raw, fresh, *remarks)
 
 
-def told_gaps(gaps: Array) -> tuple[Remark, ...]:
-    """A remark on gaps: their lengths, and the times at which they begin. (G, 2) [s]"""
+def gap_remarks(t: Array) -> tuple[Remark, ...]:
+    """A remark on the gaps of a clock (T,) [s], if there are any."""
+    gaps = gaps_of(t, GAP_STEPS)
     if not len(gaps):
         return ()
-    longest, at = gaps[np.argmax(gaps[:, 0])]
+    longest = int(gaps[np.argmax(t[gaps + 1] - t[gaps])])
     remark = caution(
         "clock-gaps" if len(gaps) > 1 else "clock-gap",
         gaps=len(gaps),
         steps=GAP_STEPS,
-        longest_s=float(longest),
-        at_s=float(at),
+        longest_s=float(t[longest + 1] - t[longest]),
+        at_s=float(t[longest]),
     )
     return (remark,)
 
@@ -386,10 +384,13 @@ def refuse_degrees(raw: RawLog, path: Path) -> None:
     """
     q = raw.signals["q"]
     limit = ONE_TURN if q.shape[1] == 7 else TWO_TURNS
-    beyond = np.any(np.abs(q) > limit, axis=1)
-    if 0 < np.mean(beyond) < BAD_SHARE:
-        q = q[~beyond]  # a few bad samples are no unit; the doctor cuts them out
-    largest, travel = float(np.max(np.abs(q))), float(np.max(np.ptp(q, axis=0)))
+    beyond = np.concatenate([np.any(np.abs(rows) > limit, axis=1) for rows in pieces(q)])
+    # A few bad samples are no unit; the doctor cuts them out.
+    good = ~beyond if 0 < np.mean(beyond) < BAD_SHARE else np.ones_like(beyond)
+    parts = zip(pieces(q), pieces(good), strict=True)
+    ends = np.array([(x[k].min(axis=0), x[k].max(axis=0)) for x, k in parts if k.any()])
+    low, high = ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)
+    largest, travel = float(np.max([-low, high])), float(np.max(high - low))
     if largest > limit or travel > TWO_TURNS:
         raise LogError(
             f"{path}: positions reach {largest:.4g} and travel {travel:.4g}, which looks like "

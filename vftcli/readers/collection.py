@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import lerobot
-from vftcli.readers.droid import TRAJECTORY
 from vftcli.readers.estimates import stored_observers
 from vftcli.readers.formats import LogFormat
+from vftcli.readers.hdf5_layouts import TRAJECTORY
 from vftcli.readers.library import absolute
 from vftcli.readers.opening import files_of
 from vftcli.readers.reader import LogFile, ReadChoice, open_log

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.reader import InOnePieceError, LogFile
+from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
@@ -152,8 +152,9 @@ class TextTable:
 
         path, kinds = self.file.direct, self._kinds(columns, clock)
         quoted = any('"' in line for line in self.sample)
+        in_one_piece = LogError(f"{self.path}: a text that needs mending is read in one piece")
         if path is None or quoted or self._needs_mending(self.file.head):
-            raise InOnePieceError
+            raise in_one_piece
         end = self._end() or len(self.file.content)
         with path.open("rb") as source:
             for _ in range(self._lines_before_rows):
@@ -164,9 +165,9 @@ class TextTable:
                 try:
                     frame = self._parse(text, kinds)
                 except pl.exceptions.PolarsError:
-                    raise InOnePieceError from None
+                    raise in_one_piece from None
                 if self._has_blank_rows(frame):
-                    raise InOnePieceError
+                    raise in_one_piece
                 yield {c: _numbers(frame[str(c)], self.path) for c in columns}
 
     def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, Any]:

@@ -1,8 +1,12 @@
-"""HDF5 logs: the layouts of ALOHA and DROID, and any other by its paths."""
+"""HDF5 logs: the layouts of ALOHA and DROID, and any other by its paths.
+
+DROID's raw release is a folder of episodes, each a trajectory.h5 with its metadata beside it.
+"""
 
 import json
+import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -13,7 +17,16 @@ from vftcli.readers.columns import parse_columns
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.hdf5 import Hdf5Table, natural, opened, table_of
 from vftcli.readers.picking import rate_words
-from vftcli.readers.reader import ARMS, LogFile, RawLog, ReadChoice, arm_of, episode_of, refuse_arm
+from vftcli.readers.reader import (
+    ARMS,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    arm_of,
+    episode_of,
+    open_log,
+    refuse_arm,
+)
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
@@ -36,6 +49,10 @@ TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
 FRANKA = ("panda", "fr3")
 TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
+
+TRAJECTORY = "trajectory.h5"
+DEEPEST = 8  #: Folders inside folders; DROID has five: version, lab, success, date, episode.
+MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
 
 
 class Layout(NamedTuple):
@@ -165,8 +182,47 @@ def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
     return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
 
 
+def trajectories(folder: Path) -> Iterator[Path | None]:
+    """Every episode below a folder in the order of their names; None for a folder without one."""
+    for place, below, names in os.walk(folder):
+        below.sort()
+        if len(Path(place).relative_to(folder).parts) >= DEEPEST:
+            below.clear()
+        yield Path(place) / TRAJECTORY if TRAJECTORY in names else None
+
+
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder holds DROID's episodes, at any depth."""
+    is_lerobot = (file.path / "meta" / "info.json").is_file()
+    if "metadata.yaml" in file.entries or is_lerobot:
+        return False
+    looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
+    return any(path is not None for _, path in looked_at)
+
+
+def episodes_below(file: LogFile) -> list[Path]:
+    """The episodes of DROID's folder, by name."""
+    found = [path for path in trajectories(file.path) if path is not None]
+    if not found:
+        raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
+    return found
+
+
+def read_release(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read one episode of DROID's folder."""
+    paths = episodes_below(file)
+    number, part, remarks = episode_of(file.path, request, range(len(paths)))
+    raw = read(open_log(paths[number]), replace(request, episode=None))
+    if part:
+        place = str(paths[number].parent.relative_to(file.path))
+        remarks = (*remarks, fact("episode-place", place=place))
+    return replace(raw, part=part, files=(paths[number],), remarks=(*remarks, *raw.remarks))
+
+
 def read(file: LogFile, request: ReadChoice, _: LogFormat | None = None) -> RawLog:
-    """Read an HDF5 log, or one episode of it."""
+    """Read an HDF5 log, or one episode of it or of DROID's folder."""
+    if file.is_folder:
+        return read_release(file, request)
     with opened(file) as content:
         table = table_of(file.path, content)
         layout, groups = layout_of(table)
@@ -181,7 +237,9 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat | None = None) -> RawL
 
 
 def episodes_in(file: LogFile) -> tuple[int, ...]:
-    """The numbers of the episodes of an HDF5 file."""
+    """The numbers of the episodes of an HDF5 file, or of DROID's folder, counted from 0."""
+    if file.is_folder:
+        return tuple(range(len(episodes_below(file))))
     with opened(file) as content:
         return numbers_of(layout_of(table_of(file.path, content))[1])
 

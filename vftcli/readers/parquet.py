@@ -17,7 +17,12 @@ import numpy as np
 
 from vftcli.readers.formats import LogFormat
 from vftcli.readers.opening import check_unpacked
-from vftcli.readers.reader import InOnePieceError, LogFile, RawLog, ReadChoice, episode_of
+from vftcli.readers.reader import (
+    LogFile,
+    RawLog,
+    ReadChoice,
+    episode_of,
+)
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
 from vftcli.signals.errors import LogError
@@ -255,7 +260,7 @@ class ParquetTable(ColumnarTable):
         import pyarrow.parquet as pq
 
         if self._rows is not None or self._direct is None:
-            raise InOnePieceError
+            raise LogError(f"{self.path}: part of a file, or a packed one, is read in one piece")
         names = self._names_of(columns)
         self._check_size(columns)
         with guarded(self.path):

@@ -2,14 +2,21 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
+from vftcli.readers.joining import joined
 from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.table import Column, LongTable, Pick, Picks, Table
+from vftcli.readers.table import (
+    Column,
+    LongTable,
+    Pick,
+    Picks,
+    Table,
+)
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step
@@ -27,25 +34,40 @@ def picked(
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells[0] if picks.clock else None
     last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
-    kept = {*picks.constants, *(() if picks.origin is None else (picks.origin,))}
-    kept |= {cell.column for cell in picks.clock.cells} if picks.clock else set()
-    asked = sorted(kept.union(last)), clock.column if clock else None
-    blocks = None
-    if request.blocks and isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
-        blocks = table.blocks(*asked)
-    loaded = table.load(*asked) if blocks is None else next(blocks)
-    stamps, tick, words = _stamps(table, picks, loaded, clock_name)
+    kept = {cell.column for cell in picks.clock.cells} if picks.clock else set()
+    kept |= set() if picks.origin is None else {picks.origin}
+    asked = sorted(kept.union(last, picks.constants)), clock.column if clock else None
+    columns: dict[int, list[Column]] = {}
+    constants: tuple[float, ...] = ()
+
+    def stacked(parts: Iterator[dict[int, Column]]) -> Iterator[dict[str, Array]]:
+        nonlocal constants
+        columns.clear()
+        for loaded in parts:
+            for column in kept:
+                columns.setdefault(column, []).append(loaded[column])
+            constants, arrays = _last(loaded, picks), {}
+            for pick in signals:
+                arrays[pick.signal] = _stacked(pick, loaded)
+                # Columns and what is picked of them have no room beside each other.
+                for column in [c for c in loaded if last.get(c) == pick.signal]:
+                    del loaded[column]
+            yield arrays
+
+    arrays: dict[str, Array] = {}
+    if isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
+        with suppress(LogError):  # in one piece it can be mended, or it is known what is wrong
+            arrays = joined(stacked(table.blocks(*asked)))
+    arrays = arrays or joined(stacked(table.load(*asked) for _ in range(1)))
+    loaded = {c: np.concatenate(x) if len(x) > 1 else x[0] for c, x in columns.items()}
+    rows = len(next(iter(arrays.values())))
+    stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
     remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
     more.setdefault("wrench_frame", wrench.frame if wrench else None)
-    constants, arrays = _last(loaded, picks), {}
-    for pick in signals:
-        arrays[pick.signal] = _stacked(pick, loaded)
-        # Of a long log the columns and what is picked of them have no room beside each other.
-        loaded = {c: x for c, x in loaded.items() if last.get(c) != pick.signal}
-    first = RawLog(
+    return RawLog(
         stamps=stamps,
         tick=tick,
         clock=words,
@@ -54,26 +76,6 @@ def picked(
         constants=constants,
         **more,
     )
-    return first if blocks is None else replace(first, rest=_rest(first, table, picks, blocks))
-
-
-def _rest(
-    first: RawLog, table: Table, picks: Picks, blocks: Iterator[dict[int, Column]]
-) -> Iterator[RawLog]:
-    """The blocks that follow the first, which says how their columns are to be taken."""
-    row = first.first_row + len(first.stamps)
-    for loaded in blocks:
-        stamps = _ticks(table, picks, loaded, row - first.first_row)
-        yield replace(
-            first,
-            stamps=stamps,
-            signals={
-                p.signal: _stacked(p, loaded) for p in picks.signals if p.signal in first.signals
-            },
-            constants=_last(loaded, picks),
-            first_row=row,
-        )
-        row += len(stamps)
 
 
 def _last(loaded: Mapping[int, Column], picks: Picks) -> tuple[float, ...]:
@@ -98,10 +100,14 @@ def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
 
 
 def _stamps(
-    table: Table, picks: Picks, loaded: Mapping[int, Column], clock_name: str
+    table: Table,
+    picks: Picks,
+    loaded: Mapping[int, Column],
+    rows: int,
+    clock_name: str,
 ) -> tuple[Column, float, str]:
     """The stamps, the length of their tick and which clock they are."""
-    stamps = _ticks(table, picks, loaded)
+    stamps = _ticks(table, picks, loaded, rows)
     if picks.clock is None:
         rate = picks.rate or 0.0
         return stamps, 1 / rate, rate_words(rate)
@@ -116,15 +122,15 @@ def _stamps(
     return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
 
 
-def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], before: int = 0) -> Column:
-    """The stamps of loaded rows, of which so many came before in the table. (T,)"""
+def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int) -> Column:
+    """The stamps of the rows. (T,)"""
     if picks.clock is None:
         if picks.rate is None:
             raise LogError(
                 f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
                 "order), or say the rate of a log without one: t@125Hz."
             )
-        return np.arange(before, before + len(next(iter(loaded.values()))))
+        return np.arange(rows)
     if picks.clock.factor < 0 or any(cell.turned for cell in picks.clock.cells):
         raise LogError(
             f"{table.path}: --columns turns the sign of the clock; time cannot run back."

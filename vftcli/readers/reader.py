@@ -1,9 +1,8 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
 import math
-import mmap
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -58,9 +57,9 @@ class LogFile:
 
     def release(self) -> None:
         """Let go of the pages of a mapped file that were touched so far; they can be read again."""
-        mapped = self.content.obj
-        if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
-            mapped.madvise(mmap.MADV_DONTNEED)
+        from vftcli.signals.arrays import release
+
+        release(self.content)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -114,9 +113,6 @@ class RawLog:
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     part: str = ""
     files: tuple[Path, ...] = ()  #: The files of a folder that it was read from; () for all.
-    #: What follows in the file, block by block, where this is the first of several; None where it
-    #: is all.
-    rest: "Iterator[RawLog] | None" = None
     #: Which rows of the file these are, counted from 0; None for all. (T,)
     rows: "Indices | None" = None
     #: Rows of the file that were left out because a value is no number.
@@ -132,10 +128,6 @@ class RawLog:
             return self
         mass, *com = constants
         return replace(self, constants=constants, payload_mass=mass, payload_com=tuple(com))
-
-
-class InOnePieceError(Exception):
-    """A log that was to come in blocks has to be read whole: only that tells what is odd."""
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
@@ -238,7 +230,6 @@ class ReadChoice(Choice):
     all_episodes: bool = False  #: Whether each episode is wanted, as a log of its own.
     #: Whether the log is only looked at, where a part and a word say more than a refusal.
     examining: bool = False
-    blocks: bool = False  #: Whether a long log may come in blocks, where its format allows it.
     #: Whether rows with a value that is no number are left out and said, not refused.
     skips_unknown: bool = False
 

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +10,8 @@ from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
 from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.long_log import long_recording
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import (
-    InOnePieceError,
     LogFile,
     RawLog,
     ReadChoice,
@@ -29,13 +26,10 @@ from vftcli.signals.errors import (
     ShapeError,
     UnknownFormatError,
 )
-from vftcli.signals.names import EFFORTS, JOINT_SIGNALS
+from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.parsing import did_you_mean
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import warning
-
-#: Signals that an estimate is made of, beside time and positions; others are only examined.
-COMPUTED_WITH = frozenset(("dq", *EFFORTS, "temperature"))
 
 
 def read(
@@ -89,21 +83,10 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     if "polars" not in sys.modules and not reader.episodes:
         digest.start()  # its import takes longer than the hash and leaves a core idle
 
-    def found(choice: ReadChoice = choice) -> RawLog:
-        with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
-            raw = reader.read(file, choice)
-            raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
-            return without_unknown_rows(raw) if choice.skips_unknown else raw
-
-    try:
-        raw = found()
-        if raw.rest is not None:
-            digest.start()
-            used = None if choice.signals is None else choice.signals & COMPUTED_WITH
-            again = partial(found, replace(choice, signals=used))
-            return long_recording(raw, again, path, reader.name, digest.hexdigest, label)
-    except InOnePieceError:
-        raw = found(replace(choice, blocks=False))
+    with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
+        raw = reader.read(file, choice)
+        raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
+        raw = without_unknown_rows(raw) if choice.skips_unknown else raw
     digest = Digest(raw.files) if raw.files else digest
     if not raw.part:
         digest.start()  # of one of many parts it may never be asked for

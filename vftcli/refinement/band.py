@@ -26,9 +26,7 @@ from vftcli.signals.series import resample_columns
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """The estimate with its band, and marked where joints move; itself where nothing is known.
 
-    The band is how far the estimate may be off, as the log itself shows it: see
-    `vftcli.observers.error_band`. A Kalman filter's own covariance knows neither model error nor
-    lag: it is the filter's own account, and stands apart (`sd`).
+    The band is `vftcli.observers.error_band`'s: a filter's own covariance, `sd`, knows no lag.
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     if spectra is None or not len(reading.samples):
@@ -75,9 +73,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
 def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     """What an estimator reads where nothing touches the arm, as far as the log shows it.
 
-    Where the bias of the whole log was fitted, all samples that its fit calls free of contact speak
-    too: a stated free part is short, and often at rest. The larger of both counts, since the fit
-    may take slow errors for slow loads.
+    Samples that a fitted bias calls free speak too, as a stated part is short and often at rest:
+    the larger of both counts.
     """
     friction = dry_friction(found.motion.log.robot.friction, reading.estimate.joints)
     stated = free_error(reading.samples, reading.resting, friction)

@@ -1,25 +1,30 @@
-"""A log's free part and spectra, and what the observers read where nothing touches the arm."""
+"""A log's free part and spectra, and what the observers run on once the bias is off.
+
+The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
+`best` runs on what is left, tuned on the spectra of that; the other observers do where
+``--remove-bias whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
+and `best` is made of what is left.
+"""
 
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
-from vftcli.refinement.tuning import gains_of
+from vftcli.observers.tuning import Goal, tune_all
+from vftcli.refinement.choice import RefinementChoice
+from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad, free_load, without_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, frozen_mask
-from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.rest import standing
-
-if TYPE_CHECKING:
-    from vftcli.refinement.whole_log import WholeLogBias
 
 STANDS = 0.5  #: A joint that stands in more than this share of the samples is limited by stiction.
 
@@ -39,7 +44,7 @@ class Baseline:
     load: FreeLoad | None = None
     #: The bias of the whole log, off the terms where its guards apply it; None where none was
     #: fitted.
-    correction: "WholeLogBias | None" = None
+    correction: WholeLogBias | None = None
     #: Whether the free part is what the fit of that bias takes for free: no contact that comes and
     #: goes, though a load that stays may be in it.
     by_fit: bool = False
@@ -74,9 +79,8 @@ class Baseline:
     def tunable(self) -> Spectra | None:
         """The spectra where gains may be taken from them, else None.
 
-        Not from a free part that only the fit calls so and that carries a load: on a UR10e with an
-        untold 2.8 kg they ran to the slowest there is on two joints, 2.3 N·m rms where the gains of
-        the robot file leave 1.7.
+        Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran to the
+        slowest.
         """
         return None if self.by_fit and self.load is not None else self.spectra
 
@@ -84,8 +88,7 @@ class Baseline:
     def correction_sd(self) -> Array | None:
         """Standard deviation of the model's error as the correction has it. (T, n) [N·m]
 
-        On joints left alone too: what could not be predicted there is not known either. None
-        without a correction.
+        On joints left alone too; None without a correction.
         """
         return None if self.correction is None else self.correction.sd
 
@@ -134,7 +137,7 @@ def baseline_of(motion: FreeMotion) -> Baseline:
         spectra = spectra_of(RunSamples(log, ~part.own), known.samples)
     except ParameterError as error:
         return replace(known, missing=caution("no-spectra", reason=str(error)))
-    if motion.choice.is_given or looks_free(spectra):
+    if not part.doubted or looks_free(spectra):
         return replace(known, spectra=spectra)
     residuals = motion.free_cycles.residuals
     listed = [] if residuals is None else residuals[np.isfinite(residuals)].tolist()
@@ -161,7 +164,10 @@ class Baselines:
     def spectra(self, *, gains: bool) -> LogSpectra:
         """What the observers that are built for the log are tuned to."""
         plain = self.plain.tunable
-        called_for = gains_of(plain) if gains and plain is not None else None
+        called_for = None
+        if gains and plain is not None:
+            least = tune_all(plain, Goal("rmse"))
+            called_for = {line.section: dict(line.gains) for line in least}
         return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
 
 
@@ -204,3 +210,58 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
         samples=np.concatenate([np.zeros(none), *inside]),
         resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
     )
+
+
+def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:
+    """What the observers of a log run on: `best` and, where it is asked, all less the bias."""
+    motion, as_read = motion.steadied, motion.log
+    found = baseline_of(motion)
+    if not (choice.corrects_all or (best and choice.corrects_best)):
+        return Baselines(plain=found, best=found)
+    try:
+        bias = whole_log_bias(motion.log)
+    except (VftError, np.linalg.LinAlgError) as error:
+        failed = caution("whole-log-bias-failed", reason=str(error))
+        found = replace(found, on_correction=(failed,))
+        return Baselines(plain=found, best=found)
+    if found.spectra is None and bias.fitted:
+        found = on_quiet_samples(found, bias.free)
+    made = corrected(found, bias)
+    if motion.log is not as_read:
+        evened = motion.log.recording.source.remarks[-1:]
+        made = replace(made, on_correction=(*evened, *made.on_correction))
+    return Baselines(plain=made if choice.corrects_all else found, best=made)
+
+
+def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
+    """A baseline whose free part is what the fit of the bias takes for free, where that will do.
+
+    Args:
+        found: A baseline without spectra.
+        quiet: The samples that are taken for free. (T,)
+    """
+    log = found.motion.log
+    share = float(quiet.mean())
+    remark = fact("free-by-the-fit", share=share)
+    if found.motion.choice.is_given and found.missing is not None:
+        # What was given is dropped, and why has to be said.
+        reason = found.missing.values["reason"]
+        remark = caution("free-by-the-fit-instead", share=share, reason=reason)
+    part = FreePart((RunSamples(log, quiet),), quiet, (remark,))
+    made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
+    try:
+        return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
+    except ParameterError:  # all of it or nothing is taken for free, or never for long enough
+        return found
+
+
+def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
+    """A baseline with the bias of the whole log off, where its guards apply any of it.
+
+    What its fit says of contact and of slow loads holds also where none of it is applied.
+    """
+    fitted = bias if bias.fitted else None
+    made = replace(found, on_correction=bias.remarks, correction=fitted)
+    if not bias.applied.any() or made.part is None or made.spectra is None:
+        return made
+    return replace(made, spectra=spectra_of(RunSamples(made.log, ~made.part.own), made.samples))

@@ -90,7 +90,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 def limits_remark(found: Budget, stuck: Mask) -> Remark:
     """What limits a log: the largest cause of each joint, and how much of the error it makes.
 
-    What stiction may hide is added to the error of a joint that stands, so that it is a part of it.
+    What stiction may hide is added to the error of a standing joint.
 
     Args:
         found: The budget.

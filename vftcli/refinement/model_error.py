@@ -63,8 +63,7 @@ def smooth_motion(run: Run) -> SmoothMotion:
 def without_waits(t: Array) -> Array:
     """A clock that waits no longer than `WAIT`; itself where it does not. (T,) [s]
 
-    What was between is not known: a filter that fills an hour with a line takes minutes for it, and
-    a load that changes slowly had all the time to do so.
+    What was between is not known, and to fill an hour with a line takes minutes.
     """
     steps = np.diff(t)
     longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
@@ -140,8 +139,8 @@ class ModelError:
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
         """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
 
-        The rigid body's part is the difference of two inverse dynamics, that of the chain with
-        these errors and that of the robot's own, which costs a fiftieth of the regressor.
+        The rigid body's part is the difference of two inverse dynamics: a fiftieth of the
+        regressor.
         """
         chain = run.robot.loaded_chain
         wrong = with_parameters(
@@ -177,7 +176,7 @@ def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
 def expected_error(robot: Robot) -> ModelError:
     """Standard deviation of the model's error in every column, from the robot's own numbers.
 
-    An arm that measures behind its gears has no rotor in its torque.
+    Torque behind the gears has no rotor in it.
     """
     chain, friction = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))

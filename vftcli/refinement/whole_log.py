@@ -22,17 +22,15 @@ from vftcli.refinement.model_error import (
     usual_friction,
     without_waits,
 )
-from vftcli.refinement.normal_equations import Rows
-from vftcli.refinement.robust_fit import WholeLogFit, fit_robustly
-from vftcli.refinement.slow_load import slow_loads
-from vftcli.refinement.unseen import Guarded, faded, guarded
+from vftcli.refinement.normal_equations import Rows, slow_loads
+from vftcli.refinement.robust_fit import Guarded, WholeLogFit, faded, fit_robustly, guarded
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
+from vftcli.signals.terms import DynamicsTerms
 
 #: From its first to its last motion a log has to take this long: a shorter one tells inertia from a
 #: push no more, and friction alone is fitted. [s]
@@ -135,9 +133,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
 def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
     """How much of a fit of friction alone each joint of a short log gets. (n,)
 
-    A hand that leads the arm pushes along the motion, which is what friction does the other way
-    round: what tells them apart in some seconds is that friction is about as wrong as is usual on
-    every joint, and predicts most of what was not seen.
+    A hand that leads the arm looks like less friction: they differ in size and in foresight.
     """
     if tried.solution is None:
         return tried.weight

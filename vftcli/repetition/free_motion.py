@@ -32,6 +32,8 @@ class FreePart(NamedTuple):
     pieces: tuple[RunSamples, ...]  #: One a recording, the log's own first.
     own: Mask  #: RunSamples of the log itself that are free. (T,)
     remarks: tuple[Remark, ...]  #: What it is and how it was found.
+    #: Whether it was found, not named, so that it may be touched after all.
+    doubted: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -97,28 +99,37 @@ class FreeMotion(Shown):
         return find_free_cycles(self.log, self.cycles)
 
     @cached_property
-    def part(self) -> FreePart:
-        """The free part: the given spans and runs, else the free cycles of the log."""
+    def known(self) -> FreePart:
+        """The free part: the given spans and runs, else the free cycles of the log.
+
+        Its remarks are on the log alone: where in a free run the log's motion lies is not asked.
+        """
         log, choice = self.log, self.choice
         own, t = self.within_spans, log.t
         remarks = [
             fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
             for a, b in choice.spans
         ]
-        if choice.cycles or not choice.is_given:
+        given = choice.is_given or bool(self.runs)
+        if choice.cycles or not given:
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
             remarks.append(found.remark(self.cycles.whole))
         pieces = [RunSamples(log, own)] if own.any() else []
+        whole = (RunSamples(r.run, np.ones(r.recording.samples, dtype=bool)) for r in self.runs)
+        return FreePart((*pieces, *whole), own, tuple(remarks), doubted=not given)
+
+    @cached_property
+    def part(self) -> FreePart:
+        """The free part, with how each free run lies on the log among its remarks."""
+        paired = []
         for run in self.runs:
-            whole = np.ones(run.recording.samples, dtype=bool)
             about = Where(about=run.recording.name)
-            pieces.append(RunSamples(run.run, whole))
             if run.is_same_motion:
-                remarks.append(fact("free-run", about, shift_s=run.alignment.shift))
+                paired.append(fact("free-run", about, shift_s=run.alignment.shift))
             else:
-                remarks.append(fact("free-run-of-another-motion", about))
-        return FreePart(tuple(pieces), own, tuple(remarks))
+                paired.append(fact("free-run-of-another-motion", about))
+        return self.known._replace(remarks=(*self.known.remarks, *paired))
 
     def unloaded(self, spans: tuple[tuple[float, float], ...]) -> "FreeMotion":
         """The log with its unloaded spans as free motion, where none is given."""

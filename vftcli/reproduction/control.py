@@ -15,7 +15,7 @@ from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.admittance.page import charts as replay_charts
+from vftcli.outputs.admittance import charts as replay_charts
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
 from vftcli.robots import load_robot

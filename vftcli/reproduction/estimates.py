@@ -15,11 +15,10 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.selection import facts
-from vftcli.observers import PAPER
 from vftcli.observers.choice import ObserverChoice
+from vftcli.observers.table import PAPER
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.torque_part import torque_chart
-from vftcli.outputs.page.wrench_part import wrench_chart
+from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice
 from vftcli.reproduction.control import deviation_chart
@@ -27,9 +26,9 @@ from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Run
 from vftcli.robots import load_robot
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.run import Runs
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import fact
+from vftcli.signals.terms import DynamicsTerms
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
@@ -76,11 +75,16 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         assert made.errors is not None, "a reference was asked for"
         rows = made.errors.filter(made.errors["axis"].is_not_null())
         for row in rows.iter_rows(named=True):
-            known = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
-            result.put(variant, {row["axis"]: known})
+            force, moment = row["rmse_N"], row["rmse_Nm"]
+            result.put(variant, {row["axis"]: moment if force is None else force})
         put_causes(result, variant, run, made)
         if variant == CORRECTED:
-            result.put(FLOOR, dict(zip(AXES, sensor_error(run, made), strict=True)))
+            # How far the real sensor itself is from the simulation's truth.
+            turn = link_poses(made.robot.chain, made.recording.q).rotation[:, -1]
+            known = run.truth.wrench[: len(turn)].reshape(-1, 2, 3)
+            true = np.einsum("tji,tkj->tki", turn[: len(known)], known).reshape(-1, 6)
+            off = (real_sensor(made).known[: len(true)] - true).T
+            result.put(FLOOR, {axis: rms(one) for axis, one in zip(AXES, off, strict=True)})
             chart = wrench_chart(made)
             assert chart is not None, "a wrench was asked for"
             result.charts["fig4"] = chart
@@ -118,15 +122,6 @@ def real_sensor(made: Analysis) -> Wrench:
     reference = made.virtual_sensor.reference
     assert reference is not None, "the sensor is the reference"
     return reference
-
-
-def sensor_error(run: Simulation, made: Analysis) -> Array:
-    """How far the real sensor itself is from the simulation's truth, rms. (6,) [N, N·m]"""
-    turn = link_poses(made.robot.chain, made.recording.q).rotation[:, -1]
-    known = run.truth.wrench[: len(turn)].reshape(-1, 2, 3)
-    true = np.einsum("tji,tkj->tki", turn[: len(known)], known).reshape(-1, 6)
-    error: Array = np.sqrt(np.nanmean((real_sensor(made).known[: len(true)] - true) ** 2, axis=0))
-    return error
 
 
 def assembled_bearing(

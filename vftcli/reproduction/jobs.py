@@ -75,11 +75,6 @@ def perform(job: Job) -> Result:
     return made if job.seed == experiment.seeds[0] else replace(made, charts={})
 
 
-def end_with_terminal() -> None:
-    """Let a worker end without a word when Ctrl-C ends the command."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
-
-
 def run_jobs(
     jobs: Sequence[Job],
     tell: Hearer,
@@ -103,7 +98,9 @@ def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
         yield from ((job, perform(job)) for job in jobs)
         return
     context = multiprocessing.get_context("spawn")
-    pool = ProcessPoolExecutor(count, context, initializer=end_with_terminal)
+    # A worker ends without a word when Ctrl-C ends the command.
+    silent = signal.SIGINT, signal.SIG_DFL
+    pool = ProcessPoolExecutor(count, context, initializer=signal.signal, initargs=silent)
     try:
         futures: dict[Future[Result], Job] = {pool.submit(perform, job): job for job in jobs}
         for future in as_completed(futures):

@@ -7,13 +7,23 @@ from html import escape
 
 import numpy as np
 
-from vftcli.outputs.figures.lines import line_figure, plots_of
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, html, markdown, significant
+from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.log.run_record import seal, versions
-from vftcli.outputs.page.charts import large, multiples
-from vftcli.outputs.page.shell import bullets, document, lead, section, soft, top
+from vftcli.outputs.page.shell import (
+    bullets,
+    document,
+    large,
+    lead,
+    multiples,
+    section,
+    soft,
+    table,
+    top,
+)
+from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
@@ -46,7 +56,7 @@ def spread(values: Sequence[float | None]) -> str:
 def signed(value: float) -> str:
     """Three significant digits, a whole number as it is, with a true minus sign."""
     text = f"{value:.0f}" if value == round(value) else significant(value)
-    return text.replace("-", "−")
+    return minus(text)
 
 
 def item_grid(shown: ShownItem) -> Grid:
@@ -59,7 +69,7 @@ def item_grid(shown: ShownItem) -> Grid:
         (
             line.label,
             line.unit or DASH,
-            line.printed.replace("-", "−") or DASH,
+            minus(line.printed) or DASH,
             *(spread(values.get(line.key, {}).get(kind, [])) for kind in kinds),
         )
         for line in item.lines
@@ -129,7 +139,7 @@ def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job
     about = lead(f"{paper.title}.") + lead(*paper.setting)
     parts = [
         top((paper.name, f"doi {paper.doi}"), "The paper, run again", about),
-        html(overview(found)),
+        table(overview(found)),
         soft(RATIOS),
         *(item_section(name, shown) for name, shown in found.items()),
         "<h2>What was run</h2>",
@@ -146,7 +156,7 @@ def item_section(name: str, shown: ShownItem) -> str:
     parts += [f'<p class="alarm">{escape(line)}</p>' for line in shown.failures]
     parts.append(f"<p><strong>{escape(item.answer)}</strong> {escape(item.why)}</p>")
     if item.lines:
-        parts.append(html(item_grid(shown)))
+        parts.append(table(item_grid(shown)))
     if shown.chart is not None:
         drawn = multiples(shown.chart) + large(shown.chart)
         parts.append(section("Traces", drawn, shown.chart.title, opened=True))

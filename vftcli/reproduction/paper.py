@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vftcli.evaluation.print_table import TABLES, Published
+from vftcli.evaluation.print_table import TABLES
 from vftcli.outputs.page.charts import Chart
 from vftcli.signals.errors import ParameterError
 
@@ -126,7 +126,11 @@ def load_paper(name: str) -> Paper:
     for key, entry in declared.pop("items").items():
         lines = [line for row in entry.pop("lines", ()) for line in lines_of(row, each)]
         if published := entry.pop("published", None):
-            lines += published_lines(TABLES[published], each["observer"])
+            lines += [
+                PrintedLine(f"{name}/{j}", f"{each['observer'][name]}, J{j}", "N·m", f"{rmse:.4f}")
+                for name, numbers in TABLES[published].rmse.items()
+                for j, rmse in enumerate(numbers, start=1)
+            ]
         items[key] = PaperItem(**entry, lines=lines)
     experiments = {key: Experiment(**entry) for key, entry in declared.pop("experiments").items()}
     return Paper(name=name, experiments=experiments, items=items, **declared)
@@ -147,15 +151,6 @@ def lines_of(row: Sequence[Any], each: Mapping[str, Mapping[str, str]]) -> list[
             printed=number,
         )
         for (key, word), number in zip(each[name].items(), numbers, strict=True)
-    ]
-
-
-def published_lines(table: Published, names: Mapping[str, str]) -> list[PrintedLine]:
-    """A line for each observer and joint of a printed table."""
-    return [
-        PrintedLine(f"{observer}/{j}", f"{names[observer]}, J{j}", "N·m", f"{number:.4f}")
-        for observer, numbers in table.rmse.items()
-        for j, number in enumerate(numbers, start=1)
     ]
 
 

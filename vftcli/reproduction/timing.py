@@ -14,17 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.observers import BEST, PAPER, KalmanObserver
+from vftcli.observers import KalmanObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
+from vftcli.observers.table import BEST, PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
+from vftcli.signals.terms import DynamicsTerms
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.

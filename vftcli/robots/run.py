@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.robots.drive import check_joints, drive_torque
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms
+from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.filters import low_pass
 from vftcli.signals.isolated import without_isolated
@@ -17,6 +17,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step, white_noise
 from vftcli.signals.shown import Shown
+from vftcli.signals.terms import DynamicsTerms
 
 #: RunSamples from which on a recording's series do not stay in memory beside its results.
 LONG = 1 << 17
@@ -156,6 +157,7 @@ class Run(Shown):
         That takes less time than a pass of the observers, and all of a log's results have no room
         beside it.
         """
+        self.recording.release()
         if self.recording.samples > LONG and "terms" in vars(self):
             _ = self.noise
             del vars(self)["terms"]

@@ -1,13 +1,11 @@
 """Joints that turn on and on: positions that a log holds within one turn are wound up again."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Where, fact
 
@@ -37,24 +35,4 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
         return recording
     said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
     source = replace(recording.source, remarks=(*recording.source.remarks, said))
-    return recording.changed(lambda: Winding(sorted(jumping)), source=source, **changed)
-
-
-class Winding:
-    """Winds the positions of endless joints up, one block of a long log after another."""
-
-    def __init__(self, joints: Sequence[int]) -> None:
-        self.joints = list(joints)
-        self.last: dict[str, Array] = {}
-
-    def __call__(self, block: Recording) -> Recording:
-        """The block, wound up behind the one before."""
-        changed: dict[str, Any] = {}
-        for signal in ("q", "target_q"):
-            if (values := getattr(block, signal)) is not None:
-                before = self.last.get(signal, values[:1, self.joints])
-                smooth = values.copy()
-                wound = np.unwrap(np.vstack([before, values[:, self.joints]]), axis=0)[1:]
-                smooth[:, self.joints], self.last[signal] = wound, wound[-1:]
-                changed[signal] = smooth
-        return replace(block, **changed)
+    return replace(recording, source=source, **changed)

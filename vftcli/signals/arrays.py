@@ -1,5 +1,7 @@
 """Arrays: one alias, read-only copies, and the checks every type makes at its door."""
 
+import mmap
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -31,9 +33,28 @@ def frozen(value: ArrayLike) -> Array:
 def is_sealed(value: NDArray[Any]) -> bool:
     """Whether neither an array nor the array it is a view of can be written to."""
     owner = value.base
-    if owner is None:
+    if owner is None or value.flags.writeable:
         return not value.flags.writeable
-    return isinstance(owner, np.ndarray) and not value.flags.writeable and is_sealed(owner)
+    if isinstance(owner, np.ndarray):
+        return is_sealed(owner)
+    # The memory of a file that nobody can write to through it.
+    return isinstance(owner, memoryview) and owner.readonly and isinstance(owner.obj, mmap.mmap)
+
+
+def release(memory: object) -> None:
+    """Let go of the pages of a mapped file that were touched so far; they can be read again."""
+    while isinstance(memory, np.ndarray):
+        memory = memory.base
+    mapped = memory.obj if isinstance(memory, memoryview) else None
+    if isinstance(mapped, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def pieces(values: NDArray[Any], size: int = 1 << 16) -> Iterator[NDArray[Any]]:
+    """The rows of an array, so many at a time; of a mapped one no more lie in memory."""
+    for start in range(0, max(len(values), 1), size):
+        yield values[start : start + size]
+        release(values)
 
 
 def handed_over(value: Array) -> Array:
@@ -152,7 +173,8 @@ def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
     steps = np.diff(t)
     if steps.size == 0:
         return True
-    if (least := np.min(steps)) > 0.0 and np.max(steps) - least <= tolerance * least:
+    least, most = np.min(steps), np.max(steps)
+    if least > 0.0 and most - least <= tolerance * least:
         return True  # wherever between them the median is
     usual = median(steps)
-    return bool(np.max(np.abs(steps - usual)) <= tolerance * usual)
+    return bool(max(most - usual, usual - least) <= tolerance * usual)

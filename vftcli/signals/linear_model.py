@@ -53,12 +53,6 @@ def beside_errors(H: Array) -> Array:
     return np.concatenate([H, own], axis=-2)
 
 
-def diagonal(matrices: Array) -> Array:
-    """A view of the diagonals of square matrices, which can be written to. (…, N)"""
-    view: Array = np.einsum("...ii->...i", matrices)
-    return view
-
-
 def filtered(model: LinearModel, limit: Array | None = None) -> Iterator[FilteredBlock]:
     """The filter, block by block.
 
@@ -71,16 +65,17 @@ def filtered(model: LinearModel, limit: Array | None = None) -> Iterator[Filtere
     alone = size == n == 1
     times, inverse = (np.multiply, np.reciprocal) if alone else (np.matmul, np.linalg.inv)
     x, P = np.zeros((*shape, 1)), np.zeros((*shape, size))
+    turned = model.observation.swapaxes(-1, -2)
     for k, (d, H, white, f, added) in enumerate(zip(*model, strict=True)):
-        Ht, column = H.swapaxes(-1, -2), f[..., :, None]
-        x, P = column * x, P * (column * f[..., None, :])
-        diagonal(P)[...] += added
+        Ht, column = turned[k], f[..., None]
+        x, P = column * x, column * P * f[..., None, :]
+        P.reshape(*shape[:-1], -1)[..., :: size + 1] += added
         predicted, PH = P, times(P, H)
         S = times(Ht, PH)
-        diagonal(S)[...] += white
+        S.reshape(*S.shape[:-2], -1)[..., :: n + 1] += white
         nu, Si = d[..., None] - times(Ht, x), inverse(S)
-        square = times(nu.swapaxes(-1, -2), times(Si, nu))[..., 0, 0]
         gain = times(PH, Si)
+        square = times(nu.swapaxes(-1, -2), times(Si, nu))[..., 0, 0]
         if limit is not None:
             gain /= np.where(square > limit[k], SPIKE, 1.0)[..., None, None]
         x, P = x + times(gain, nu), P - times(gain, PH.swapaxes(-1, -2))

@@ -13,9 +13,6 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 
-#: Angle below which the series replaces the quotient; the next term is below 1e-25. [rad]
-SMALL = 1e-6
-
 
 class Pose(NamedTuple):
     """Orientation (3, 3) and origin (3,) [m] of one frame in another."""
@@ -114,11 +111,8 @@ def rotation_onto(direction: Array) -> Array:
 
 def exp_quaternion(vector: Array) -> Array:
     """The unit quaternion of a rotation vector. (…, 3) [rad] → (…, 4)"""
-    angle = np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
-    half = 0.5 * angle
-    # sin(θ/2)/θ is 0/0 at rest, where every replay starts.
-    share = np.where(angle < SMALL, 0.5 - angle**2 / 48.0, np.sin(half) / np.maximum(angle, SMALL))
-    return np.concatenate([np.cos(half), share * vector], axis=-1)
+    half = 0.5 * np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
+    return np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * vector], axis=-1)
 
 
 def log_quaternion(quaternion: Array) -> Array:
@@ -126,11 +120,10 @@ def log_quaternion(quaternion: Array) -> Array:
     w, vector = quaternion[..., :1], quaternion[..., 1:]
     sine = np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, w)
-    # For a tiny sine the quotient is 2/w − (2/3) sine²/w³; at w < 0 (a full turn) it is undefined.
-    near = (sine < SMALL) & (w > 0.0)
-    share = np.where(near, 2.0 - 2.0 / 3.0 * sine**2, angle / np.maximum(sine, 1e-300))
-    result: Array = share * vector
-    return result
+    # At rest the quotient is 0/0.
+    share = np.full_like(sine, 2.0)
+    np.divide(angle, sine, out=share, where=sine > 0.0)
+    return np.asarray(share * vector)
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
@@ -149,14 +142,13 @@ def quaternion_product(a: Array, b: Array) -> Array:
 
 
 def exp_matrix(vector: Array) -> Array:
-    """Rotation matrices of rotation vectors, by Rodrigues' formula. (…, 3) [rad] → (…, 3, 3)"""
-    w, x, y, z = np.moveaxis(exp_quaternion(np.asarray(vector, dtype=np.float64)), -1, 0)
-    rows = [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
-        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
-        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    """Rotations of rotation vectors (Rodrigues). (…, 3) [rad] → (…, 3, 3)"""
+    v = np.asarray(vector, dtype=np.float64)
+    angle, K = np.sqrt(np.sum(v**2, axis=-1))[..., None, None], skew(v)
+    # sin θ/θ, and (1 − cos θ)/θ² = ½ (sin(θ/2)/(θ/2))²
+    once = np.sinc(angle / np.pi)
+    twice = 0.5 * np.sinc(0.5 * angle / np.pi) ** 2
+    return np.asarray(np.eye(3) + once * K + twice * (K @ K))
 
 
 def log_matrix(matrix: Array) -> Array:
@@ -167,39 +159,23 @@ def log_matrix(matrix: Array) -> Array:
 
 
 def matrix_quaternion(matrix: Array) -> Array:
-    """A unit quaternion of each rotation matrix. (…, 3, 3) → (…, 4)
+    """A unit quaternion x of each rotation matrix. (…, 3, 3) → (…, 4)
 
-    Of the four ways to take a quaternion from a matrix each matrix gets the one with the largest
-    divisor, so that the result is as exact near a turn of π as near 0.
+    A matrix gives 4 x xᵀ. The row with its largest diagonal entry is as exact near a turn of π
+    as near 0.
 
     References:
         S. W. Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1(3), 1978.
     """
-    R = matrix
-    d = np.diagonal(R, axis1=-2, axis2=-1)
-    trace = d.sum(axis=-1)
-    candidates = np.stack([trace, *np.moveaxis(2.0 * d - trace[..., None], -1, 0)], axis=-1)
-    xy, xz, yz = (
-        R[..., 0, 1] + R[..., 1, 0],
-        R[..., 0, 2] + R[..., 2, 0],
-        R[..., 1, 2] + R[..., 2, 1],
-    )
-    wx, wy, wz = (
-        R[..., 2, 1] - R[..., 1, 2],
-        R[..., 0, 2] - R[..., 2, 0],
-        R[..., 1, 0] - R[..., 0, 1],
-    )
-    first = 1.0 + candidates
-    rows = np.stack(
-        [
-            np.stack([first[..., 0], wx, wy, wz], axis=-1),
-            np.stack([wx, first[..., 1], xy, xz], axis=-1),
-            np.stack([wy, xy, first[..., 2], yz], axis=-1),
-            np.stack([wz, xz, yz, first[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = np.argmax(candidates, axis=-1)
-    longest = np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :]
+    back = matrix.swapaxes(-1, -2)
+    trace = np.trace(matrix, axis1=-2, axis2=-1)[..., None, None]
+    turn = (matrix - back)[..., (2, 0, 1), (1, 2, 0)]
+    product = np.empty((*matrix.shape[:-2], 4, 4))
+    product[..., :1, :1] = 1.0 + trace
+    product[..., 1:, 1:] = matrix + back + (1.0 - trace) * np.eye(3)
+    product[..., 0, 1:] = turn
+    product[..., 1:, 0] = turn
+    best = np.argmax(np.diagonal(product, axis1=-2, axis2=-1), axis=-1)
+    longest = np.take_along_axis(product, best[..., None, None], axis=-2)[..., 0, :]
     unit: Array = longest / np.linalg.norm(longest, axis=-1, keepdims=True)
     return unit

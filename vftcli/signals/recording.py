@@ -1,59 +1,36 @@
 """Recording: one log, in SI units, on one strictly increasing clock."""
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from vftcli.signals.arrays import (
     Array,
+    Indices,
     Mask,
     check_clock,
     check_series,
     check_shape,
-    handed_over,
+    release,
     seal,
 )
-from vftcli.signals.errors import ClockError, MissingSignalError, ShapeError
+from vftcli.signals.errors import (
+    ClockError,
+    MissingSignalError,
+    ShapeError,
+)
 from vftcli.signals.names import COLUMN_NAMES, EFFORTS, JOINT_SIGNALS, MEANINGS
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, frame_of, per_joint
 from vftcli.signals.source import IN_MEMORY, Cut, Source
-from vftcli.signals.timing import Timing
 from vftcli.signals.wrench import WrenchFrame, per_axis
 
 if TYPE_CHECKING:
     import polars as pl
-
-#: What is done to one block of a long log after another.
-Change = Callable[["Recording"], "Recording"]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LongLog:
-    """A log that is read block by block, each block a recording, each time it is asked for."""
-
-    timing: Timing  #: What is known of its clock.
-    #: Reads it in blocks of so many samples, but for the last.
-    read: Callable[[int], Iterator["Recording"]]
-    #: Make what is done to the blocks since; anew for each time it is read.
-    changes: tuple[Callable[[], Change], ...] = ()
-
-    def blocks(self, samples: int) -> Iterator["Recording"]:
-        """Blocks of so many samples, but for the last; their times are those of the whole log."""
-        changes = [make() for make in self.changes]
-        for block in self.read(samples):
-            changed = block
-            for change in changes:
-                changed = change(changed)
-            yield changed
-
-    def changed(self, make: Callable[[], Change]) -> "LongLog":
-        """The log with something more done to its blocks."""
-        return replace(self, changes=(*self.changes, make))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -85,9 +62,6 @@ class Recording(Shown):
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
-    #: The log that these samples are stretches of, evenly drawn, where it is too long to be held
-    #: whole; None where they are all.
-    long: LongLog | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         seal(self, "t", *MEANINGS)
@@ -146,36 +120,9 @@ class Recording(Shown):
     @property
     def median_step(self) -> float:
         """Median time between samples, the nominal sample time. [s]"""
-        if self.long is not None:
-            return self.long.timing.step
         if self.samples < 2:
             raise ClockError(f"{self.name}: one sample has no sample time")
         return median_step(self.t)
-
-    @property
-    def all_samples(self) -> int:
-        """Number of samples of the log, of which this may hold stretches only."""
-        return self.samples if self.long is None else self.long.timing.samples
-
-    @property
-    def steps(self) -> Array:
-        """Times between samples, and when they begin; of a long log those that may be gaps. (S, 2)
-
-        The longest is always among them. [s]
-        """
-        if self.long is not None:
-            return self.long.timing.steps
-        return np.column_stack([np.diff(self.t), self.t[:-1]])
-
-    def changed(self, make: Callable[[], Change], **values: Any) -> "Recording":  # noqa: ANN401
-        """The recording with other values, and the long log behind it changed alike.
-
-        Args:
-            make: Makes what gives a block its values, as in `LongLog`.
-            values: Fields of this recording.
-        """
-        long = None if self.long is None else self.long.changed(make)
-        return replace(self, long=long, **values)
 
     @property
     def name(self) -> str:
@@ -203,15 +150,20 @@ class Recording(Shown):
             )
         return value
 
-    def let_go(self, names: Iterable[str]) -> None:
-        """Give back the memory of signals that nobody will read again; they read as unknown then.
+    def rows(self, rows: slice | Indices | Mask) -> "Recording":
+        """Some of its samples; their times stay those of the whole log."""
+        return replace(self, **{name: getattr(self, name)[rows] for name in ("t", *self.signals)})
 
-        Only for a recording that its owner read itself and shares with no one who may ask for them.
-        """
-        unknown = np.broadcast_to(handed_over(np.full(1, np.nan)), self.q.shape)
-        for name in names:
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, unknown)
+    def blocks(self, size: int) -> Iterator["Recording"]:
+        """Blocks of so many samples, but for the last; one at a time is held in memory."""
+        for start in range(0, self.samples, size):
+            yield self.rows(slice(start, start + size))
+            self.release()
+
+    def release(self) -> None:
+        """Give the memory of long signals back; what lies in a file can be read again."""
+        for name in self.signals:
+            release(getattr(self, name))
 
     def with_effort(
         self, kind: str, *, source: str | None = None, factor: float = 1.0
@@ -240,11 +192,7 @@ class Recording(Shown):
         where = replace(self.source, remarks=(*self.source.remarks, taken))
         # 0 + x: no zero of the other sign.
         changed: dict[str, Any] = {**dict.fromkeys(there), kind: 0.0 + factor * value}
-        return self.changed(
-            lambda: lambda block: block.with_effort(kind, source=source, factor=factor),
-            source=where,
-            **changed,
-        )
+        return replace(self, source=where, **changed)
 
     def with_joints(self, places: Sequence[int]) -> "Recording":
         """Return the recording with some of its joints, in an order; what goes is said.
@@ -261,8 +209,8 @@ class Recording(Shown):
         remarks += [fact("joints-left-out", joints=left)] if left else []
         joints = [name for name in JOINT_SIGNALS if getattr(self, name) is not None]
         changed: dict[str, Any] = {name: getattr(self, name)[:, order] for name in joints}
-        return self.changed(
-            lambda: lambda block: block.with_joints(order),
+        return replace(
+            self,
             joint_names=tuple(names[k] for k in order),
             source=replace(self.source, remarks=(*self.source.remarks, *remarks)),
             **changed,
@@ -289,9 +237,7 @@ class Recording(Shown):
         }
         taken = fact("gear-applied", ratios=gear.tolist())
         source = replace(self.source, remarks=(*self.source.remarks, taken))
-        return self.changed(
-            lambda: lambda block: block.behind_gear(gear, efficiency), source=source, **changed
-        )
+        return replace(self, source=source, **changed)
 
     def without(self, rows: Mask, cuts: Iterable[Cut] = ()) -> "Recording":
         """Return the recording without some samples; gaps of its clock stay in their place.
@@ -304,8 +250,7 @@ class Recording(Shown):
         samples = source.row_samples
         now = number if samples is None else np.where(samples < 0, -1, number[samples])
         source = replace(source, cuts=(*source.cuts, *cuts), row_samples=now)
-        kept = {name: getattr(self, name)[~rows] for name in ("t", *self.signals)}
-        return replace(self, source=source, **kept)
+        return replace(self.rows(~rows), source=source)
 
     def between(self, start: float, stop: float) -> "Recording":
         """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]

@@ -8,10 +8,10 @@ with their order; so they are asked of this quantity, which no option touches an
 import numpy as np
 
 from vftcli.robots.disturbance import disturbance_impulse
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import resample_columns
+from vftcli.signals.terms import DynamicsTerms
 
 HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 

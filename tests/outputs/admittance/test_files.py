@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance.files import FILES, admittance_record, motion_table, write_admittance
+from vftcli.outputs.admittance import FILES, admittance_record, motion_table, write_admittance
 from vftcli.outputs.log.run_record import to_json
 from vftcli.signals.errors import OutputError
 

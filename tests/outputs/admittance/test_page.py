@@ -7,9 +7,9 @@ import pytest
 from vftcli.admittance.law import judge, variable
 from vftcli.admittance.parameters import from_table
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance.files import admittance_record
-from vftcli.outputs.admittance.page import (
+from vftcli.outputs.admittance import (
     UNITS,
+    admittance_record,
     charts,
     deviations_from_paper,
     render_admittance,

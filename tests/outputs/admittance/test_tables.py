@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance.tables import (
+from vftcli.outputs.admittance_tables import (
     COLUMNS,
     comparison_csv,
     comparison_grid,
@@ -16,7 +16,7 @@ from vftcli.outputs.admittance.tables import (
     position_rotation,
     stability_grid,
 )
-from vftcli.outputs.plain_rows import json_rows
+from vftcli.outputs.grid import json_rows
 
 
 def test_controllers_stand_under_each_other_by_axis_and_drag(release: Replay) -> None:

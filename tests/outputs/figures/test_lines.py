@@ -4,8 +4,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.outputs.figures.lines import Plot, line_figure, plain, plots_of
 from vftcli.outputs.figures.paper import paper_style
+from vftcli.outputs.figures.plots import Plot, line_figure, plain, plots_of
 from vftcli.outputs.page.charts import DASHES, INK, QUIET, REFERENCE, Chart, ChartLine
 from vftcli.outputs.palette import SPARE
 

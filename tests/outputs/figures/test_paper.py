@@ -10,7 +10,6 @@ from vftcli.outputs.figures.paper import (
     Drawing,
     checked_form,
     figure_files,
-    legend_room,
     sheet,
     shortened,
     write_figures,
@@ -22,8 +21,7 @@ matplotlib = pytest.importorskip("matplotlib", reason="no figure is drawn withou
 
 
 def drawn(width: float) -> object:
-    figure = sheet(width, 1, 1, 1.0, 0.0)
-    axes = figure.subplots()
+    figure, (axes,) = sheet(width, 1, 1, 1.0, {})
     axes.plot([0.0, 1.0], [-1.0, 1.0])
     axes.set_ylabel("costs $5 τ² (N·m)")
     return figure
@@ -91,7 +89,7 @@ def test_a_form_is_checked_before_anything_is_computed(monkeypatch: pytest.Monke
 
 @pytest.mark.slow
 def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
-    rooms = ("figures.tuned", "admittance.files", "identification.files", "log.report")
+    rooms = ("log.figures", "admittance", "identification", "log.report")
     modules = (f"vftcli.outputs.{room}" for room in rooms)
     assert "matplotlib" not in loaded(", ".join(("vftcli.cli.report", *modules)))
 
@@ -103,9 +101,13 @@ def test_no_files_without_a_form_and_names_beside_a_file() -> None:
 
 def test_a_legend_takes_as_many_lines_as_it_needs() -> None:
     """Seven names of five letters are .625 in each: five a line of 3.5 in, so four and three."""
-    assert legend_room(3.5, ["abcde"] * 7) == (4, pytest.approx(0.35))
-    assert legend_room(7.16, ["abcde"] * 7)[0] == 7
-    assert legend_room(3.5, []) == (1, 0.0)
+    names = {f"abcd{k}": matplotlib.lines.Line2D([], []) for k in range(7)}
+    bare, _ = sheet(3.5, 1, 1, 1.0, {})
+    assert bare.legends == []
+    for width, columns, room in ((3.5, 4, 0.35), (7.16, 7, 0.2)):
+        figure, _ = sheet(width, 1, 1, 1.0, names)
+        assert figure.legends[0]._ncols == columns  # it has no public name
+        assert figure.get_figheight() - bare.get_figheight() == pytest.approx(room)
 
 
 def test_long_names_are_cut() -> None:

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vftcli.observers.spectra import Spectra
+from vftcli.observers.tuning import Tuned, parse_goal, tune_all, tuning_curves
 from vftcli.outputs.figures.paper import WIDTHS, figure_files, paper_style
-from vftcli.outputs.figures.tuned import TUNED_FIGURES, tuned_figures, write_tuned
-from vftcli.refinement.tuning import Tuned, parse_goal, tune_all, tuning_curves
+from vftcli.outputs.log.figures import TUNED_FIGURES, tuned_figures, write_tuned
 from vftcli.signals.errors import OutputError
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")

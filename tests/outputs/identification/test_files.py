@@ -1,4 +1,4 @@
-"""What `identify` writes: a robot file, a page that opens offline, a recording, run.json."""
+"""What `identify` writes: a robot file, a page that opens offline, run.json."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.doctor import examine
 from vftcli.outputs.files import OutputFolder
-from vftcli.outputs.identification.files import write_identification
+from vftcli.outputs.identification import write_identification
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError
 
@@ -19,7 +19,6 @@ def test_all_files_are_written_and_the_robot_loads(found, tmp_path):
     text = write_identification(path, result, [examine(log)], "vftcli identify", force=False)
     assert sorted(p.name for p in tmp_path.iterdir()) == [
         "mine.html",
-        "mine.rrd",
         "mine.run.json",
         "mine.toml",
     ]
@@ -32,7 +31,6 @@ def test_all_files_are_written_and_the_robot_loads(found, tmp_path):
     assert account["method"] == "friction"
     assert "0" * 64 in robot.friction[0].confidence
     assert robot.document["joints"][0]["rotor_inertia_source"].startswith("identified")
-    assert (tmp_path / "mine.rrd").read_bytes().startswith(b"RRF2")
     record = json.loads(text)
     assert record["processing"]["cutoff_hz"] == 8.0
     assert "never" in record["processing"]["differentiation"]

@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from vftcli.doctor import examine
-from vftcli.outputs.identification.files import identification_record
-from vftcli.outputs.identification.page import render_identification, shown_trace, torque_charts
+from vftcli.outputs.identification import (
+    identification_record,
+    render_identification,
+    shown_trace,
+    torque_charts,
+)
 
 
 class Balance(HTMLParser):

@@ -4,7 +4,7 @@ import polars as pl
 import pytest
 
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.identification.tables import (
+from vftcli.outputs.identification import (
     parameter_grid,
     residual_grid,
     shape_choice_grid,

@@ -12,7 +12,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.log.contact_recording import (
     best_wrench,
     contact_log,
-    force_lines,
+    force_plot,
     painted_links,
     touched_point,
 )
@@ -22,10 +22,10 @@ from vftcli.signals.remarks import Where, caution
 
 
 def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None:
-    plot, wrench = force_lines(touched), best_wrench(touched)
+    plot, wrench = force_plot(touched), best_wrench(touched)
     assert plot is not None
     assert wrench is not None
-    lines = {line.name: line.values for line in plot.lines}
+    lines = {line.name: line.values[:, 0] for line in plot.series}
     size = np.linalg.norm(wrench.known[:, :3], axis=1)
     np.testing.assert_allclose(lines["|F|"], size, rtol=1e-12)
     assert np.all(lines["95 % lower"] <= size)
@@ -36,20 +36,21 @@ def test_the_force_stands_in_its_band_above_the_spans(touched: Analysis) -> None
         bar = lines[f"touched: {name}"]
         np.testing.assert_array_equal(np.isfinite(bar), (t >= start) & (t <= stop))
         assert np.nanmax(bar) < 0.0
-    assert plot.points is not None
-    assert plot.points.t.tolist() == [1.2, 2.4]
-    assert plot.points.values.tolist() == [64.8, 64.8]
+    (peaks,) = (line for line in plot.series if line.x is not None)
+    assert peaks.x is not None
+    assert peaks.x.tolist() == [1.2, 2.4]
+    assert lines["peaks"].tolist() == [64.8, 64.8]
 
 
 def test_without_a_wrench_there_is_no_force(touched: Analysis) -> None:
-    assert force_lines(replace(touched, virtual_sensor=None)) is None
+    assert force_plot(replace(touched, virtual_sensor=None)) is None
 
 
 def test_a_load_has_no_peak(touched: Analysis) -> None:
     load = contact_list(contact(start=1.0, stop=4.0, peak=2.0, is_load=True))
-    plot = force_lines(replace(touched, contacts=load))
+    plot = force_plot(replace(touched, contacts=load))
     assert plot is not None
-    assert plot.points is None
+    assert all(line.x is None for line in plot.series)
     assert "load 1 begins" in contact_log(load)[0].text
 
 

@@ -10,7 +10,6 @@ from vftcli.outputs.figures.paper import WIDTHS, paper_style
 from vftcli.outputs.log.figures import (
     LOG_FIGURES,
     MOST,
-    error_drawing,
     error_figures,
     log_figures,
     torque_drawing,
@@ -93,8 +92,8 @@ def test_of_many_logs_only_what_stands_for_all_is_drawn(pushed: Analysis) -> Non
     assert pushed.errors is not None
     rows = pushed.errors.filter(pl.col("joint").is_not_null())
     many = [rows.with_columns(recording=pl.lit(f"{k}.csv")) for k in range(MOST + 1)]
-    assert error_drawing(pl.concat(many)) is None
+    assert error_figures(pl.concat(many)) == {}
     pooled = rows.with_columns(recording=pl.lit(POOLED))
-    drawing = error_drawing(pl.concat([*many, pooled]))
+    drawing = error_figures(pl.concat([*many, pooled]))["errors"]
     assert len(drawn(drawing).axes) == 1
-    assert error_drawing(rows.clear()) is None
+    assert error_figures(rows.clear()) == {}

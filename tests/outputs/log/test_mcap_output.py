@@ -2,7 +2,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
@@ -13,7 +12,6 @@ from vftcli.outputs.log import mcap_output
 from vftcli.outputs.log.mcap_output import frame_id, ros_name, stamps_of, write_mcap
 from vftcli.outputs.log.run_record import jsonable
 from vftcli.robots.drive import drive_torque
-from vftcli.robots.kinematics import link_poses
 from vftcli.signals.recording import Recording
 from vftcli.signals.source import Source
 
@@ -44,7 +42,7 @@ def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
     topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
     topics.append("/vftcli/wrench/best")
     assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
-    few = {"/robot_description": 1, "/vftcli/contacts": 1, "/vftcli/contacts/log": 4}
+    few = {"/vftcli/contacts": 1, "/vftcli/contacts/log": 4}
     assert {topic: len(messages[topic]) for topic in few} == few
     assert set(messages) == {*topics, *few}
 
@@ -60,13 +58,13 @@ def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) ->
     stamps = [message.log_time for _, _, message in found]
     assert stamps == sorted(stamps)
     assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
-    assert late == {"/robot_description", "/vftcli/contacts"}
+    assert late == {"/vftcli/contacts"}
 
 
-def test_the_description_and_the_list_are_kept_for_who_comes_late(path: Path) -> None:
+def test_the_list_of_contacts_is_kept_for_who_comes_late(path: Path) -> None:
     with AnyReader([path]) as reader:
         for connection in reader.connections:
-            latched = connection.topic in {"/robot_description", "/vftcli/contacts"}
+            latched = connection.topic == "/vftcli/contacts"
             profiles = connection.ext.offered_qos_profiles
             assert bool(profiles) == latched
             if latched:
@@ -104,23 +102,6 @@ def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Anal
     assert json.loads(listed.data) == json.loads(
         json.dumps(jsonable(contacts_record(touched.contacts)))
     )
-
-
-def test_pinocchio_moves_the_description_as_the_arm(
-    messages: dict[str, list], touched: Analysis
-) -> None:
-    """Poses of the flange at 20 drawn configurations of seed 5; 12 printed digits."""
-    ((_, message),) = messages["/robot_description"]
-    model = pin.buildModelFromXML(message.data)
-    assert list(model.names[1:]) == list(touched.robot.chain.names)
-    data, flange = model.createData(), model.getFrameId("flange")
-    q = np.random.default_rng(5).uniform(-3.0, 3.0, (20, 6))
-    expected = link_poses(touched.robot.chain, q)
-    for k, pose in enumerate(q):
-        pin.framesForwardKinematics(model, data, pose)
-        placed = data.oMf[flange]
-        np.testing.assert_allclose(placed.translation, expected.translation[k, -1], atol=1e-9)
-        np.testing.assert_allclose(placed.rotation, expected.rotation[k, -1], atol=1e-9)
 
 
 def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis) -> None:

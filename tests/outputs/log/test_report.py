@@ -9,7 +9,7 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.log import report
 from vftcli.outputs.log.choice import NONE, OutputChoice
-from vftcli.outputs.log.estimates import extra_files, write_estimate_folder
+from vftcli.outputs.log.estimates import write_estimate_folder
 from vftcli.outputs.log.report import (
     ERROR_TABLES,
     FILES,
@@ -54,13 +54,10 @@ def test_the_list_of_contacts_is_written_as_it_is_printed(
     assert not (tmp_path / "none/contacts.json").exists()
 
 
-def test_a_report_writes_an_mcap_with_its_layouts_on_request(
-    touched: Analysis, tmp_path: Path
-) -> None:
-    extras = ("mcap", "layouts")
-    write_report(tmp_path / "out", touched, command="", choice=OutputChoice(extras=extras))
+def test_a_report_writes_an_mcap_on_request(touched: Analysis, tmp_path: Path) -> None:
+    write_report(tmp_path / "out", touched, command="", choice=OutputChoice(extras=("mcap",)))
     found = {p.name for p in (tmp_path / "out").iterdir()}
-    assert found == {*FILES, *extra_files(extras)}
+    assert found == {*FILES, "estimates.mcap"}
 
 
 def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:

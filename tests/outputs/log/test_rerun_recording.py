@@ -11,15 +11,14 @@ from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.arm import motion
 from vftcli.outputs.log.choice import FULL, LEVELS
 from vftcli.outputs.log.rerun_recording import (
     force_arrow,
-    line_groups,
+    plot_groups,
     tabs_of,
     write_rrd,
 )
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kinematics import flange_jacobian, link_poses
@@ -73,11 +72,11 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
     for j in range(1, 7):
         assert column(rows, f"/tau_ext/J{j}", "SeriesLines:names")[-1] == [
             "reference (vendor)",
-            "best",
             "fdo",
             "gmo",
             "kfo-fe",
             "kfo-zoh",
+            "best",
             "best 95 % upper",
             "best 95 % lower",
         ]
@@ -88,7 +87,8 @@ def test_every_plot_has_all_of_its_lines(rows: dict[str, dict[str, list]]) -> No
 def test_torques_read_back(rows: dict[str, dict[str, list]], analysis: Analysis) -> None:
     values = np.array([v for v in column(rows, "/tau_ext/J2", "Scalars:scalars") if v])
     assert analysis.reference is not None
-    expected = [analysis.reference.tau[:, 1], *(e.tau[:, 1] for e in analysis.estimates)]
+    best, *others = (e.tau[:, 1] for e in analysis.estimates)
+    expected = [analysis.reference.tau[:, 1], *others, best]
     np.testing.assert_array_equal(values[:, : len(expected)], np.column_stack(expected))
 
 
@@ -133,9 +133,12 @@ def test_without_a_reference_there_are_no_residuals(
 
 @pytest.mark.slow
 def test_wrenches_have_their_own_tab(with_wrench: Analysis) -> None:
-    lines = list(line_groups(with_wrench)["Wrench"])
-    assert [entry.path for entry in lines] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
-    np.testing.assert_array_equal(lines[4].values[:, 1], with_wrench.wrenches[1].known[:, 4])
+    plots = list(plot_groups(with_wrench)["Wrench"])
+    assert [entry.key for entry in plots] == [f"/wrench/{a}" for a in (*AXES, "sigma_min")]
+    own = {line.name: line.values[:, 0] for line in plots[4].series}
+    for wrench in with_wrench.wrenches:
+        np.testing.assert_array_equal(own[wrench.name], wrench.known[:, 4])
+    assert {line.name for line in plots[6].series} == {"σ_min of J", "masked below"}
 
 
 def test_odd_names_do_no_harm(analysis: Analysis, as_if: Callable, tmp_path: Path) -> None:
@@ -193,14 +196,12 @@ def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_beg
     assert found is not None
     strongest = max(found.contacts, key=lambda contact: contact.peak_force or 0.0)
     near = t[np.abs(t - strongest.start) <= 0.2]
+    whole = {plot.key: plot for tab in tabs_of(analysis, FULL) for plot in tab.plots}
     for tab in tabs_of(analysis, LEVELS):
-        for lines in tab.plots:
-            assert lines.t is not None
-            assert set(near) <= set(lines.t)
+        for plot in tab.plots:
+            assert set(near) <= set(plot.x)
             # two, and one unknown, of each line and stretch, the ends, and what is whole
-            assert len(lines.t) <= 3 * 20 * len(lines.lines) + 2 + len(near)
-    whole = {lines.path: lines for tab in tabs_of(analysis, FULL) for lines in tab.plots}
-    for tab in tabs_of(analysis, LEVELS):
-        for lines in tab.plots:
-            assert whole[lines.path].t is None
-            assert lines.ends == whole[lines.path].ends  # no spike is lost
+            assert len(plot.x) <= 3 * 20 * len(plot.series) + 2 + len(near)
+            assert len(plot.x) < len(whole[plot.key].x) == len(t)
+            ends = tab.ends(plot._replace(families=()))
+            assert ends == tab.ends(whole[plot.key]._replace(families=()))  # no spike is lost

@@ -3,7 +3,7 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import SCHEMA
-from vftcli.outputs.grid import GridCell, html, latex, markdown, terminal
+from vftcli.outputs.grid import GridCell, latex, markdown, terminal
 from vftcli.outputs.log.rmse_tables import (
     blocks,
     detail_grids,
@@ -12,6 +12,7 @@ from vftcli.outputs.log.rmse_tables import (
     marks_in_words,
     rmse_grid,
 )
+from vftcli.outputs.page.shell import table
 
 
 def errors(*changed: dict[str, object]) -> pl.DataFrame:
@@ -55,7 +56,7 @@ def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
     (block,) = blocks(errors({}, rests, {"rmse_Nm": 0.9}, rests))
     grid = rmse_grid(block)
     assert block.means.errors == {"fdo": 0.6, "gmo": 0.9}
-    for text in (terminal(grid), markdown(grid), latex(grid), html(grid)):
+    for text in (terminal(grid), markdown(grid), latex(grid), table(grid)):
         assert "0.600" in text
         assert "1.30" not in text  # the mean of .6 and 2
     assert "mean: without J2" in terminal(grid) + marks_in_words([block])

@@ -6,8 +6,7 @@ from collections.abc import Callable
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.page.index_page import render_index
-from vftcli.outputs.page.page import render
+from vftcli.outputs.page.pages import render, render_index
 
 FOCUSED = """() => { const x = document.activeElement; const style = getComputedStyle(x);
   return { words: x.textContent.trim(), tag: x.tagName, seen: style.outlineStyle !== "none" } }"""
@@ -101,7 +100,7 @@ def test_observers_come_on_demand(opened: Callable, html: str) -> None:
 
 def test_without_a_script_the_page_answers(opened: Callable, html: str) -> None:
     tab = opened(html, java_script_enabled=False)
-    assert "pushed the arm 12 times" in tab.page.locator("h1").inner_text()
+    assert "12 contacts" in tab.page.locator("h1").inner_text()
     for place in (".hero svg.wide", "#contacts", "#believed"):
         assert tab.page.locator(place).is_visible()
     tab.page.locator("#torques summary").click()

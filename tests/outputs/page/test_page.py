@@ -11,8 +11,8 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground
 from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.page.page import believability_section, eyebrow, render
-from vftcli.outputs.page.sections import joint_values
+from vftcli.outputs.page import pages
+from vftcli.outputs.page.pages import eyebrow, render
 from vftcli.outputs.page.shell import asset, script_json
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution, explanation
@@ -109,7 +109,8 @@ def test_the_answer_comes_first(pushed: Analysis) -> None:
     text = page.text
     order = (
         "ur5_circle.csv · Universal Robots UR5",
-        "Something pushed the arm 12 times, hardest with 95 ± 9 N.",
+        "12 contacts. The hardest of known size, at 11.3 s: 95 ± 9 N on the wrist.",
+        "Nothing else above 4 N. Weaker pushes would not show.",
         "The contacts",
         "Can it be believed?",
         "vftcli identify",
@@ -130,7 +131,7 @@ def test_without_contacts_the_torques_are_open(
     reason = caution("contacts-not-told", reason="a hostile <b>")
     bare = replace(pushed, contacts=None, remarks=(*pushed.remarks, reason))
     page = Page(render(bare))
-    assert "External torques of the 6 joints." in page.text
+    assert "External torque of 6 joints by " in page.text
     assert "a hostile <b>" in page.text
     opened = [a.get("id") for tag, a in page.elements if tag == "details" and "open" in a]
     assert opened == ["torques"]
@@ -213,17 +214,14 @@ def test_the_eyebrow_says_what_measured_the_force(
     assert words in measured
 
 
-def test_joints_that_agree_share_a_line() -> None:
-    assert joint_values(np.array([10.0, 10.0])) == "10.0"
-    text = joint_values(np.array([5.0, 10.0, 10.0, 7.0]))
-    assert re.sub(r"<[^>]*>", " ", text).split() == ["J1", "5.00", "J2–J3", "10.0", "J4", "7.00"]
-
-
-def test_a_ground_is_shown_with_its_sign_and_its_remedy() -> None:
+def test_a_ground_is_shown_with_its_sign_and_its_remedy(
+    analysis: Analysis, monkeypatch: pytest.MonkeyPatch
+) -> None:
     good = Ground(standing="good", subject="clock of the UR", sentence="no gap <b>")
     bad = Ground(standing="bad", subject="load", sentence="heavy", remedy="vftcli x '<i>'")
-    html = believability_section([bad, good])
-    assert html.index("Load") < html.index("Clock of the UR")
+    monkeypatch.setattr(pages, "grounds", lambda _: (bad, good))
+    html = render(analysis)
+    assert html.index("Load<small>") < html.index("Clock of the UR")
     assert '<b class="sign bad">✗</b>' in html
     assert '<code class="remedy">vftcli x &#x27;&lt;i&gt;&#x27;</code>' in html
     assert "no gap &lt;b&gt;" in html

@@ -2,6 +2,7 @@ import json
 
 import numpy as np
 import pytest
+from jinja2 import UndefinedError
 
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.page.shell import (
@@ -9,11 +10,11 @@ from vftcli.outputs.page.shell import (
     bullets,
     document,
     lead,
+    page,
     pairs,
     provenance,
     script_json,
     section,
-    swatch_rules,
     top,
 )
 from vftcli.signals import remarks as remarks_module
@@ -68,8 +69,10 @@ def test_a_remark_is_said_once_and_the_worst_first() -> None:
 
 
 def test_a_name_that_could_end_a_rule_has_no_swatch() -> None:
-    rules = swatch_rules({"gmo": ("#112233", "2 2"), 'x"]{}</style>': ("#445566", "")})
-    assert rules == '[data-swatch="gmo"]::before{border-top:3px dotted #112233}'
+    styles = {"gmo": ("#112233", "2 2"), 'x"]{}</style>': ("#445566", "")}
+    page = document("t", "body", styles=styles)
+    assert '[data-swatch="gmo"]::before{border-top:3px dotted #112233}' in page
+    assert "#445566" not in page
 
 
 def test_a_remark_shows_its_long_words(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,3 +86,12 @@ def test_provenance_without_a_log_names_none() -> None:
     assert "Log sha256" not in html
     assert "through the Python interface" in html
     assert "ur5 (built in)" in html
+
+
+def test_a_command_without_a_page_loads_no_templates(loaded) -> None:
+    assert "jinja2" not in loaded("vftcli.outputs.log.report")
+
+
+def test_what_a_template_misses_is_an_error() -> None:
+    with pytest.raises(UndefinedError, match="words"):
+        page("logs.html", "t", failures=None)

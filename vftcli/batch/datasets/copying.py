@@ -128,7 +128,7 @@ def stored_rows(path: Path) -> dict[str, NDArray[Any]]:
         return {name: held[name] for name in held.files}
 
 
-def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bool) -> None:
+def copy_others(folder: Path, partial: Path, done: Collection[Path]) -> None:
     """Bring everything else of a dataset into a copy; films are linked where that can be."""
     for inside, source in files_within(folder):
         if inside in done:
@@ -136,7 +136,7 @@ def copy_others(folder: Path, partial: Path, done: Collection[Path], *, link: bo
         target = partial / inside
         target.parent.mkdir(parents=True, exist_ok=True)
         target.unlink(missing_ok=True)
-        if link and target.suffix.lower() in FILMS:
+        if target.suffix.lower() in FILMS:
             with suppress(OSError):  # another file system, or one without links
                 os.link(source, target)
                 continue

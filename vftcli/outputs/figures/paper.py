@@ -7,7 +7,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import product
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.outputs.files import OutputFolder
 from vftcli.signals.errors import ParameterError
@@ -18,6 +18,7 @@ from vftcli.signals.version import VERSION
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 FORMS = ("pdf", "svg", "png")  #: What a figure may be written as.
 WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
@@ -128,38 +129,36 @@ def metadata(form: str, title: str) -> dict[str, str | None]:
     return said | own[form]
 
 
-def sheet(width: float, cells: int, columns: int, height: float, above: float) -> "Figure":
-    """An empty figure.
+def sheet(
+    width: float, cells: int, columns: int, height: float, handles: "Mapping[str, Artist]"
+) -> "tuple[Figure, NDArray[Any]]":
+    """A figure with room for some plots, row by row, and one legend above all of them.
 
     Args:
         width: Its width. [in]
         cells: How many plots it will have.
         columns: Plots beside one another.
         height: Of one row of them. [in]
-        above: Room above them, for the legend. [in]
+        handles: Name in the legend → what it names; none for no legend.
     """
     from matplotlib.figure import Figure
 
-    rows = -(-cells // columns)
-    return Figure(figsize=(width, rows * height + above + 0.22), layout="constrained")
-
-
-def legend_room(width: float, labels: Sequence[str]) -> tuple[int, float]:
-    """How many columns a legend has above a figure, and its height. [in]"""
-    if not labels:
-        return 1, 0.0
-    widest = SAMPLE + LETTER * max(map(len, labels))
-    rows = -(-len(labels) // max(int(width / widest), 1))
-    # As many columns as rows of about one length need.
-    return -(-len(labels) // rows), LINE * rows + 0.05
-
-
-def add_legend(figure: "Figure", handles: "Mapping[str, Artist]", columns: int) -> None:
-    """One legend above all plots, where there is more than one thing to name."""
+    rows, lines = -(-cells // columns), 0
     if handles:
+        widest = SAMPLE + LETTER * max(map(len, handles))
+        lines = -(-len(handles) // max(int(width / widest), 1))
+    above = LINE * lines + 0.05 * bool(lines)
+    figure = Figure(figsize=(width, rows * height + above + 0.22), layout="constrained")
+    if handles:
+        # As many columns as rows of about one length need.
+        columns_of_names = -(-len(handles) // lines)
         figure.legend(
-            list(handles.values()), list(handles), loc="outside upper center", ncols=columns
+            list(handles.values()),
+            list(handles),
+            loc="outside upper center",
+            ncols=columns_of_names,
         )
+    return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
 def shortened(name: str) -> str:

@@ -11,23 +11,21 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.observers.table import BEST
-from vftcli.outputs.arm import ArmPoses
-from vftcli.outputs.contacts import beginning
-from vftcli.outputs.palette import COLOURS, PLACES, REFERENCE, SPARE
-from vftcli.outputs.plots import Lines, LogLine, PlotLine, PlotPoints
-from vftcli.outputs.rerun_arm import PaintedSpan, send_force
-from vftcli.outputs.rerun_file import CONTACTS, Stream
+from vftcli.outputs.answer import beginning
+from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
+from vftcli.outputs.palette import COLOURS, PLACES, SPARE
+from vftcli.outputs.palette import REFERENCE as GREY
+from vftcli.outputs.rerun_arm import ArmPoses, PaintedSpan, Stream, send_force
+from vftcli.outputs.rerun_file import BAR, CONTACTS, EDGES, LogLine
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 
-SHAFT = 0.012  #: Radius of a force arrow. [m]
 BELOW = 0.06  #: The spans of the contacts lie below zero by this share of the largest force.
 #: The band of |F|: the colour of `best`, paler.
 BAND = "#e98aa2"
-SPAN_WIDTH = 6.0  #: Width of the line that is the span of a contact. [px]
 
 
 def best_wrench(analysis: Analysis) -> Wrench | None:
@@ -35,58 +33,50 @@ def best_wrench(analysis: Analysis) -> Wrench | None:
     return next((w for w in analysis.wrenches if w.name == BEST), None)
 
 
-def force_lines(analysis: Analysis) -> Lines | None:
+def force_plot(analysis: Analysis) -> Chart | None:
     """|F| with its 95 % band, the spans of the contacts below it, their peaks as points.
 
     None where no wrench of `best` is known, as of an arm of less than six joints.
     """
-    wrench, found = best_wrench(analysis), analysis.contacts
+    wrench, found, sensed = best_wrench(analysis), analysis.contacts, analysis.virtual_sensor
     if wrench is None:
         return None
-    size, sd = wrench.size, wrench.size_sd
+    size, sd = wrench.size[:, None], wrench.size_sd
     lines = []
-    if analysis.virtual_sensor is not None and analysis.virtual_sensor.reference is not None:
-        reference = analysis.virtual_sensor.reference.size
-        lines.append(PlotLine("reference", reference, REFERENCE, 2.5))
-    lines.append(PlotLine("|F|", size, COLOURS[BEST], 2.0))
+    if sensed is not None and sensed.reference is not None:
+        lines.append(ChartLine("reference", sensed.reference.size[:, None], REFERENCE))
+    lines.append(ChartLine("|F|", size, COLOURS[BEST], leads=True))
     if sd is not None:
-        upper, lower = size + COVERS * sd, np.maximum(size - COVERS * sd, 0.0)
-        lines.append(PlotLine("95 % upper", upper, BAND, 0.8))
-        lines.append(PlotLine("95 % lower", lower, BAND, 0.8))
-    if found is None:
-        return Lines("/force", "|F| on the robot [N]", lines)
-    title = (
-        "|F| on the robot as at the flange, 95 % band [N]; bars: touched; diamonds: peaks by place"
-    )
-    if found.told_force is not None:
-        least = np.full(len(size), found.told_force)
-        lines.append(PlotLine("smallest that is listed", least, SPARE[7], 1.0))
-        title += f"; green: {found.told_force:.0f} N, the smallest that is listed"
-    points = peaks(found)
-    tallest = np.nanmax(np.concatenate([size, [1.0], points.values if points else []]))
-    lines += span_lines(analysis.t, found, -BELOW * float(tallest))
-    return Lines("/force", title, lines, points=points, legend=False)
+        half = COVERS * sd[:, None]
+        edges = zip(EDGES, (size + half, np.maximum(size - half, 0.0)), strict=True)
+        lines += [ChartLine(name, edge, BAND) for name, edge in edges]
+    title = "|F| on the robot"
+    if found is not None:
+        title += " as at the flange, 95 % band; bars: touched; diamonds: peaks by place"
+        if found.told_force is not None:
+            least = np.full_like(size, found.told_force)
+            lines.append(ChartLine("smallest that is listed", least, SPARE[7]))
+            title += f"; green: {found.told_force:.0f} N, the smallest that is listed"
+        # The peak of every contact whose force is known; a load has a mean and no peak.
+        felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
+        force = np.array([c.peak_force for c in felt], dtype=float)
+        tallest = np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
+        lines += span_lines(analysis.t, found, -BELOW * float(tallest))
+        if felt:
+            when = np.array([c.peak for c in felt])
+            lines.append(ChartLine("peaks", force[:, None], COLOURS[BEST], x=when))
+    return Chart("/force", title, ("N",), (title,), analysis.t, tuple(lines))
 
 
-def span_lines(t: Array, found: ContactList, level: float) -> Iterator[PlotLine]:
+def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine]:
     """A bar a contact at one level, a line a part of the arm, so that the legend names them."""
     for where, colour in PLACES.items():
-        bar = np.full(len(t), np.nan)
+        bar = np.full((len(t), 1), np.nan)
         for contact in found.contacts:
             if contact.where == where:
                 bar[(t >= contact.start) & (t <= contact.stop)] = level
         if np.isfinite(bar).any():
-            yield PlotLine(f"touched: {where}", bar, colour, SPAN_WIDTH)
-
-
-def peaks(found: ContactList) -> PlotPoints | None:
-    """The peak of every contact whose force is known; a load has a mean and no peak."""
-    felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
-    if not felt:
-        return None
-    t = np.array([contact.peak for contact in felt])
-    force = np.array([contact.peak_force for contact in felt], dtype=float)
-    return PlotPoints("peaks", t, force, COLOURS[BEST])
+            yield ChartLine(f"{BAR}{where}", bar, colour)
 
 
 def contact_log(found: ContactList) -> list[LogLine]:
@@ -97,9 +87,9 @@ def contact_log(found: ContactList) -> list[LogLine]:
         lines.append(LogLine(path, contact.start, beginning(contact), colour))
     for remark in found.remarks:
         begins = remark.where.span[0] if remark.where.span is not None else 0.0
-        lines.append(LogLine("/remarks", begins, sentence(remark), REFERENCE, "WARN"))
+        lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
     if not found.contacts:
-        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", REFERENCE))
+        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", GREY))
     return lines
 
 
@@ -145,7 +135,7 @@ def send_contacts(
             arrows = np.where(np.isfinite(force[rows]), force[rows], arrows)
         arrows[t > contact.stop] = np.nan
         path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
-        send_force(stream, path, t, origin, arrows, SHAFT, scale=scale, colour=colour)
+        send_force(stream, path, t, origin, arrows, scale=scale, colour=colour)
 
 
 def touched_point(contact: Contact, origins: Array) -> Array:

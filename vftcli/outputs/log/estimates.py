@@ -1,9 +1,12 @@
 """What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import (
+    Iterable,
+    Iterator,
+    Sequence,
+)
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,6 +31,8 @@ if TYPE_CHECKING:
 
 
 ALL = slice(None)  #: All rows of a table.
+#: An analysis and which of its rows are written; None where all of them went by in blocks.
+Group = tuple[Analysis, slice | None]
 #: Rows from which on a table is written as several groups, and rows of such a group.
 LONG, GROUP_ROWS = 1 << 17, 1 << 15
 
@@ -106,10 +111,12 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         )
 
 
-def write_groups(
-    path: Path, groups: Iterable[tuple[Analysis, slice]], csv: Path | None = None
-) -> None:
-    """Write the table of a long log as groups of rows: all of it has no room beside the log."""
+def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
+    """Write the table of a long log as groups of rows: all of it has no room beside the log.
+
+    Returns:
+        The analysis of the last group.
+    """
     pq = needed("pyarrow.parquet", "the estimates of a long log")
 
     # Measured numbers hardly repeat: a dictionary of them costs time and room.
@@ -118,6 +125,8 @@ def write_groups(
     with ExitStack() as files:
         file = files.enter_context(table_file(path))
         for analysis, rows in groups:
+            if rows is None:
+                continue
             table = estimates_table(analysis, rows)
             if schema is None:
                 schema = described_schema(table, frames_of(analysis), doubts_of(analysis))
@@ -129,6 +138,7 @@ def write_groups(
             writer.write_table(table.to_arrow().cast(schema))
             if csv is not None:
                 table.write_csv(text, include_header=False, float_precision=9)
+    return analysis
 
 
 def doubts_of(analysis: Analysis) -> dict[str, str]:
@@ -153,18 +163,13 @@ def write_csv(path: Path, analysis: Analysis) -> None:
         table.write_csv(file, float_precision=9)
 
 
-#: Flag → names of its files.
-EXTRAS = {
-    "csv": ("estimates.csv",),
-    "mcap": ("estimates.mcap",),
-    "layouts": ("estimates.foxglove.json", "estimates.plotjuggler.xml"),
-    "rrd": ("recording.rrd",),
-}
+#: Flag → name of its file.
+EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
 
 
 def extra_files(extras: Sequence[str]) -> tuple[str, ...]:
     """Names of the files of these extras."""
-    return tuple(name for extra in extras for name in EXTRAS[extra])
+    return tuple(EXTRAS[extra] for extra in extras)
 
 
 def estimate_files(extras: Sequence[str]) -> tuple[str, ...]:
@@ -176,60 +181,50 @@ def write_extras(
     folder: OutputFolder, place: str, analysis: Analysis, choice: OutputChoice
 ) -> None:
     """Write what was asked for besides, below a place of a folder."""
-    if not choice.extras:
-        return  # without loading what writes them: a third of the modules of a command
-    from vftcli.outputs.log.layouts import foxglove_layout, plotjuggler_layout
-    from vftcli.outputs.log.mcap_output import write_mcap
-    from vftcli.outputs.log.rerun_recording import write_rrd
-
-    writers: dict[str, Callable[[Path, Analysis], None]] = {
-        "csv": write_csv,
-        "mcap": write_mcap,
-        "rrd": partial(write_rrd, detail=choice.rrd_detail),
-    }
-    texts = dict(zip(EXTRAS["layouts"], (foxglove_layout, plotjuggler_layout), strict=True))
+    # Without loading what writes the others: a third of the modules of a command.
     for extra in choice.extras:
-        for name in EXTRAS[extra]:
-            if name in texts:
-                folder.write(f"{place}{name}", texts[name](analysis))
-            else:
-                writers[extra](folder / f"{place}{name}", analysis)
+        path = folder / f"{place}{EXTRAS[extra]}"
+        if extra == "csv":
+            write_csv(path, analysis)
+        elif extra == "mcap":
+            from vftcli.outputs.log.mcap_output import write_mcap
+
+            write_mcap(path, analysis)
+        else:
+            needed("rerun", path.name)
+            from vftcli.outputs.log.rerun_recording import write_rrd
+
+            write_rrd(path, analysis, choice.rrd_detail)
 
 
 def write_estimate_folder(
     path: Path,
-    analysis: Analysis,
+    analysis: Analysis | Iterator[Group],
     command: str,
     choice: OutputChoice = PLAIN,
     force: bool = False,
-) -> str:
+) -> tuple[Analysis, str]:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
-    Returns:
-        The text of `run.json`.
-    """
-    record = run_record(analysis, command)
-    with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
-        write_estimates(folder / "estimates.parquet", analysis)
-        # After the record: it names the packages that are loaded, and these made no number.
-        write_extras(folder, "", analysis, choice)
-        return seal(folder, SEAL, record)
-
-
-def write_long_estimates(
-    path: Path,
-    blocks: Iterable[Analysis],
-    whole: Callable[[], Analysis],
-    command: str,
-    choice: OutputChoice = PLAIN,
-    force: bool = False,
-) -> str:
-    """Write the folder of a long log as `write_estimate_folder` does, block by block.
+    Args:
+        path: The folder.
+        analysis: The analysis of the log; of a long log its groups, with CSV as the only extra.
+        command: The command line.
+        choice: Which extras are written.
+        force: Whether an existing folder may be replaced.
 
     Returns:
-        The text of `run.json`.
+        The analysis of the whole log, and the text of `run.json`.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
-        csv = folder / "estimates.csv" if "csv" in choice.extras else None
-        write_groups(folder / "estimates.parquet", ((block, ALL) for block in blocks), csv)
-        return seal(folder, SEAL, run_record(whole(), command))
+        table = folder / "estimates.parquet"
+        if isinstance(analysis, Analysis):
+            record = run_record(analysis, command)
+            write_estimates(table, analysis)
+            # After the record: it names the packages that are loaded, and these made no number.
+            write_extras(folder, "", analysis, choice)
+        else:
+            csv = folder / "estimates.csv" if "csv" in choice.extras else None
+            analysis = write_groups(table, analysis, csv)
+            record = run_record(analysis, command)
+        return analysis, seal(folder, SEAL, record)

@@ -1,7 +1,8 @@
-"""The figures of one log: torque, errors, wrench, spectra, tuning and responses."""
+"""The figures of one log: torque, errors, wrench, spectra, tuning, responses; gains with theirs."""
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,21 +11,31 @@ from vftcli.analysis import Analysis
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
-from vftcli.outputs.figures.dots import DotPlot, DotRow, dot_figure
-from vftcli.outputs.figures.lines import NARROW, line_figure, plots_of
-from vftcli.outputs.figures.paper import Drawing
+from vftcli.observers.tuning import Tuned, tuning_curves
+from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import (
+    NARROW,
+    DotPlot,
+    DotRow,
+    dot_figure,
+    line_figure,
+    plots_of,
+)
+from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.log.rmse_tables import block, logs_of
 from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
-from vftcli.outputs.page.refinement_part import spectra_chart, tuning_chart
-from vftcli.outputs.page.torque_part import (
+from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
     legend_name,
     response_charts,
+    spectra_chart,
     torque_chart,
+    tuning_chart,
+    wrench_chart,
 )
-from vftcli.outputs.page.wrench_part import wrench_chart
 from vftcli.outputs.palette import colours_of_names
+from vftcli.robots.writing import lines_of
 
 if TYPE_CHECKING:
     import polars as pl
@@ -35,6 +46,7 @@ if TYPE_CHECKING:
 
 #: Every figure that a log may have.
 LOG_FIGURES = ("torque", "errors", "wrench", "spectra", "tuning", "responses")
+TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
 MOST = 8  #: Logs that one figure of errors shows; of more, only what stands for all of them.
 #: Dashes of responses, which are black: the spectra beside them have colours.
@@ -122,10 +134,10 @@ def contact_numbers(analysis: Analysis) -> dict[int, float]:
     return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
 
 
-def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
+def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    None where no joint has an error, or where more than `MOST` logs have no rows that stand for
+    Empty where no joint has an error, or where more than `MOST` logs have no rows that stand for
     all of them.
     """
     from vftcli.evaluation.errors import POOLED
@@ -135,18 +147,11 @@ def error_drawing(errors: "pl.DataFrame") -> Drawing | None:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
     plots = [error_plot(rows) for rows in groups]
     if not 0 < len(plots) <= MOST:
-        return None
+        return {}
     paints = colours_of_names(list(dict.fromkeys(r.name for plot in plots for r in plot.rows)))
-    return Drawing(
-        "RMSE of the external torque with its 95 % interval",
-        partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)"),
-    )
-
-
-def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
-    """The figure of a table of errors, as `error_drawing` makes it."""
-    drawn = error_drawing(errors)
-    return {} if drawn is None else {"errors": drawn}
+    title = "RMSE of the external torque with its 95 % interval"
+    draw = partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)")
+    return {"errors": Drawing(title, draw)}
 
 
 def error_plot(rows: "pl.DataFrame") -> DotPlot:
@@ -209,3 +214,36 @@ def responses(charts: Sequence[Chart], width: float) -> "Figure":
     plots = [plot for chart in charts for plot in plots_of(chart)]
     columns = len(plots) if width > NARROW else 1
     return line_figure(width, plots, columns=columns)
+
+
+def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:
+    """The spectra with |H| of every observer, and the expected error over each one's rate."""
+    running = {line.observer: line.running for line in tuned if line.running is not None}
+    chosen = {line.observer: (line.rate, line.rmse) for line in tuned}
+    return {
+        "spectra": spectra_drawing(spectra, running),
+        "tuning": tuning_drawing(tuning_curves(spectra), chosen),
+    }
+
+
+def write_tuned(
+    path: Path,
+    heading: Sequence[str],
+    spectra: Spectra,
+    tuned: Sequence[Tuned],
+    *,
+    force: bool = False,
+    form: str | None = None,
+) -> None:
+    """Write gains, and their figures beside them, all or nothing."""
+    comments = "".join(f"# {line}\n" for line in heading)
+    gains = {"observers": {line.section: dict(line.gains) for line in tuned}}
+    text = comments + "".join(lines_of(gains))
+    if form is None:
+        write_text(path, text, force)
+        return
+    before = f"{path.stem}-"
+    names = [path.name, *figure_files(form, TUNED_FIGURES, before)]
+    with OutputFolder(path.parent, force, names) as folder:
+        folder.write(path.name, text)
+        write_figures(folder, tuned_figures(spectra, tuned), form, before)

@@ -5,9 +5,8 @@ effort), `/vftcli/external/<observer>` and `/vftcli/external/reference` (externa
 all sensor_msgs/JointState; `/vftcli/wrench/<observer>` and `/vftcli/wrench/reference`
 (geometry_msgs/WrenchStamped, NaN where the pose cannot tell it); `/vftcli/contacts/log`
 (foxglove_msgs/Log) where each contact begins and ends; `/vftcli/contacts` (std_msgs/String, the
-JSON of contacts.json) and `/robot_description` (std_msgs/String, URDF) once, kept for who comes
-late. Hyphens, which ROS names may not hold, become underscores. All of it is CDR: a channel of JSON
-messages in a ros2 file ends rosbags' reader.
+JSON of contacts.json) once, kept for who comes late. Hyphens, which ROS names may not hold, become
+underscores. All of it is CDR: a channel of JSON messages in a ros2 file ends rosbags' reader.
 """
 
 import json
@@ -20,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.contacts import beginning, contact_name, contacts_record
-from vftcli.outputs.log.description import urdf_text
+from vftcli.outputs.answer import beginning, contact_name
+from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.log.run_record import jsonable
 from vftcli.readers.bags.ros_messages import (
     Value,
@@ -33,10 +32,8 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.pose import Pose
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.frames import frame_pose
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
@@ -69,8 +66,6 @@ class Event(NamedTuple):
     topic: str  #: The topic's name.
     kind: str  #: The type, as package/Name.
     values: Mapping[str, Value]  #: Dotted path of a field → its value.
-    #: Whether who subscribes later gets it too, as ROS 2 keeps a robot's description.
-    latched: bool = False
 
 
 def joint_topic(
@@ -88,10 +83,9 @@ def joint_topic(
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
     """Write the recording's torques and its estimates; an existing file is replaced."""
-    # The log's own names, so that the URDF moves with its /joint_states.
     names = analysis.recording.joint_names or analysis.robot.chain.names
     stamps = stamps_of(analysis.recording)
-    write_topics(path, stamps, topics(analysis, names), events(analysis, names, int(stamps[0])))
+    write_topics(path, stamps, topics(analysis, names), events(analysis, int(stamps[0])))
 
 
 def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
@@ -114,25 +108,22 @@ def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
 
 
 def frame_id(wrench: Wrench) -> str:
-    """The frame of a wrench: a link of the description, ``base@flange`` for base axes there."""
+    """The frame of a wrench: flange, tool or sensor, ``base@flange`` for base axes there."""
     return "base@flange" if wrench.frame == "base" else wrench.frame
 
 
-def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
-    """The arm's description, the contacts, and when each of them begins and ends.
+def events(analysis: Analysis, start: int) -> list[Event]:
+    """The contacts, and when each of them begins and ends.
 
     Args:
         analysis: The log.
-        names: The joints' names.
         start: The first sample's stamp. [ns]
     """
     found = analysis.contacts
-    urdf = urdf_text(analysis.robot, tuple(names), mounted_frames(analysis))
-    made = [Event(start, "/robot_description", TEXT, {"data": urdf}, latched=True)]
     if found is None:
-        return made
+        return []
     record = json.dumps(jsonable(contacts_record(found)), ensure_ascii=False, allow_nan=False)
-    made.append(Event(start, "/vftcli/contacts", TEXT, {"data": record}, latched=True))
+    made = [Event(start, "/vftcli/contacts", TEXT, {"data": record})]
     for contact in found.contacts:
         for t, words in (
             (contact.start, beginning(contact)),
@@ -144,15 +135,6 @@ def events(analysis: Analysis, names: Sequence[str], start: int) -> list[Event]:
             values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
             made.append(Event(stamp, "/vftcli/contacts/log", LOG, values | logged))
     return sorted(made, key=lambda event: event.stamp)
-
-
-def mounted_frames(analysis: Analysis) -> dict[str, Pose]:
-    """Poses in the flange frame of the tool and the sensor that wrenches are told in."""
-    sensed = analysis.virtual_sensor
-    names = {wrench.frame for wrench in analysis.wrenches} & {"tool", "sensor"}
-    if sensed is None:
-        return {}
-    return {name: frame_pose(name, sensed.sensor.mounting) for name in sorted(names)}
 
 
 def ros_name(name: str) -> str:
@@ -197,7 +179,7 @@ def write_topics(
         writer = Writer(file, compression=CompressionType.ZSTD)
         writer.start(profile="ros2", library="vftcli")
         waiting = deque(events)
-        of_events = {e.topic: channel(writer, e.topic, e.kind, e.latched) for e in events}
+        of_events = {e.topic: channel(writer, e.topic, e.kind) for e in events}
         channels = [channel(writer, topic.name, topic.kind) for topic in found]
         # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
         for start in range(0, len(stamps), BLOCK):
@@ -219,7 +201,7 @@ def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  
     writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
 
 
-#: What `ros2 bag` writes of a latched topic, for it to be latched when the bag is played.
+#: What `ros2 bag` writes of a latched topic: who subscribes later gets its message too.
 LATCHED = """\
 - history: keep_last
   depth: 1
@@ -233,8 +215,8 @@ LATCHED = """\
 """
 
 
-def channel(writer: Any, topic: str, kind: str, latched: bool = False) -> int:  # noqa: ANN401
-    """Register a topic with its type's definition; return its channel number."""
+def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
+    """Register a topic with its type's definition; return its channel number. Text is latched."""
     schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
-    how = {"offered_qos_profiles": LATCHED} if latched else {}
+    how = {"offered_qos_profiles": LATCHED} if kind == TEXT else {}
     return int(writer.register_channel(topic, "cdr", schema, metadata=how))

@@ -15,11 +15,9 @@ from vftcli.outputs.log import tables
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.log.rerun_recording import write_rrd
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
-from vftcli.outputs.page.index_page import render_index
-from vftcli.outputs.page.page import render
+from vftcli.outputs.page.pages import render, render_index
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
@@ -47,22 +45,20 @@ def places_of(labels: Sequence[str]) -> list[str]:
 
 
 def report_files(
-    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
+    labels: Sequence[str],
+    extras: Sequence[str] = (),
+    form: str | None = None,
+    *,
+    several: bool | None = None,
 ) -> list[str]:
     """Names of all files that a report of logs with these labels may hold, with these extras.
 
-    `form` is what figures are written as, None without any.
+    `form` is what figures are written as, None without any; `several` is whether there is a
+    sub-folder a log, None for where there is more than one.
     """
-    if len(labels) == 1:
-        return [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
-    return files_of_several(labels, extras, form)
-
-
-def files_of_several(
-    labels: Sequence[str], extras: Sequence[str] = (), form: str | None = None
-) -> list[str]:
-    """Those of a report with a sub-folder a log, even where one log alone could be analysed."""
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
+    if not (len(labels) > 1 if several is None else several):
+        return own
     above = [*SUMMARY_FILES, *figure_files(form, ERROR_FIGURES)]
     return [*above, *(f"{place}/{name}" for place in places_of(labels) for name in own)]
 
@@ -105,7 +101,8 @@ def write_reports(
 
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
-    with OutputFolder(path, force, files_of_several(labels, choice.extras, form)) as folder:
+    names = report_files(labels, choice.extras, form, several=True)
+    with OutputFolder(path, force, names) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, choice, form)
             for place, analysis in steps(list(zip(places, analyses, strict=True)))
@@ -144,6 +141,8 @@ def fill(
         lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
     ]
     if choice.writes_recording and installed("rerun"):  # else `left_out` says how to get it
+        from vftcli.outputs.log.rerun_recording import write_rrd
+
         path = folder / f"{place}recording.rrd"
         writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
     for write in steps(writers):

@@ -1,13 +1,12 @@
 """recording.rrd: contacts, torques, residuals, motion and the arm, arranged for the Rerun viewer.
 
-Entities: those of `contact_recording`; `/tau_ext/J1` … (every observer, then the reference),
-`/residual/J1` … (every estimate minus the reference), `/drive_torque`, `/q` and `/dq` (one line a
-joint), `/wrench/fx` … where wrenches are known, `/robot` with the arm, and the force on it where no
-contacts are listed.
+Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every estimate
+minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint), `/wrench/fx` … where
+wrenches are known, as in the page's charts; `/robot` with the arm, and the force on it where no
+contacts are listed; those of `contact_recording` where they are.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -15,39 +14,49 @@ from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
 from vftcli.observers.table import BEST
-from vftcli.outputs.arm import ArmPoses, motion
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.choice import FULL, LEVELS
 from vftcli.outputs.log.contact_recording import (
-    SHAFT,
     contact_log,
     flange_force,
-    force_lines,
+    force_plot,
     painted_links,
     send_contacts,
 )
+from vftcli.outputs.log.rmse_tables import DAGGER
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
 from vftcli.outputs.log.wrench_tables import paper_bounds
-from vftcli.outputs.palette import COLOURS, REFERENCE, SPARE, colours_of
-from vftcli.outputs.plots import Lines, PlotLine, Tab
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, arrow_scale, send_arm, send_force
-from vftcli.outputs.rerun_file import ArmView, rerun_file
+from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.log_charts import (
+    condition_charts,
+    estimate_lines,
+    legend_name,
+    torque_chart,
+    wrench_chart,
+)
+from vftcli.outputs.palette import SPARE
+from vftcli.outputs.rerun_arm import (
+    NEWTON_PER_METRE,
+    ArmPoses,
+    arrow_scale,
+    motion,
+    send_arm,
+    send_force,
+)
+from vftcli.outputs.rerun_file import EDGES, Tab, rerun_file, thinned
 from vftcli.robots.drive import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import COVERS, ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.progress import steps
-from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
-#: The last joints, whose torques are smaller than the others': they share a vertical axis.
-WRIST = 3
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its lines.
 STRETCHES = 5000
 AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
 WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
-LEADING = 2.0  #: Width of the line of `best`; the others are thinner. [px]
+DOUBT = " (the joint rests: do not trust the reference)"  #: What a dagger says in a plot's title.
 
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
@@ -61,27 +70,26 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     poses = motion(arm, analysis.t, analysis.recording.q)
     sampled = np.searchsorted(analysis.t, poses.t)
     scale = newton_per_metre(analysis)
-    view = ArmView(f"Arm (arrow: 1 m is {scale:g} N)", poses)
+    space = f"Arm (arrow: 1 m is {scale:g} N)"
     first = found.contacts[0] if found is not None and found.contacts else None
     marked = (first.start, first.stop) if first is not None else None
-    with rerun_file(path, analysis.recording.name, tabs, words, view, marked) as stream:
-        painted = painted_links(found, arm.joints) if found is not None else {}
-        send_arm(stream, "/robot", arm, poses, painted=painted)
+    name = analysis.recording.name
+    with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
+        send_arm(stream, arm, poses, painted_links(found, arm.joints) if found is not None else {})
         if found is not None:
             force = flange_force(analysis, poses.q, sampled, arm)
             send_contacts(stream, found, poses, force, scale)
         elif (arrow := force_arrow(analysis, poses, sampled)) is not None:
-            send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force, SHAFT)
+            send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force)
 
 
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
-    t, whole = analysis.t, whole_spans(analysis)
-    tabs = []
-    for name, group in steps(list(line_groups(analysis).items())):
+    whole, tabs = whole_spans(analysis), []
+    for name, group in steps(list(plot_groups(analysis).items())):
         # One plot after the other: of a long log all of them have no room at once.
-        shown = group if detail == FULL else (lines.thinned(t, STRETCHES, whole) for lines in group)
-        tabs.append(Tab(name, t, list(shown)))
+        shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
+        tabs.append(Tab(name, list(shown)))
     return tabs
 
 
@@ -102,128 +110,78 @@ def newton_per_metre(analysis: Analysis) -> float:
     return arrow_scale(found.hardest.peak_force or NEWTON_PER_METRE)
 
 
-def line_groups(analysis: Analysis) -> dict[str, Iterable[Lines]]:
+def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
     """All plots, tab by tab: the force, torques and residuals joint by joint, then the motion."""
+    force, wrench = force_plot(analysis), wrench_chart(analysis)
     reference, joints = analysis.reference, range(analysis.recording.joints)
-    force = force_lines(analysis)
-    groups: dict[str, Iterable[Lines]] = {"Contacts": [force]} if force is not None else {}
-    groups["Joint torques"] = (joint_lines("tau_ext", analysis, j, reference) for j in joints)
+    groups: dict[str, Iterable[Chart]] = {"Contacts": [force]} if force is not None else {}
+    # One 95 % band, that of `best`, else of the last: all would hide each other.
+    banded = [e.name for e in analysis.estimates if e.error_sd is not None]
+    last = BEST if BEST in banded else next(reversed(banded), "")
+    found = estimate_lines(analysis)
+    lines = [line if line.name == last else line._replace(half=None) for line in found]
+    bare = tuple(line._replace(half=None) for line in found)
     if reference is not None:
+        name = legend_name(analysis, "reference")
+        lines.insert(0, ChartLine(name, reference.tau, REFERENCE))
+    torque = torque_chart(analysis)._replace(series=tuple(lines))
+    groups["Joint torques"] = (plot_of(torque, j, f"/tau_ext/J{j + 1}") for j in joints)
+    if reference is not None:
+        left = torque._replace(title="estimate − reference", series=bare)
         groups["Residual"] = (
-            joint_lines("residual", analysis, j, None, reference.tau[:, j]) for j in joints
+            plot_of(left, j, f"/residual/J{j + 1}", reference.tau[:, j : j + 1]) for j in joints
         )
-    if analysis.wrenches:
-        axes = (wrench_lines(analysis, k) for k in range(len(AXES)))
-        groups["Wrench"] = chain(axes, condition_lines(analysis))
-    return {**groups, "Motion": motion_lines(analysis)}
+    if wrench is not None:
+        groups["Wrench"] = wrench_plots(analysis, wrench)
+    return {**groups, "Motion": motion_plots(analysis)}
 
 
-#: Group of entities → what its plots show.
-TITLES = {"tau_ext": "external torque [N·m]", "residual": "estimate − reference [N·m]"}
+def plot_of(chart: Chart, j: int, key: str, minus: Array | float = 0.0) -> Chart:
+    """One panel less something: every line is drawn at once, of a band both edges."""
+    lines, edges = [], []
+    for line in chart.series:
+        values = line.values[:, j : j + 1] - minus
+        lines.append(line._replace(values=values, half=None, shown=True))
+        if line.half is not None:
+            half = line.half[:, j : j + 1]
+            ends = zip(EDGES, (values + half, values - half), strict=True)
+            edges += [ChartLine(f"{line.name} {name}", end, line.colour) for name, end in ends]
+    panel = chart.panels[j]
+    named = f"{panel.replace(DAGGER, DOUBT)}: {chart.title}" if panel != chart.title else panel
+    family = chart.families[j : j + 1]
+    return Chart(key, named, chart.units[j : j + 1], (panel,), chart.x, (*lines, *edges), family)
 
 
-def joint_lines(
-    group: str,
-    analysis: Analysis,
-    j: int,
-    reference: ExternalTorque | None,
-    minus: Array | float = 0.0,
-) -> Lines:
-    """All estimates of one joint less something, and the reference first if it is wanted."""
-    colours = colours_of(analysis.estimates)
-    lines = [
-        PlotLine(e.name, e.tau[:, j] - minus, colours[e.name], LEADING if e.name == BEST else 1.2)
-        for e in analysis.estimates
-    ]
-    if group == "tau_ext":
-        lines += band_lines(analysis, j)
-    if reference is not None:
-        name = f"reference ({reference.name})"
-        lines.insert(0, PlotLine(name, reference.tau[:, j], REFERENCE, 2.5))
-    rests = analysis.reference is not None and analysis.reference.mostly_rests[j]
-    doubt = " (the joint rests: do not trust the reference)" if rests else ""
-    family = "wrist" if j >= analysis.recording.joints - WRIST else "shoulder"
-    return Lines(f"/{group}/J{j + 1}", f"J{j + 1} {TITLES[group]}{doubt}", lines, family)
+def wrench_plots(analysis: Analysis, wrench: Chart) -> Iterator[Chart]:
+    """Every axis, what the pose can tell, and the torque that no wrench explains."""
+    for k, axis in enumerate(wrench.panels):
+        yield plot_of(wrench, k, f"/wrench/{axis}")
+    sensed = analysis.virtual_sensor
+    for chart in condition_charts(analysis):
+        plot = plot_of(chart, 0, f"/wrench/{chart.key}")
+        if chart.key == "null_space":
+            yield plot
+        # The smoother asks no pose: its band grows where the pose tells little.
+        elif chart.key == "sigma_min" and sensed is not None and sensed.solver != SMOOTHER:
+            least = np.full((len(plot.x), 1), sensed.sensor.least_sigma)
+            masked = ChartLine(chart.band_label, least, SPARE[0])
+            yield plot._replace(series=(*plot.series, masked))
 
 
-def band_lines(analysis: Analysis, j: int) -> Iterator[PlotLine]:
-    """Both edges of one 95 % band of a joint, thin in its colour: that of `best`, else the last.
-
-    Every observer's would hide them all; the table of estimates holds the others.
-    """
-    colours = colours_of(analysis.estimates)
-    last_first = analysis.estimates[::-1]
-    for estimate in sorted(last_first, key=lambda estimate: estimate.name != BEST):
-        if estimate.error_sd is not None:
-            for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
-                column = estimate.tau[:, j] + sign * COVERS * estimate.error_sd[:, j]
-                name = f"{estimate.name} 95 % {edge}"
-                yield PlotLine(name, column, colours[estimate.name], 0.6)
-            return
-
-
-def wrench_lines(analysis: Analysis, k: int) -> Lines:
-    """One axis of every wrench, the reference first."""
-    colours = colours_of(analysis.estimates)
-    # The reference first: it is drawn below the others, and thicker.
-    found = sorted(analysis.wrenches, key=lambda wrench: wrench.name != "reference")
-    title = f"{AXES[k]} in {found[0].frame} axes [{unit_of(k)}]"
-    lines = [
-        PlotLine(w.name, w.known[:, k], colours[w.name])
-        if w.name in colours
-        else PlotLine(w.name, w.known[:, k], REFERENCE, 2.5)
-        for w in found
-    ]
-    for w in found:
-        if w.name == BEST and w.known_sd is not None:
-            for sign, edge in ((1.0, "upper"), (-1.0, "lower")):
-                column = w.known[:, k] + sign * COVERS * w.known_sd[:, k]
-                lines.append(PlotLine(f"{w.name} 95 % {edge}", column, COLOURS[BEST], 0.6))
-    return Lines(f"/wrench/{AXES[k]}", title, lines, unit_of(k))
-
-
-def condition_lines(analysis: Analysis) -> list[Lines]:
-    """What the pose can tell, and the torque that no wrench at the flange explains."""
-    colours = colours_of(analysis.estimates)
-    wrenches = [wrench for wrench in analysis.wrenches if wrench.name in colours]
-    found, sensed = [], analysis.virtual_sensor
-    sigma = next((w.sigma_min for w in wrenches if w.sigma_min is not None), None)
-    # The smoother asks no pose: its band grows where the pose tells little.
-    if sigma is not None and sensed is not None and sensed.solver != SMOOTHER:
-        least = np.full_like(sigma, sensed.sensor.least_sigma)
-        lines = [
-            PlotLine("σ_min", sigma, REFERENCE),
-            PlotLine("masked below", least, SPARE[0], 1.0),
-        ]
-        found.append(Lines("/wrench/sigma_min", "σ_min of J, angular rows × 0.3 m [m]", lines))
-    lines = [
-        PlotLine(w.name, w.null_space, colours[w.name])
-        for w in wrenches
-        if w.null_space is not None
-    ]
-    if lines:
-        title = "torque that no wrench at the flange explains [N·m]"
-        found.append(Lines("/wrench/null_space", title, lines))
-    return found
-
-
-def motion_lines(analysis: Analysis) -> list[Lines]:
+def motion_plots(analysis: Analysis) -> Iterator[Chart]:
     """Positions, velocities and drive torques, one line a joint."""
     recording = analysis.recording
-    signals = [
-        ("/q", "position [rad]", recording.q),
-        ("/dq", "velocity [rad/s]", recording.dq),
-        ("/drive_torque", "drive torque [N·m]", drive_torque(recording, analysis.robot)),
-    ]
-    return [
-        Lines(
-            path,
-            title,
-            [PlotLine(f"J{j + 1}", x, SPARE[j % len(SPARE)]) for j, x in enumerate(values.T)],
-        )
-        for path, title, values in signals
-        if values is not None
-    ]
+    for key, title, unit, values in (
+        ("/q", "position", "rad", recording.q),
+        ("/dq", "velocity", "rad/s", recording.dq),
+        ("/drive_torque", "drive torque", "N·m", drive_torque(recording, analysis.robot)),
+    ):
+        if values is not None:
+            lines = tuple(
+                ChartLine(f"J{j + 1}", values[:, j : j + 1], SPARE[j % len(SPARE)])
+                for j in range(values.shape[1])
+            )
+            yield Chart(key, title, (unit,), (title,), analysis.t, lines)
 
 
 def summary(analysis: Analysis) -> str:

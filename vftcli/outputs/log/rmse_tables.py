@@ -8,7 +8,8 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import JointMeans, joint_means
-from vftcli.outputs.grid import DASH, Column, Grid, GridCell, joint_columns, significant
+from vftcli.outputs.grid import Column, Grid, GridCell, joint_columns
+from vftcli.outputs.quantity import DASH, significant
 from vftcli.signals.arrays import Array, Mask
 
 #: An RMSE within this factor of the reference's floor cannot be told from the reference's own.

@@ -153,7 +153,7 @@ def input_record(recording: Recording) -> dict[str, Any]:
         "rows": source.rows,
         "duplicates": source.duplicates,
         **({"derived": source.derived} if source.derived else {}),
-        "samples": recording.all_samples,
+        "samples": recording.samples,
         "joints": recording.joints,
         "start_s": float(recording.t[0]),
         "end_s": float(recording.t[-1]),

@@ -10,11 +10,12 @@ from vftcli.evaluation.errors import POOLED
 from vftcli.outputs.grid import (
     Column,
     Grid,
+    csv_rows,
     escape_markdown,
     joint_columns,
+    json_rows,
     latex,
     markdown,
-    significant,
     terminal,
 )
 from vftcli.outputs.log.rmse_tables import (
@@ -31,7 +32,7 @@ from vftcli.outputs.log.wrench_tables import (
     contact_grids,
     nothing_to_compare,
 )
-from vftcli.outputs.plain_rows import csv_rows, json_rows
+from vftcli.outputs.quantity import significant
 from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:

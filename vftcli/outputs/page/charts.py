@@ -1,19 +1,16 @@
-"""Charts of the page: small pictures that stand still, and what the script draws large from them.
+"""Charts: what the page, its script and figures for papers draw, and how the script is given them.
 
-Every chart is drawn as SVG, one small picture a joint or axis, for print and for readers without a
-script; with a script the plotting library draws the chosen one large beside them.
+Every chart is drawn as SVG (`svg.py`), one small picture a joint or axis, for print and for readers
+without a script; with a script the plotting library draws the chosen one large beside them.
 """
 
 import base64
-from collections.abc import Iterable, Iterator, Sequence
-from html import escape
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.outputs.decimation import decimated
-from vftcli.outputs.page import figures
-from vftcli.outputs.page.figures import Box, Scales, Span
 from vftcli.outputs.palette import colours_of_names
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.external_torque import ExternalTorque
@@ -89,127 +86,6 @@ def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
     return {
         name: (colour, dashes[k % len(dashes)]) for k, (name, colour) in enumerate(colours.items())
     }
-
-
-def multiples(chart: Chart) -> str:
-    """One small picture a panel, below the legend; panels of a family have one scale."""
-    return (
-        f'{legend(chart)}<div class="multiples" data-of="{escape(chart.key)}">'
-        f"{pictures_of(chart)}</div>"
-    )
-
-
-def pictures_of(chart: Chart) -> str:
-    """The small pictures of a chart alone."""
-    families = chart.families or (0,) * len(chart.panels)
-    ends = {family: ends_of_family(chart, families.index(family)) for family in set(families)}
-    return "".join(picture(chart, j, ends[families[j]]) for j in range(len(chart.panels)))
-
-
-def legend(chart: Chart) -> str:
-    """The lines that are drawn at once, where there is more than one, and the band."""
-    shown = [s for s in chart.series if s.shown]
-    parts = [f"{swatch(s.colour, s.dash, leads=s.leads)} {escape(s.name)}" for s in shown]
-    if chart.band is not None:
-        parts.append(f'<span class="patch floor"></span> {escape(chart.band_label)}')
-    ribbons = dict.fromkeys(s.colour for s in shown if s.half is not None)
-    parts += [f"{patch(colour)} 95 % band" for colour in ribbons]
-    if any(s.quiet is not None and s.half is not None for s in shown):
-        parts.append(f'<span class="patch floor"></span> {QUIET}')
-    if chart.spans:
-        parts.append('<span class="patch contact"></span> contact')
-    if len(parts) < 2:
-        return ""
-    return f'<p class="legend">{"".join(f"<span>{part}</span>" for part in parts)}</p>'
-
-
-def patch(colour: str) -> str:
-    """A small piece of a ribbon."""
-    box = f'<rect width="26" height="8" fill="{colour}" class="rim"/>'
-    return f'<svg class="swatch" viewBox="0 0 26 8" aria-hidden="true">{box}</svg>'
-
-
-def swatch(colour: str, dash: str, *, leads: bool = False) -> str:
-    """A short piece of a line."""
-    return (
-        '<svg class="swatch" viewBox="0 0 26 8" aria-hidden="true">'
-        f'<path d="M0 4H26" {look_of(colour, dash, leads=leads)}/></svg>'
-    )
-
-
-def look_of(colour: str, dash: str, *, leads: bool = False) -> str:
-    """The attributes of a line."""
-    if colour == REFERENCE:
-        return 'class="reference"'
-    paint = "var(--ink)" if colour == INK else colour
-    broken = f' stroke-dasharray="{dash}"' if dash else ""
-    return f'stroke="{paint}" stroke-width="{1.9 if leads else 1.3}"{broken}'
-
-
-def ends_of_family(chart: Chart, panel: int) -> Span:
-    """Ends of a panel's vertical axis: those of all panels of its family."""
-    families = chart.families or (0,) * len(chart.panels)
-    members = [j for j, family in enumerate(families) if family == families[panel]]
-    span = figures.ends_of(values for j in members for values in drawn_values(chart, j))
-    return span if chart.lowest is None else Span(max(span.low, chart.lowest), span.high)
-
-
-def drawn_values(chart: Chart, panel: int) -> Iterator[Array]:
-    """What is drawn at once in a panel, line by line: of a long log all have no room at once."""
-    for series in chart.series:
-        if series.shown:
-            values = series.values[:, panel]
-            if series.half is None:
-                yield values
-            else:
-                half = np.nan_to_num(series.half[:, panel])
-                yield from (values - half, values + half)
-    if chart.band is not None:
-        yield np.array([chart.band[panel], -chart.band[panel]])
-
-
-def picture(chart: Chart, panel: int, ends: Span) -> str:
-    """One panel as a figure with its head."""
-    box = Box()
-    scales = Scales(box, Span(float(chart.x[0]), float(chart.x[-1])), ends, chart.log)
-    parts = [figures.stripes(scales, chart.spans, 'class="contact"')]
-    if chart.band is not None and np.isfinite(chart.band[panel]):
-        top, foot = (float(scales.up(sign * chart.band[panel])) for sign in (1.0, -1.0))
-        foot = min(foot, scales.floor)
-        parts.append(
-            figures.rectangle(box.left, top, scales.side - box.left, foot - top, 'class="floor"')
-        )
-    parts.append(figures.axes(scales, chart.unit, (4, 3)))
-    parts += [drawn_line(scales, chart, series, panel) for series in chart.series if series.shown]
-    name, unit = escape(chart.panels[panel]), escape(chart.units[panel])
-    title = f"{chart.title}, {chart.panels[panel]}"
-    return (
-        f'<figure data-panel="{panel}"><figcaption>{name} <span>{unit}</span></figcaption>'
-        f"{figures.svg(box, title, ''.join(parts))}</figure>"
-    )
-
-
-def drawn_line(scales: Scales, chart: Chart, series: ChartLine, panel: int) -> str:
-    """A line of a panel with its ribbon."""
-    x = chart.x if series.x is None else series.x
-    values = series.values[:, panel]
-    if chart.log:
-        t, y = figures.thinned_log(x, values)
-        return figures.line(scales, t, y, look_of(series.colour, series.dash))
-    t, y = figures.thinned(x, values)
-    under = ""
-    looks = f'fill="{series.colour}" class="rim"', 'class="floor"'
-    for width, style in zip(series.ribbons(panel) or (), looks, strict=False):
-        half = np.interp(t, x, width)
-        under += figures.ribbon(scales, t, y - half, y + half, style)
-    return under + figures.line(
-        scales, t, y, look_of(series.colour, series.dash, leads=series.leads)
-    )
-
-
-def large(chart: Chart) -> str:
-    """Where the script draws the chosen panel large, with every line on demand."""
-    return f'<div class="large" data-chart="{escape(chart.key)}"></div>'
 
 
 def families_of(limits: Array) -> tuple[int, ...]:

@@ -1,24 +1,94 @@
-"""What every page shares: its frame, its small parts, and what the script is given.
-
-Every word that comes from outside is escaped here or in `vftcli.outputs.grid`.
-"""
+"""The templates of every page, their parts as functions, and what the page's script is given."""
 
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, partial
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
-from vftcli.doctor import Examination, in_words
+import numpy as np
+
+from vftcli.doctor import in_words
+from vftcli.outputs.answer import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
-from vftcli.outputs.page.charts import INK, Chart, LineStyle, packed_charts
+from vftcli.outputs.page import svg
+from vftcli.outputs.page.charts import QUIET, Chart, LineStyle, packed_charts
+from vftcli.outputs.quantity import counted, ranged
+from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, explanation
 
-HERE = Path(__file__).parent
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
-#: The browser loads nothing from anywhere.
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+HERE = Path(__file__).parent
+LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
+
+
+@cache
+def templates() -> "Environment":
+    """The templates: what comes from outside is printable and escaped, what is missing an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    def shown(value: object) -> object:
+        """A value as HTML."""
+        return value if hasattr(value, "__html__") else Markup(escape(printable(str(value))))
+
+    made = Environment(
+        loader=FileSystemLoader(HERE / "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        finalize=shown,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.globals |= {
+        "asset": lambda name: Markup(asset(name)),
+        "is_plain": re.compile(r"[\w.,=× -]+").fullmatch,
+        "QUIET": QUIET,
+    }
+    functions = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
+    drawing = (svg.ticks, svg.decades, svg.label, svg.scales_of, svg.stripes, svg.strokes)
+    made.globals |= {each.__name__: each for each in (*functions, svg.polyline, *drawing)}
+    made.filters |= {
+        "counted": counted,
+        "f1": "{:.1f}".format,
+        "known": np.isfinite,
+        "polyline": svg.polyline,
+        "said": lambda line: explanation(line) if isinstance(line, Remark) else line,
+        "warnings_of": warnings_of,
+        "worst_first": worst_first,
+    }
+    return made
+
+
+def worst_first(remarks: Iterable[Remark]) -> list[str]:
+    """The words of every remark once, the most serious first."""
+    texts = {explanation(remark): LEVELS.index(remark.level) for remark in remarks}
+    return sorted(texts, key=lambda text: texts[text])
+
+
+def part(name: str, /, *values: object, **named: object) -> str:
+    """HTML of a small part of the pages: a macro of a template, as ``parts/top``."""
+    file, macro = name.split("/")
+    module = templates().get_template(f"{file}.html").module
+    return str(getattr(module, macro)(*values, **named)).strip()
+
+
+def page(
+    template: str,
+    title: str,
+    charts: Sequence[Chart] = (),
+    styles: Mapping[str, LineStyle] | None = None,
+    scripts: Sequence[str] = (),
+    **view: object,
+) -> str:
+    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere."""
+    data = script_json(packed_charts(charts)) if charts else ""
+    frame = {"title": title, "styles": styles or {}, "scripts": scripts, "data": data}
+    return templates().get_template(template).render(**frame, **view) + "\n"
 
 
 def document(
@@ -26,39 +96,9 @@ def document(
     body: str,
     charts: Sequence[Chart] = (),
     styles: Mapping[str, LineStyle] | None = None,
-    scripts: Sequence[str] = (),
 ) -> str:
-    """A whole HTML page with its style: self-contained, nothing is loaded from anywhere."""
-    script = "".join(f"<script>{asset(name)}</script>" for name in scripts)
-    style = asset("page.css") + swatch_rules(styles or {})
-    # JSON in an element of its own cannot run, so that a name in a log cannot either.
-    if charts:
-        style += asset("uplot.css")
-        script += (
-            f'<script type="application/json" id="data">{script_json(packed_charts(charts))}'
-            f"</script><script>/*{asset('uplot_licence.txt')}*/{asset('uplot.js')}</script>"
-            f"<script>{asset('page.js')}</script>"
-        )
-    return (
-        '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        '<meta name="generator" content="vftcli">'
-        f"<title>{escape(title)}</title><style>{style}</style></head>"
-        f"<body>{body}{script}</body></html>\n"
-    )
-
-
-def swatch_rules(styles: Mapping[str, LineStyle]) -> str:
-    """Style of the short line before a name that heads a row: the line's own colour and dash."""
-    rules = []
-    for name, (colour, dash) in styles.items():
-        # A name from a file could end the rule: it goes without a colour.
-        if re.fullmatch(r"[\w.,=× -]+", name):
-            kind = "solid" if not dash else "dashed" if float(dash.split()[0]) > 3 else "dotted"
-            paint = "var(--ink)" if colour == INK else colour
-            rules.append(f'[data-swatch="{name}"]::before{{border-top:3px {kind} {paint}}}')
-    return "".join(rules)
+    """A page around a body that is HTML already."""
+    return page("page.html", title, charts, styles, body=body)
 
 
 def asset(name: str) -> str:
@@ -73,118 +113,11 @@ def script_json(data: object) -> str:
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
 
 
-def top(eyebrow: Sequence[str], headline: str, lead: str = "") -> str:
-    """The top of a page: what it is about, the answer in words, and what follows from it."""
-    facts = " · ".join(escape(part) for part in eyebrow if part)
-    return f'<header><p class="eyebrow">{facts}</p><h1>{escape(headline)}</h1>{lead}</header>'
-
-
-def lead(*sentences: str) -> str:
-    """A paragraph below a headline, "" without a word."""
-    text = " ".join(escape(sentence) for sentence in sentences if sentence)
-    return f'<p class="lead">{text}</p>' if text else ""
-
-
-def pairs(table: Mapping[str, Any]) -> str:
-    """Names and their values, one below the other."""
-    rows = "".join(f"<dt>{escape(str(k))}</dt><dd>{escape(str(v))}</dd>" for k, v in table.items())
-    return f'<dl class="pairs">{rows}</dl>'
-
-
-def bullets(lines: Iterable[Remark | str]) -> str:
-    """A bullet list; of a remark it shows the long words."""
-    items = "".join(
-        f"<li>{escape(explanation(x) if isinstance(x, Remark) else x)}</li>" for x in lines
-    )
-    return f'<ul class="plain">{items}</ul>'
-
-
-def all_remarks(lines: Iterable[Remark]) -> str:
-    """Every remark once, the most serious first; "" without any."""
-    texts = {explanation(remark): remark.level for remark in lines}
-    order = ("warning", "caution", "fact")
-    found = sorted(texts, key=lambda text: order.index(texts[text]))
-    return section("Remarks", bullets(found), f"{len(found)}") if found else ""
-
-
-def alarms(examinations: Sequence[Examination], *, fitting: bool = True) -> str:
-    """What stands above everything where results were wanted in spite of a finding."""
-    lines = overridden_lines(examinations, fitting=fitting)
-    return "".join(f'<p class="alarm">{escape(line)}</p>' for line in lines)
-
-
-def health(examinations: Sequence[Examination], *, opened: bool = False) -> str:
-    """What is wrong with the logs: evidence, consequence and remedy of every finding."""
-    if not examinations:
-        return ""
-    named = len(examinations) > 1
-    parts, count = [], 0
-    for one in examinations:
-        warnings = warnings_of(one)
-        count += len(warnings)
-        notes = [finding for finding in one.findings if finding.level != "warning"]
-        head = f"<h3>{escape(one.recording.name)}</h3>" if named else ""
-        found = "".join(map(finding_block, (*warnings, *notes)))
-        parts.append(head + (found or soft("Nothing was found.")))
-    state = f"{count} warning{'s' * (count > 1)}" if count else "sound"
-    return section("Log health", "".join(parts), state, name="health", opened=opened and count > 0)
-
-
-def finding_block(finding: Remark) -> str:
-    """A finding: its name and evidence, then what it does and what to do about it."""
-    said = in_words(finding)
-    rest = f" {escape(said.consequence)}." if said.consequence else ""
-    remedy = f" <strong>What to do:</strong> {escape(said.remedy)}." if said.remedy else ""
-    then = f'<p class="then">{rest}{remedy}</p>' if rest or remedy else ""
-    evidence = f"<strong>{escape(said.name)}</strong>: {escape(said.evidence)}."
-    return f'<div class="finding"><p>{evidence}</p>{then}</div>'
-
-
-def soft(text: str) -> str:
-    """A paragraph in small type: words that explain what stands beside them. Taken as HTML."""
-    return f'<p class="soft">{text}</p>'
-
-
-def section(title: str, html: str, state: str = "", *, name: str = "", opened: bool = False) -> str:
-    """A part of the details that the reader opens with a click, "" where there is nothing."""
-    if not html:
-        return ""
-    words = f" <span>· {escape(state)}</span>" if state else ""
-    mark = f' id="{name}"' if name else ""
-    head = f"<summary>{escape(title)}{words}</summary>"
-    return f"<details{mark}{' open' * opened}>{head}{html}</details>"
-
-
-def provenance(record: Mapping[str, Any]) -> str:
-    """Command, versions, input, robot and what was repaired: enough to make it again."""
-    versions = ", ".join(f"{name} {number}" for name, number in record.get("versions", {}).items())
-    command = str(record.get("command") or "through the Python interface")
-    robot, source = record.get("robot") or {}, record.get("input")
-    table = {}
-    if source is not None:
-        table = {
-            "Log": f"{source.get('path') or 'in memory'} ({source.get('format')})",
-            "Log sha256": source.get("sha256") or "–",
-            "Clock": source.get("clock"),
-            "Rows": f"{source.get('rows')} in the file, {source.get('duplicates')} repeated stamps "
-            f"dropped, {source.get('samples')} used",
-        }
-    table |= {
-        "Robot": f"{robot.get('name')} ({robot.get('file') or 'built in'})",
-        "Robot sha256": robot.get("sha256") or "–",
-        "Versions": versions,
-    }
-    notes = robot.get("notes")
-    more = f"<h3>Notes on the robot file</h3>{bullets(notes)}" if notes else ""
-    return section(
-        "Conventions and provenance",
-        "".join(
-            (
-                pairs(record.get("conventions", {})),
-                f"<pre>{escape(command)}</pre>",
-                pairs(table),
-                more,
-            )
-        ),
-        name="provenance",
-    )
+#: Parts as functions, for pages that are put together in Python.
+alarms, all_remarks = partial(part, "parts/alarms"), partial(part, "parts/all_remarks")
+bullets, health = partial(part, "parts/bullets"), partial(part, "parts/health")
+lead, pairs, top = (partial(part, f"parts/{name}") for name in ("lead", "pairs", "top"))
+provenance, section = partial(part, "parts/provenance"), partial(part, "parts/section")
+soft, table = partial(part, "parts/soft"), partial(part, "parts/table")
+axes, frame = partial(part, "svg/axes"), partial(part, "svg/svg")
+large, multiples = partial(part, "svg/large"), partial(part, "svg/multiples")

@@ -1,14 +1,17 @@
 """Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
 from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
 from vftcli.readers.bags.ros_messages import types_for
+from vftcli.readers.joining import JoinedRows
 from vftcli.readers.joints import in_order, kinematic_order
+from vftcli.readers.table import Column
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
@@ -118,6 +121,24 @@ class Stream:
         """Number of messages."""
         return len(self.receive)
 
+    def series(self) -> Iterator[tuple[str, Column]]:
+        """Its times and signals, by name."""
+        times = (("receive", self.receive), ("header", self.header), ("robot", self.robot))
+        yield from ((name, value) for name, value in times if value is not None)
+        yield from self.signals.items()
+
+    def with_series(self, rows: Mapping[str, JoinedRows]) -> "Stream":
+        """The stream with other times and signals, those that have one width in every message."""
+        count = rows["receive"].count
+        found = {
+            name: values.whole()
+            for name, values in rows.items()
+            if len(values.shapes) == 1 and values.count == count
+        }
+        keys = ("receive", "header", "robot")
+        times: dict[str, Any] = {key: found.pop(key, None) for key in keys}
+        return replace(self, signals=found, **times)
+
 
 @dataclass
 class _Part:
@@ -131,15 +152,20 @@ class _Part:
     mixed: bool
 
 
+#: What tells streams of a topic apart: the joints' names, the frame, the signals.
+_Key = tuple[tuple[str, ...], str, tuple[str, ...]]
+
+
 @dataclass
 class _Topic:
     """What is known of a channel while its batches come in."""
 
     types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    parts: dict[tuple[tuple[str, ...], str, tuple[str, ...]], list[_Part]] = field(
-        default_factory=dict
-    )
+    #: The parts of the batch at hand.
+    parts: dict[_Key, list[_Part]] = field(default_factory=dict)
+    #: The streams of the first batches, and the times and signals of all batches.
+    streams: dict[_Key, tuple[Stream, dict[str, JoinedRows]]] = field(default_factory=dict)
     constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
     seen: int = 0
 
@@ -166,6 +192,13 @@ class Decoder:
             for length in np.unique(batch.lengths):
                 self._of_length(batch, topic, int(length))
             topic.seen += len(batch.offsets)
+            for key, parts in topic.parts.items():
+                stream = _joined(channel, topic, key, parts)
+                first, series = topic.streams.setdefault(key, (stream, {}))
+                first.mixed |= stream.mixed
+                for name, value in stream.series():
+                    series.setdefault(name, JoinedRows()).add(value)
+            topic.parts.clear()
         except LayoutError as error:
             raise LogError(
                 f"{self.ingest.path}: a message of {channel.topic} does not fit the definition of "
@@ -249,18 +282,8 @@ class Decoder:
 
     def streams(self) -> list[Stream]:
         """All streams that were decoded, each in the order of recording."""
-        return [
-            _joined(channel, topic, key, parts)
-            for channel, topic in self.topics.items()
-            for key, parts in topic.parts.items()
-        ]
-
-    def taken(self) -> list[Stream]:
-        """The streams that were decoded since this was last asked for."""
-        found = self.streams()
-        for topic in self.topics.values():
-            topic.parts.clear()
-        return found
+        found = (each for topic in self.topics.values() for each in topic.streams.values())
+        return [stream.with_series(series) for stream, series in found]
 
 
 def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:
@@ -273,12 +296,7 @@ def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers 
     )
 
 
-def _joined(
-    channel: Channel,
-    topic: _Topic,
-    key: tuple[tuple[str, ...], str, tuple[str, ...]],
-    parts: Iterable[_Part],
-) -> Stream:
+def _joined(channel: Channel, topic: _Topic, key: _Key, parts: Iterable[_Part]) -> Stream:
     """One stream of its parts, in the order in which the messages were recorded."""
     parts = list(parts)
     names, frame, signals = key

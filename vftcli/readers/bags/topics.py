@@ -13,7 +13,7 @@ from vftcli.readers.bags.decode import Stream
 from vftcli.readers.columns import SIGNALS
 from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, pieces, release
 from vftcli.signals.errors import LogError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import Remark, caution, fact
@@ -37,6 +37,8 @@ def aligned(
     gathering.take_lead(path)
     for stream in streams:
         gathering.take(stream)
+        for _, values in stream.series():
+            release(values)
     frame = gathering.take_wrench(streams, path)
     gathering.tell_left(streams, others)
     lead, signals = gathering.lead, gathering.signals
@@ -172,7 +174,7 @@ class Gathering:
         field_name = SIGNALS.get(name, name)
         if field_name in EFFORTS and lead.kind.names:
             for other in set(EFFORTS) & set(self.signals):
-                if np.array_equal(self.signals[other], value):
+                if all(map(np.array_equal, pieces(self.signals[other]), pieces(value))):
                     del self.signals[other]  # /joint_states' effort said the same without its kind
         self.signals[field_name] = value
 

@@ -13,7 +13,6 @@ References:
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -104,10 +103,7 @@ def torque_noise(
     stretches = [s for piece in free for s in free_stretches(piece, seconds)]
     if not stretches:
         return assumed_noise(log, dry)
-    white, variance, time = (np.array(v) for v in zip(*fit_joints(stretches), strict=True))
-    # An offset is an error too.
-    every = np.concatenate([s.d for s in stretches])
-    variance += every.mean(axis=0) ** 2
+    white, variance, time = fit_joints(stretches)
     moving = ~np.concatenate([s.rests for s in stretches])
     unseen = moving.mean(axis=0) < SEEN
     return TorqueNoise(
@@ -153,26 +149,27 @@ def free_stretches(piece: RunSamples, seconds: float) -> list[Blocks]:
     motion = np.flatnonzero(blocks.known & ~blocks.rests.all(axis=1))
     if len(motion):
         blocks = blocks.part(slice(int(motion[0]), int(motion[-1]) + 1))
+    return long_stretches(blocks)
+
+
+def long_stretches(blocks: Blocks) -> list[Blocks]:
+    """The stretches of known blocks that a spectrum can be learned from."""
     runs = [run for run in runs_of(blocks.known) if run[1] - run[0] >= LEAST_BLOCKS]
     return [blocks.part(slice(*run)) for run in runs]
 
 
-class FittedNoise(NamedTuple):
-    """What one joint's spectrum gives."""
-
-    white: float  #: R. [(N·m)²]
-    variance: float  #: s². [(N·m)²]
-    time: float  #: T. [s]
-
-
-def fit_joints(stretches: Sequence[Blocks]) -> list[FittedNoise]:
-    """R, s² and T of every joint, by Whittle's likelihood over all stretches together."""
+def fit_joints(stretches: Sequence[Blocks]) -> tuple[Array, Array, Array]:
+    """R, s² and T of every joint, by Whittle's likelihood over all stretches together. (n,) each"""
     # A block holds whole samples, so that it is not quite as long as was asked.
     seconds = median(np.concatenate([s.length for s in stretches]))
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
     P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
     longest = max(float(s.length.sum()) for s in stretches)
-    return [fit_spectrum(f, p, seconds, longest) for p in P.T]
+    each = [fit_spectrum(f, p, seconds, longest) for p in P.T]
+    white, variance, time = (np.array(v) for v in zip(*each, strict=True))
+    # An offset is an error too.
+    variance += np.concatenate([s.d for s in stretches]).mean(axis=0) ** 2
+    return white, variance, time
 
 
 def periodogram(d: Array, seconds: float) -> Array:
@@ -182,7 +179,7 @@ def periodogram(d: Array, seconds: float) -> Array:
     return power
 
 
-def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNoise:
+def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
     """R, s² and T of one joint: the best of a grid over ln T and ln s²/R that narrows five times.
 
     The level follows in closed form, so that two numbers are left to search.
@@ -210,4 +207,4 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> FittedNo
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)
         count = 5
     time, ratio = np.exp(best)
-    return FittedNoise(max(level, LEAST_NOISE), float(level * ratio), float(time))
+    return max(level, LEAST_NOISE), float(level * ratio), float(time)

@@ -47,7 +47,7 @@ class FreeLog(NamedTuple):
 def as_modelled(motion: FreeMotion) -> FreeLog:
     """The log as the robot's model explains it, with the free part that is given or found."""
     try:
-        return FreeLog(motion.log, motion.part.pieces)
+        return FreeLog(motion.log, motion.known.pieces)
     except ReferenceTorqueError:
         return FreeLog(motion.log, ())
 

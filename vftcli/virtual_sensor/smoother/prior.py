@@ -7,6 +7,7 @@ import numpy as np
 
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
@@ -36,6 +37,16 @@ class WrenchPrior(NamedTuple):
         moment = LEVER * self.force if self.moment is None else self.moment
         return np.repeat([self.force**2, moment**2], 3)
 
+    def decay(self, inside: Mask, step: Array) -> Array:
+        """Share that is kept from the block before; 0 where the gate opens and outside. (K,)
+
+        Args:
+            inside: Blocks in which there may be a wrench. (K,)
+            step: Time from the block before. (K,) [s]
+        """
+        goes_on = inside & np.concatenate([[False], inside[:-1]])
+        return np.where(goes_on, np.exp(-step / self.time), 0.0)
+
 
 STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
 LOAD_CHANGE = 5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
@@ -57,9 +68,7 @@ def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Ma
     for start, stop in intervals:
         touched = (blocks.t + half > start) & (blocks.t - half < stop)
         inside |= touched
-        inside[1:] |= touched[:-1]
-        inside[:-1] |= touched[1:]
-    return inside
+    return covered(runs_of(inside), len(inside), 1)
 
 
 def wrench_model(
@@ -79,10 +88,9 @@ def wrench_model(
     """
     count, n = blocks.d.shape
     decay, added = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
-    goes_on = inside & np.concatenate([[False], inside[:-1]])
     step = steps(blocks)
     for g, prior in enumerate(priors):
-        kept = np.where(goes_on, np.exp(-step / prior.time), 0.0)[:, None]
+        kept = prior.decay(inside, step)[:, None]
         decay[:, g, :6] = kept
         added[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
     # Where the whole log may be touched nothing tells a push from what it re-settles.

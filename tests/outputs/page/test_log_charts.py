@@ -1,0 +1,114 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.page.charts import REFERENCE
+from vftcli.outputs.page.log_charts import (
+    LOWEST,
+    condition_charts,
+    response_charts,
+    torque_chart,
+    wrench_chart,
+)
+from vftcli.outputs.page.pages import render, scale_words
+
+
+def test_the_best_is_drawn_at_once_the_others_on_demand(analysis: Analysis) -> None:
+    chart = torque_chart(analysis)
+    names = [line.name for line in chart.series]
+    assert names == ["reference (vendor)", "fdo", "gmo", "kfo-fe", "kfo-zoh", "best"]
+    assert [line.name for line in chart.series if line.shown] == ["reference (vendor)", "best"]
+    assert len({line.dash for line in chart.series[1:]}) == 5  # none is told by its colour alone
+    assert chart.series[0].colour == REFERENCE
+    assert chart.band is not None
+    assert chart.band.tolist() == [0.5] * 6
+    np.testing.assert_array_equal(chart.series[2].values, analysis.estimates[2].tau)
+    assert chart.panels == tuple(f"J{j}" for j in range(1, 7))
+
+
+def test_a_reference_at_rest_is_another_line(analysis: Analysis) -> None:
+    assert analysis.reference is not None
+    moving = np.ones((len(analysis.t), 6), dtype=bool)
+    moving[100:200, 2] = False
+    partly = replace(analysis, reference=replace(analysis.reference, moving=moving))
+    whole, resting = torque_chart(partly).series[:2]
+    assert "rests" in resting.name
+    assert np.isnan(whole.values[150, 2])
+    assert np.isfinite(resting.values[150, 2])
+    assert np.isnan(resting.values[150, 1])
+
+
+def test_scales_are_said(analysis: Analysis) -> None:
+    chart = torque_chart(analysis)
+    assert chart.families == (1, 1, 1, 2, 2, 2)  # 150 and 28 N·m
+    assert scale_words(chart) == "One scale in J1–J3 and in J4–J6."
+    assert scale_words(chart._replace(families=(1, 1, 2, 3, 4, 5))) == (
+        "One scale in J1–J2; the others have their own."
+    )
+    assert scale_words(chart._replace(families=())) == "Every joint has its own scale."
+    assert "best; 4 more on demand" in render(analysis)
+
+
+def test_a_first_order_response_is_3_db_down_at_its_cutoff(analysis: Analysis) -> None:
+    """fdo.omega of the UR5 is 10 rad/s: 1.59 Hz."""
+    gain, _, delay = response_charts(analysis)
+    fdo = next(line for line in gain.series if line.name == "fdo")
+    found = np.interp(10.0 / (2.0 * np.pi), gain.x, fdo.values[:, 0])
+    # the bilinear rule warps 1.59 Hz by 0.05 % at 125 Hz; interpolation adds less than 0.04 dB
+    assert found == pytest.approx(-3.01, abs=0.05)
+    assert gain.lowest == LOWEST
+    slow = next(line for line in delay.series if line.name == "fdo").values[0, 0]
+    assert slow == pytest.approx(100.0, rel=0.01)  # 1/ω at frequencies far below it
+
+
+def test_the_pose_has_a_chart_with_its_threshold(with_wrench: Analysis) -> None:
+    reading = with_wrench.virtual_sensor
+    assert reading is not None
+    first = next(condition_charts(with_wrench))
+    assert (first.key, first.units) == ("sigma_min", ("m",))
+    assert first.band is not None
+    assert first.band.tolist() == [reading.sensor.least_sigma]
+    sigma = reading.wrenches[0].sigma_min
+    assert sigma is not None
+    np.testing.assert_array_equal(first.series[0].values[:, 0], sigma)
+
+
+def test_without_wrenches_there_is_no_section(without_reference: Analysis) -> None:
+    bare = replace(without_reference, virtual_sensor=None)
+    assert wrench_chart(bare) is None
+    assert "Wrench axes" not in render(bare)
+    assert list(condition_charts(bare)) == []
+
+
+def test_wrenches_have_a_panel_an_axis(with_wrench: Analysis) -> None:
+    chart = wrench_chart(with_wrench)
+    assert chart is not None
+    assert chart.panels == ("fx", "fy", "fz", "mx", "my", "mz")
+    assert chart.units == ("N",) * 3 + ("N·m",) * 3
+    assert chart.families == (1, 1, 1, 2, 2, 2)
+    (leading,) = (line for line in chart.series if line.leads)
+    assert leading.name == "best"
+    known = next(w for w in with_wrench.wrenches if w.name == "best").known
+    np.testing.assert_array_equal(leading.values, known)
+    assert [line.shown for line in chart.series if not line.leads] == [False] * 4
+    html = render(with_wrench)
+    assert html.count('data-panel="0"') >= 2  # fx, and what the pose can tell
+    assert "ON the robot in base axes" in html
+
+
+def test_the_band_is_grey_where_no_contact_is_listed(pushed: Analysis) -> None:
+    """The twelve pushes of the circle and their edges of a block; a wrench without a list: none."""
+    chart = wrench_chart(pushed)
+    assert chart is not None
+    (line,) = chart.series
+    assert pushed.contacts is not None
+    assert line.quiet is not None
+    t, inside = pushed.t, np.zeros(len(pushed.t), dtype=bool)
+    for row in pushed.contacts.contacts:
+        inside |= (t > row.start) & (t < row.stop)
+        assert line.quiet[np.argmin(np.abs(t - row.start + 0.2))] or row.number > 1
+    assert not line.quiet[inside].any()
+    assert line.quiet[t < 4.0].all()
+    assert np.nanmin(line.half) > 0.0

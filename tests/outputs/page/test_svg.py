@@ -1,0 +1,96 @@
+import numpy as np
+import pytest
+
+from vftcli.outputs.page.shell import axes, frame
+from vftcli.outputs.page.svg import (
+    Box,
+    Scales,
+    Span,
+    decades,
+    ends_of,
+    label,
+    path_of,
+    ribbon,
+    stripes,
+    thinned,
+    thinned_log,
+    ticks,
+)
+
+SCALES = Scales(Box(100, 100, 0, 0, 0, 0), Span(0.0, 10.0), Span(0.0, 5.0))
+
+
+def test_values_have_their_places() -> None:
+    np.testing.assert_allclose(SCALES.across(np.array([0.0, 5.0, 10.0])), [0, 50, 100])
+    np.testing.assert_allclose(SCALES.up(np.array([0.0, 5.0])), [100, 0])
+    log = Scales(SCALES.box, Span(0.1, 100.0), Span(0, 1), log=True)
+    np.testing.assert_allclose(log.across(np.array([0.1, 1.0, 100.0])), [0, 100 / 3, 100])
+
+
+@pytest.mark.parametrize(
+    ("span", "count", "found"),
+    [
+        (Span(0.0, 18.4), 9, [0.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0]),
+        (Span(-7.0, 12.0), 3, [-5.0, 0.0, 5.0, 10.0]),
+        (Span(1.0, 1.0), 3, [1.0]),
+    ],
+)
+def test_ticks_are_round(span: Span, count: int, found: list[float]) -> None:
+    np.testing.assert_allclose(ticks(span, count), found)
+
+
+@pytest.mark.parametrize("high", [1.0, 1.7, 3.3, 6.1, 14.0])
+def test_there_are_always_numbers_on_an_axis(high: float) -> None:
+    assert 3 <= len(ticks(Span(-0.4 * high, high), 3)) <= 7
+
+
+def test_numbers_of_axes() -> None:
+    assert decades(Span(0.02, 62.5)) == [0.1, 1.0, 10.0]
+    assert decades(Span(0.1, 10.0)) == [0.1, 1.0, 10.0]  # its ends are on it
+    assert (label(-0.5), label(-0.0), label(1e6)) == ("−0.5", "0", "1e+06")
+    text = axes(SCALES, "<s>")
+    assert "&lt;s&gt;" in text
+    assert "<s>" not in text
+
+
+def test_a_line_breaks_where_nothing_is_known() -> None:
+    t = np.arange(5.0)
+    assert path_of(SCALES, t, np.array([0.0, 5.0, np.nan, 5.0, 0.0])).count("M") == 2
+    assert path_of(SCALES, t, np.array([np.nan, 1.0, np.nan, 5.0, 0.0])).count("h.01") == 1
+    half = ribbon(SCALES, t, np.zeros(5), np.array([1.0, 1.0, np.nan, 1.0, 1.0]))
+    assert half.count("Z") == 2
+
+
+def test_what_is_far_outside_stays_near() -> None:
+    assert path_of(SCALES, np.array([0.0, 1.0]), np.array([0.0, 1e9])) == "M0.0 100.0 10.0 -100.0"
+
+
+def test_a_stripe_stays_in_the_plot() -> None:
+    assert SCALES.inside((5.0, 99.0)).tolist() == [50.0, 100.0]
+
+
+def test_many_stripes_are_one_path() -> None:
+    found = stripes(SCALES, [(0.0, 1.0), (5.0, 5.0)])
+    assert found == "M0.0 0h10.0v100h-10.0zM50.0 0h0.5v100h-0.5z"
+
+
+def test_ends_hold_all_values() -> None:
+    found = ends_of([np.array([1.0, np.nan]), np.array([-3.0])])
+    assert found.low < -3.0
+    assert found.high > 1.0
+    assert ends_of([np.array([np.nan])]) == ends_of([np.zeros(3)]) == Span(-1.0, 1.0)
+    assert ends_of([np.full(3, 4.0)]) == Span(0.0, 8.0)
+
+
+def test_no_spike_is_lost() -> None:
+    t = np.linspace(1.0, 1000.0, 20_000)
+    y = np.zeros_like(t)
+    y[[777, 15_000]] = 9.0, -9.0
+    for found in (thinned(t, y), thinned_log(t, y)):
+        assert len(found[0]) < 1200
+        assert {9.0, -9.0} <= set(found[1])
+        assert found[0][np.argmax(found[1])] == t[777]
+
+
+def test_the_title_is_words() -> None:
+    assert "&lt;b&gt;" in frame(Box(), "<b>", "<g/>")

@@ -1,0 +1,361 @@
+"""The methods: "friction" holds the maker's links, "base" frees them, "auto" chooses.
+
+What method "targets" says of a joint's friction is made here too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+
+from vftcli.identification.clean_fit import (
+    OTHER_LINKS,
+    CleanFit,
+    fit_without_contacts,
+    heavy_joints,
+    links_explain,
+    weighted_rms,
+)
+from vftcli.identification.friction_fit import (
+    PLAIN,
+    JointFit,
+    all_residuals,
+    fit_frictions,
+    is_dissipative,
+)
+from vftcli.identification.friction_shapes import Shape, friction_columns, round_digits
+from vftcli.identification.links import ParameterColumns, base_parameters, stack
+from vftcli.identification.physical_links import (
+    TABLE,
+    WEIGHTS,
+    nearest_physical_links,
+    predicts_best_unpulled,
+)
+from vftcli.identification.processing import rigid_torque
+from vftcli.identification.result import MethodResult, Number, number
+from vftcli.identification.training import Training
+from vftcli.robots.friction import SMOOTHING, falling_speed, steady_torque
+from vftcli.robots.regressor import chain_parameters, with_parameters
+from vftcli.robots.robot import JointFriction, Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import IdentificationError
+from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
+
+#: Standard deviation over value up to which a number counts as determined by the logs.
+DETERMINED = 0.3
+#: Standard deviations off from which a profile's rotor inertia is replaced.
+REFUTED = 3.0
+#: Measured over expected torque below which a current does not follow it.
+LEAST_SLOPE = 0.05
+
+
+def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
+    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
+    if not (data.rubs or data.rotor):
+        raise IdentificationError(
+            f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
+            "friction method has nothing to find; use --method base"
+        )
+    data, fits, remarks = fitted or fit_without_contacts(data, strict=True)
+    remarks, robot = [*remarks], data.robot
+    rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
+    constants = None if robot.torque_constant is None else robot.torque_constant.copy()
+    numbers: list[Number] = []
+    for j, fit in enumerate(fits):
+        if fit is None:
+            continue
+        count, where = len(fit.shape.terms), Where(joints=(j + 1,))
+        if fit.is_kept:
+            found_rms, profile_rms = fit.errors
+            missed = {"found_Nm": found_rms, "profile_Nm": profile_rms}
+            remarks.append(caution("profile-kept", where, **missed))
+            continue
+        values, sd = fit.fit.values, fit.fit.sd
+        if data.fit_constants and not fit.constant:
+            remarks.append(caution("unloaded-drive-constant", where))
+        if fit.constant and constants is not None:
+            values, sd, K = by_constant(data, j, values, sd)
+            numbers.append(K)
+            constants[j] = round_digits(K.value)
+        if data.rotor:
+            J = rotor_number(j, values[count], sd[count], rotor[j])
+            numbers.append(J)
+            remarks += rotor_remarks(J, where)
+            rotor[j] = round_digits(J.value) if J.determined else rotor[j]
+        if data.rubs:
+            frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "friction")
+            numbers += more
+            remarks += check_friction(j, frictions[j], data)
+    new = replace(
+        robot,
+        chain=replace(robot.chain, rotor_inertia=rotor),
+        friction=tuple(frictions) if data.rubs else (),
+        torque_constant=constants,
+    )
+    return fitted_result("friction", data, fits, new, numbers, remarks)
+
+
+def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
+    """Coefficients of joint j (from 0) and their sd by the drive constant fitted last, and it.
+
+    Torque was made from currents with the profile's K. Where the rigid body's torque comes out as
+    scale times what it must be, the true K is K / scale, and so are all coefficients beside it.
+    """
+    scale, scale_sd = float(values[-1]), float(sd[-1])
+    if scale <= LEAST_SLOPE:
+        raise IdentificationError(
+            f"{data.recordings[0].name}: the current of joint {j + 1} does not follow its torque "
+            f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
+            "leave out --fit-constants"
+        )
+    before = profile_constant(data.robot, j)
+    K, K_sd = before / scale, before * scale_sd / scale**2
+    return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
+
+
+def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
+    """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]
+
+    It counts as determined too where it is `REFUTED` standard deviations from the profile's.
+    """
+    if refuted := abs(value - before) >= REFUTED * sd:
+        value = max(value, 0.0)
+    known = refuted or (value > 0 and sd < DETERMINED * value)
+    return number(j, "rotor_inertia", value, sd, before, known)
+
+
+def rotor_remarks(J: Number, where: Where) -> list[Remark]:
+    """A remark on a rotor inertia that is not known to `DETERMINED`."""
+    if J.determined and J.sd < DETERMINED * J.value:
+        return []
+    values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
+    code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
+    return [caution(code, where, **values)]
+
+
+def identified_friction(
+    data: Training, j: int, shape: Shape, values: Array, sd: Array, method: str
+) -> tuple[JointFriction, list[Number]]:
+    """Friction of joint j (from 0) by its fit, and its coefficients beside the profile's.
+
+    It holds at the temperature of the profile's; others may follow the coefficients. (k,)
+    """
+    before = profile_friction(data.robot)[j]
+    logs = ", ".join(f"{r.name} (sha256 {r.source.sha256 or 'unknown'})" for r in data.recordings)
+    errors = ", ".join(f"{value:.2g}" for value in sd)
+    friction = replace(
+        shape.friction(
+            values[: len(shape.terms)],
+            f"identified ({method}) from {logs}; standard deviations {errors}",
+        ),
+        temperature=before.temperature,
+        temperature_at=before.temperature_at,
+    )
+    known = dict(before.parameters)
+    if before.speeds[: len(shape.speeds)] == shape.speeds:
+        known |= dict(zip(shape.points, before.torques, strict=False))
+    return friction, [
+        number(j, term, value, error, known.get(term, np.nan), error < DETERMINED * abs(value))
+        for term, value, error in zip(shape.terms, values, sd, strict=False)
+    ]
+
+
+def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
+    """A remark if the fitted friction of joint j (from 0) pushes at some speed, or falls."""
+    motions = [log.motion for log in data.logs]
+    speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in motions)
+    torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
+    noise = max(robust_sd(m.tau)[j] for m in motions)
+    # A hundredth of the torque's spread: no friction comes out on either side of zero.
+    if np.all(torque < -0.01 * noise):
+        raise IdentificationError(
+            f"{data.recordings[0].name}: friction of joint {j + 1} comes out as {torque[0]:.2g} to "
+            f"{torque[-1]:.2g} N·m: it would push. Velocity and effort differ in sign, or this "
+            "is another robot; check --columns and --robot"
+        )
+    where = Where(joints=(j + 1,))
+    if np.any(torque < 0):
+        return [caution("negative-friction", where, least_Nm=float(torque.min()))]
+    limit = data.top_speed(j)
+    if np.isfinite(falls := falling_speed(friction, limit)):
+        return [warning("falling-friction", where, speeds_rad_s=[falls], limits_rad_s=[limit])]
+    return []
+
+
+def fitted_result(
+    method: str,
+    data: Training,
+    fits: Sequence[JointFit | None],
+    robot: Robot,
+    numbers: list[Number],
+    remarks: list[Remark],
+    base: pl.DataFrame | None = None,
+) -> MethodResult:
+    """The result of a method that fits friction, with the remarks on these fits."""
+    known = [(j, fit) for j, fit in enumerate(fits, start=1) if fit is not None]
+    for j, fit in known:
+        if fit.at_bound:
+            terms = " and ".join(fit.at_bound)
+            remarks.append(caution("friction-at-bound", Where(joints=(j,)), terms=terms))
+    presliding = known[0][1].presliding
+    if len(presliding.errors) > 1:
+        values = {
+            "length_mrad": 1e3 * presliding.length,
+            "lengths_mrad": [1e3 * length for length in presliding.errors],
+            "errors": [*presliding.errors.values()],
+        }
+        remarks.append(Remark("presliding-length", values=values))
+    remarks += temperature_remarks(data)
+    for j, (moves, reverses) in enumerate(zip(data.moves, data.reverses, strict=True), start=1):
+        if not moves:
+            remarks.append(fact("static-joint", Where(joints=(j,))))
+        elif not reverses:
+            remarks.append(caution("one-way-joint", Where(joints=(j,))))
+    choices = [
+        (j, shape.words, error, shape == fit.shape)
+        for j, fit in known
+        for shape, error in fit.scores.items()
+    ]
+    return MethodResult(method, robot, numbers, remarks, choices, base)
+
+
+def temperature_remarks(data: Training) -> list[Remark]:
+    """Remarks on the factors of friction by the joints' temperatures."""
+    remarks = []
+    for log in data.logs:
+        if (warmth := log.columns.warmth) is not None:
+            factors = [float(warmth.min()), float(warmth.max())]
+            where = Where(log.motion.recording.name)
+            remarks.append(fact("friction-by-temperature", where, factors=factors))
+    return remarks
+
+
+def profile_friction(robot: Robot) -> tuple[JointFriction, ...]:
+    """The profile's friction, one a joint even where it has none."""
+    return robot.friction or tuple(JointFriction() for _ in range(robot.joints))
+
+
+def profile_constant(robot: Robot, j: int) -> float:
+    """The profile's drive constant of joint j (from 0), nan if it has none. [N·m/A]"""
+    return float(robot.torque_constant[j]) if robot.torque_constant is not None else float("nan")
+
+
+#: Share of undetermined base parameters from which a motion is narrow.
+NARROW = 0.7
+#: That share where the weakest pull predicts best, as of rounds of one motion: each knows the
+#: others, whatever the links are.
+MOST = 0.5
+#: Share of a joint's torque that its profile's links must leave before others are sought.
+MATTERS = 0.02
+
+
+def whole_arm(data: Training) -> MethodResult:
+    """Base parameters by weighted least squares, and the robot of the nearest physical links.
+
+    Friction models are chosen twice, so that an error of the profile's links is no friction.
+    """
+    data, fits, remarks = fit_without_contacts(data, strict=False)
+    layout, start = initial_columns(data, fits)
+    x = nearest_physical_links(stack(layout, data.logs, start), start)
+    data = with_links(data, layout, x)
+    fits = fit_frictions(data)
+    layout, start = initial_columns(data, fits)
+    triangles = stack(layout, data.logs, start)
+    base = base_parameters(triangles, start)
+    behind = len(base) - layout.size  # of a coefficient's row to its column
+    count = layout.rotor_places.stop + behind
+    undetermined = int((~base["determined"][:count]).sum())
+    share = undetermined / max(count, 1)
+    narrow = share > NARROW or (share > MOST and predicts_best_unpulled(triangles, start))
+    x = nearest_physical_links(triangles, start, TABLE if narrow else WEIGHTS[0])
+    remarks.append(fact("nearest-physical-model"))
+    level = caution if narrow else fact
+    remarks.append(level("undetermined-base-parameters", count=count, undetermined=undetermined))
+    if data.robot.payload is not None:
+        remarks.append(fact("payload-in-link"))
+    numbers, frictions = list[Number](), list(profile_friction(data.robot))
+    for j, (fit, place) in enumerate(zip(fits, layout.frictions, strict=True)):
+        if fit is not None and data.rubs:
+            values = x[place]
+            # Beside errors of the links a rise may fall; the joint's own fit does not.
+            if not is_dissipative(fit.shape, values, data.top_speed(j)):
+                values = fit.fit.values[: len(fit.shape.terms)]
+            sd = base["sd"].to_numpy()[place.start + behind : place.stop + behind]
+            frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "base")
+            numbers += more
+            remarks += check_friction(j, frictions[j], data)
+    robot = with_vector(data.robot, layout, x, tuple(frictions) if data.rubs else ())
+    result = fitted_result("base", data, fits, robot, numbers, remarks, base)
+    return result._replace(is_narrow=narrow)
+
+
+def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
+    """The training data with other links: their rigid-body torque and load."""
+    robot = with_vector(data.robot, layout, x, data.robot.friction)
+    logs = [
+        log._replace(
+            columns=friction_columns(log.motion, robot), rigid=rigid_torque(robot, log.motion)
+        )
+        for log in data.logs
+    ]
+    return replace(data, logs=tuple(logs))
+
+
+def initial_columns(
+    data: Training, fits: Sequence[JointFit | None]
+) -> tuple[ParameterColumns, Array]:
+    """The unknowns of the whole arm, and the profile with its fitted friction. (size,)"""
+    chain = data.robot.loaded_chain
+    shapes, values, rotor = list[Shape](), list[float](), chain.rotor_inertia.copy()
+    for j, fit in enumerate(fits):
+        if fit is None:
+            known = profile_friction(data.robot)[j].parameters
+            smoothing = float(known.get("smoothing", SMOOTHING))
+            shapes.append(Shape(PLAIN if data.rubs else (), smoothing))
+            values += [float(known.get(term, 0.0)) for term in shapes[j].terms]
+        else:
+            shapes.append(fit.shape)
+            own, others = np.split(fit.fit.values, [len(fit.shape.terms)])
+            values += own.tolist()
+            if data.rotor and others[0] > 0:
+                rotor[j] = others[0]
+    start = np.concatenate([chain_parameters(chain), rotor if data.rotor else [], values])
+    return ParameterColumns(data.robot.chain, data.rotor, tuple(shapes)), start
+
+
+def with_vector(
+    robot: Robot, layout: ParameterColumns, x: Array, friction: tuple[JointFriction, ...]
+) -> Robot:
+    """The robot with a whole vector of parameters; a mounted payload is in it already."""
+    phi = np.array([round_digits(v, 12) for v in x[: layout.inertial]])
+    rotor = np.array([round_digits(v) for v in x[layout.rotor_places]]) if layout.rotor else None
+    chain = with_parameters(robot.chain, phi, rotor)
+    return replace(robot, chain=chain, payload=None, friction=friction)
+
+
+def chosen_method(data: Training) -> MethodResult:
+    """Result of "friction", or of "base" where the profile's links are not the arm's.
+
+    The links are freed where they leave `OTHER_LINKS` times what free ones leave, the logs tell
+    them, and nothing suggests a load.
+    """
+    fitted = fit_without_contacts(data, strict=True)
+    kept = friction_method(data, fitted)
+    free, fits = fitted.data, fitted.fits
+    spread = np.std(np.concatenate([log.motion.tau for log in free.logs]), axis=0)
+    much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
+    ratios = links_explain(free, fits)[much[heavy_joints(free)]]
+    ratio = float(np.max(ratios, initial=0.0))
+    doubted = any(remark.level == "warning" for remark in fitted.remarks)
+    if ratio <= OTHER_LINKS or doubted or data.fit_constants:
+        return kept
+    try:
+        freed = whole_arm(data)
+    except IdentificationError:
+        return kept
+    if freed.is_narrow:
+        return kept
+    remark = caution("links-identified", robot=data.robot.name, ratio=ratio)
+    return freed._replace(remarks=[remark, *freed.remarks])

@@ -1,0 +1,350 @@
+"""Outputs of an admittance replay: page, motion.parquet, comparison, figures, run.json.
+
+The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
+"""
+
+import tomllib
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from vftcli.admittance.closed_loop import ClosedLoop
+from vftcli.admittance.law import Controller
+from vftcli.admittance.parameters import AXES, PER_AXIS
+from vftcli.admittance.replay import Replay
+from vftcli.doctor.examination import Examination
+from vftcli.outputs.admittance_tables import (
+    comparison_csv,
+    comparison_grid,
+    latency_grid,
+    latency_rows,
+    parameter_grid,
+    stability_grid,
+)
+from vftcli.outputs.examination import health_record
+from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
+from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.grid import json_rows
+from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
+from vftcli.outputs.page import shell
+from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
+from vftcli.outputs.palette import SPARE
+from vftcli.outputs.quantity import counted
+from vftcli.outputs.seals import SEAL
+from vftcli.signals.arrays import Array
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import sentence
+from vftcli.signals.wrench import AXES as FORCES
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+FILES = ("index.html", "motion.parquet", "comparison.csv", "comparison.json", SEAL)
+REPLAY_FIGURES = ("release",)  #: Name of its figure.
+CONVENTIONS = {
+    "deviation": "X̃ of the flange point from the target pose X_d, base axes; rotation as the "
+    "vector log(R R_dᵀ)",
+    "force": "force on the robot and moment about the flange point, base axes",
+    "row": "a deviation follows from the force of the row before it",
+    "units": "s, m, rad, N, N·m, J",
+}
+#: Chart → unit of a translational and of a rotational axis.
+UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "energy": ("J", "J")}
+
+
+def files_of_replay(form: str | None) -> list[str]:
+    """Every file that a replay's folder may hold; `form` is what figures are written as."""
+    return [*FILES, *figure_files(form, REPLAY_FIGURES)]
+
+
+def write_admittance(
+    path: Path,
+    replay: Replay,
+    recording: Recording | None,
+    run: ClosedLoop | None = None,
+    command: str = "",
+    force: bool = False,
+    examinations: Sequence[Examination] = (),
+    form: str | None = None,
+) -> None:
+    """Write the folder of a replay, all or nothing; figures in a form, or none."""
+    record = admittance_record(replay, recording, run, command, examinations)
+    title = recording.name if recording is not None else "release"
+    if run is not None and run.simulation is not None:
+        title = f"{run.simulation.scenario.name}, closed loop"
+    with OutputFolder(path, force, files_of_replay(form)) as folder:
+        folder.write("index.html", render_admittance(replay, record, title, run, examinations))
+        folder.write("comparison.csv", comparison_csv(replay.rows))
+        folder.write("comparison.json", json_rows(replay.rows))
+        with table_file(folder / "motion.parquet") as file:
+            motion_table(replay).write_parquet(file, compression="zstd")
+        if form is not None:
+            write_figures(folder, replay_figures(replay, run), form)
+        seal(folder, SEAL, record)
+
+
+def motion_table(replay: Replay) -> pl.DataFrame:
+    """Everything along time, flat columns; what is not known is null.
+
+    ``t`` [s]; ``force/fx``… [N, N·m]; ``x/<controller>/x``… [m, rad]; ``v/<controller>/x``…;
+    ``q/<controller>/1``… [rad]; ``reached/<controller>`` 1 or 0; ``logged/x``… [m, rad].
+    """
+    motion, columns = replay.motion, {"t": replay.motion.t}
+    columns |= {f"force/{a}": padded(replay.wrench[:, k]) for k, a in enumerate(FORCES)}
+    for n, controller in enumerate(replay.controllers):
+        # A slash would make one more level of the column's name.
+        label = controller.name.replace(" ", "").replace("/", "-")
+        for k, axis in enumerate(AXES):
+            columns[f"x/{label}/{axis}"] = motion.x[:, n, k]
+            columns[f"v/{label}/{axis}"] = motion.v[:, n, k]
+        for j in range(replay.robot.joints):
+            columns[f"q/{label}/{j + 1}"] = replay.path.q[:, n, j]
+        columns[f"reached/{label}"] = replay.path.reached[:, n].astype(np.float64)
+    if replay.logged is not None:
+        columns |= {f"logged/{a}": padded(replay.logged[:, k]) for k, a in enumerate(AXES)}
+    return pl.DataFrame({k: np.ascontiguousarray(v) for k, v in columns.items()}).fill_nan(None)
+
+
+def admittance_record(
+    replay: Replay,
+    recording: Recording | None,
+    run: ClosedLoop | None,
+    command: str,
+    examinations: Sequence[Examination] = (),
+) -> dict[str, Any]:
+    """Everything that `run.json` of a replay holds."""
+    p = replay.parameters
+    return {
+        "command": command,
+        "versions": versions(),
+        "examination": health_record(examinations),
+        "input": input_record(recording) if recording is not None else None,
+        "robot": robot_record(replay.robot),
+        "force": replay.source,
+        "closed_loop": None if run is None else loop_record(run),
+        "start_rad": replay.start,
+        "parameters": {
+            "axes": AXES,
+            **{name: getattr(p, name) for name in PER_AXIS},
+            "xi_used": p.damping_ratio,
+            "period_s": p.period,
+            "threshold_mode": p.threshold_mode,
+            "source": p.source,
+        },
+        "controllers": [
+            {
+                "name": verdict.controller.name,
+                "kind": verdict.controller.kind,
+                "alpha": verdict.controller.alpha,
+                "xi": verdict.controller.xi,
+                "recovery_damping": verdict.controller.damping,
+                "discrete_number_drag": verdict.drag,
+                "discrete_number_recovery": verdict.recovery,
+                "escape_bound": verdict.escape,
+            }
+            for verdict in replay.verdicts
+        ],
+        "conventions": CONVENTIONS,
+        "notes": list(replay.remarks),
+        **log_remarks([recording] if recording is not None else []),
+    }
+
+
+def loop_record(run: ClosedLoop) -> dict[str, Any]:
+    """What a closed loop was and how fast it was."""
+    about: dict[str, Any] = {
+        "controller": run.controller.name,
+        "stable": run.stable,
+        "zero_removed": run.zero,
+        "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
+    }
+    if run.simulation is not None:
+        about |= {"scenario": run.simulation.scenario.name, "seed": run.simulation.seed}
+    return about | {"latencies": latency_rows(run)}
+
+
+def deviations_from_paper() -> dict[str, str]:
+    """What is done otherwise than in the paper → why, from the table beside this file."""
+    text = Path(__file__).with_name("deviations_from_paper.toml").read_text(encoding="utf-8")
+    return {entry["what"]: entry["why"] for entry in tomllib.loads(text)["difference"]}
+
+
+def render_admittance(
+    replay: Replay,
+    record: Mapping[str, Any],
+    title: str,
+    run: ClosedLoop | None = None,
+    examinations: Sequence[Examination] = (),
+) -> str:
+    """The page: self-contained, nothing is loaded from anywhere."""
+    drawn, t, p = charts(replay, run), replay.motion.t, replay.parameters
+    lost = int(np.count_nonzero(~replay.path.reached))
+    eyebrow = (
+        title,
+        replay.robot.title or replay.robot.name,
+        f"{t[0]:.3f} – {t[-1]:.3f} s",
+        str(replay.source),
+        f"control period {1e3 * p.period:g} ms",
+        f"threshold {p.threshold_mode}",
+        f"{lost} poses out of reach" if lost else "",
+    )
+    controllers = counted(len(replay.controllers), "admittance controller")
+    warnings = [sentence(remark) for remark in replay.remarks if remark.level == "warning"]
+    parts = (
+        shell.alarms(examinations),
+        shell.top(eyebrow, f"The same force through {controllers}.", shell.lead(*warnings)),
+        closed_loop_section(run),
+        comparison_section(replay),
+        "<h2>Force and motion over time</h2>",
+        *(
+            # The deviation is open at once.
+            shell.section(
+                c.title, shell.multiples(c) + shell.large(c), name=c.key, opened=c.key == "x"
+            )
+            for c in drawn
+        ),
+        shell.soft(
+            "Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold band (Figs "
+            "6a, 9a, 12), speed with its limit, and the Lyapunov function W of the recovery phases "
+            "beside the printed V, which rises."
+        ),
+        "<h2>Details</h2>",
+        shell.section("Parameters", shell.table(parameter_grid(replay))),
+        shell.section(
+            "Stability before motion",
+            shell.table(stability_grid(replay))
+            + shell.soft(
+                "The escape bound is the largest deviation from which a release at rest would not "
+                "run away if there were no speed limit."
+            ),
+        ),
+        shell.section(
+            "What differs from the paper, and why",
+            shell.bullets(f"{what} {why}" for what, why in deviations_from_paper().items()),
+        ),
+        shell.health(examinations, opened=True),
+        shell.all_remarks(replay.remarks),
+        shell.provenance(record),
+    )
+    styles = {controller.name: (colour, "") for controller, colour in painted(replay)}
+    return shell.document(f"{title}: admittance", "".join(parts), drawn, styles)
+
+
+def closed_loop_section(run: ClosedLoop | None) -> str:
+    """Latencies of the loop, or nothing without one."""
+    if run is None:
+        return ""
+    state = "" if run.stable else f"<p>The arm ran away at {run.t[-1]:.2f} s.</p>"
+    words = shell.soft(
+        "The paper measured 0.24 and 0.28 s from detection to motion, 0.26 and 0.12 s from "
+        "withdrawal to the turn on its UR5 (docs/admittance.md)."
+    )
+    return f"<h2>Closed loop in simulation</h2>{state}{shell.table(latency_grid(run))}{words}"
+
+
+def comparison_section(replay: Replay) -> str:
+    """Every controller on the same force, axis by axis (Figs 7 and 10)."""
+    if not replay.rows:
+        return "<h2>Comparison</h2><p>No axis was dragged.</p>"
+
+    def name_of(row: Mapping[str, Any]) -> str:
+        """A variable controller by the name that the charts' legend has for its α."""
+        k, alpha = AXES.index(row["axis"]), row["alpha"]
+        for controller in replay.controllers if alpha is not None else ():
+            if controller.kind == "variable" and controller.alpha[k] == alpha:
+                return controller.name
+        return str(row["controller"])
+
+    grid = comparison_grid(replay.rows, name_of, "The same force through every controller")
+    words = shell.soft(
+        "Times to the peak and idle times count from the start of a drag, return times from its "
+        "release: the last moment at which the deviation is beyond that share of its value at the "
+        "release. “–” did not happen before the next drag or the end. Advance: how much sooner "
+        "than with the traditional controller the peak is reached. Overshoot: to the other side, "
+        "as a share of the deviation at the release. Work: what the hand does on the arm while it "
+        "drags."
+    )
+    return f"<h2>Comparison</h2>{shell.table(grid)}{words}"
+
+
+def painted(replay: Replay) -> list[tuple[Controller, str]]:
+    """Every controller with its colour: the traditional one's is that of the page's ink."""
+    # Every variable controller its own colour, again from the start when there are no more.
+    spare = iter(SPARE * len(replay.controllers))
+    return [(c, next(spare) if c.kind == "variable" else "ink") for c in replay.controllers]
+
+
+def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
+    """The charts, top to bottom; one panel an axis, three axes on one scale."""
+    p, dashes = replay.parameters, ("", *DASHES)
+
+    def lines(values: Array) -> tuple[ChartLine, ...]:
+        """One line a controller, each with its own dashes. (T+1, N, 6)"""
+        return tuple(
+            ChartLine(controller.name, values[:, n], colour, dashes[n % len(dashes)])
+            for n, (controller, colour) in enumerate(painted(replay))
+        )
+
+    deviation = lines(replay.motion.x)
+    force = [
+        ChartLine("force", padded(replay.wrench), "#8a929a", "1.5 2"),
+        ChartLine("force that enters the law", padded(replay.phases.force), SPARE[1]),
+    ]
+    if run is not None:
+        deviation += (ChartLine("closed loop", padded(run.moved), "#8a929a", "5 3"),)
+        force.insert(0, ChartLine("true force", padded(run.truth), dash="2 2"))
+    limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
+    w, v = replay.lyapunov.corrected, replay.lyapunov.printed
+    found: tuple[tuple[str, str, Sequence[ChartLine], Array | None, str], ...] = (
+        ("x", "Deviation", deviation, None, ""),
+        ("force", "Force on the robot", force, np.asarray(p.threshold), "± threshold"),
+        ("v", "Velocity", lines(replay.motion.v), limit, "± speed limit"),
+        ("energy-w", "Lyapunov function W (recovery phases)", lines(w), None, ""),
+        ("energy-v", "The printed V (52): it rises", lines(v), None, ""),
+    )
+    return [
+        Chart(
+            key,
+            title,
+            tuple(UNITS[key.split("-")[0]][k // 3] for k in range(6)),
+            AXES,
+            replay.motion.t,
+            tuple(shown),
+            families=(1, 1, 1, 2, 2, 2),
+            band=band if band is not None and np.isfinite(band).any() else None,
+            band_label=label,
+        )
+        for key, title, shown, band, label in found
+    ]
+
+
+def padded(values: Array) -> Array:
+    """Rows with an unknown one more: the last deviation follows from the force before it."""
+    return np.concatenate([values, np.full((1, *values.shape[1:]), np.nan)])
+
+
+def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, Drawing]:
+    """Force and deviation along the axes that were dragged; none where nothing moved."""
+    moved = [k for k in range(len(AXES)) if np.nanmax(np.abs(replay.motion.x[:, :, k])) > 0.0]
+    dragged = {row["axis"] for row in replay.rows}
+    shown = [k for k in moved if AXES[k] in dragged] or moved
+    title = f"Deviation of the flange from its target, {replay.robot.name}, base axes"
+    return {"release": Drawing(title, partial(release, replay, run, shown))} if shown else {}
+
+
+def release(replay: Replay, run: ClosedLoop | None, axes: list[int], width: float) -> "Figure":
+    """Deviations under every controller, above them the force where there is one."""
+    deviation, force, *_ = charts(replay, run)
+    columns = min(len(axes), 3 if width > NARROW else 2)
+    drawn = [force, deviation] if np.any(replay.wrench) else [deviation]
+    plots = []
+    # The plots of an axis stand below one another.
+    for k in range(0, len(axes), columns):
+        for chart in drawn:
+            plots += plots_of(chart, only=axes[k : k + columns])
+    return line_figure(width, plots, columns=columns)

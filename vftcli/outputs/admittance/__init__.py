@@ -1,1 +1,0 @@
-"""What an admittance replay is shown as."""

@@ -1,0 +1,219 @@
+"""Tables and lines on an admittance replay: the comparison, latencies, parameters."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from vftcli.admittance.closed_loop import ClosedLoop, latencies
+from vftcli.admittance.parameters import AXES
+from vftcli.admittance.replay import Replay
+from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
+from vftcli.outputs.quantity import minus
+from vftcli.signals.arrays import Array
+
+
+def number_form(form: str) -> Callable[[float], str]:
+    """How a number is printed with a true minus sign."""
+    return lambda value: minus(format(value, form))
+
+
+THIRD = number_form(".3f")
+
+#: Key of a row → its column.
+COLUMNS = {
+    "controller": Column("controller", words=True),
+    "alpha": Column("α", form=number_form("g")),
+    "xi": Column("ξ", form=number_form(".3g")),
+    "axis": Column("axis"),
+    "drag": Column("drag"),
+    "start_s": Column("start", "s", THIRD),
+    "release_s": Column("release", "s", THIRD),
+    "peak": Column("peak", "m, rad", number_form(".4f")),
+    "time_to_peak_s": Column("to peak", "s", THIRD),
+    "peak_advance_s": Column("advance", "s", THIRD),
+    "overshoot": Column("overshoot", "%", lambda share: number_form(".1f")(100.0 * share)),
+    "return_10_s": Column("back to 10 %", "s", THIRD, symbol="$t_{10}$"),
+    "return_2_s": Column("back to 2 %", "s", THIRD, symbol="$t_2$"),
+    "idle_s": Column("idle", "s", THIRD),
+    "work_J": Column("work", "J", THIRD),
+}
+#: What is timed of a contact → its heading.
+LATENCIES = {
+    "force": "force [s]",
+    "detection": "detected [s]",
+    "motion": "moved [s]",
+    "withdrawal": "withdrawal [s]",
+    "reaction": "detection to motion [s]",
+    "turn": "withdrawal to turn [s]",
+}
+#: What the headings of the LaTeX table mean.
+RETURNS = (
+    "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there"
+)
+
+
+def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The comparison as CSV; what is not known is empty."""
+    return csv_rows(rows, list(rows[0]) if rows else list(COLUMNS))
+
+
+def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The comparison of all controllers as text for a terminal."""
+    return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
+
+
+def comparison_grid(
+    rows: Sequence[Mapping[str, Any]],
+    name_of: Callable[[Mapping[str, Any]], str] = lambda row: str(row["controller"]),
+    title: str = "",
+) -> Grid:
+    """Every controller on the same force; by axis and drag, so that they stand under each other.
+
+    `name_of` tells what a row's controller is called.
+    """
+    # Sorting keeps the order of the controllers within a drag.
+    ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
+    keys = list(COLUMNS)[1:]
+    return Grid(
+        title=title,
+        columns=tuple(COLUMNS.values()),
+        rows=tuple((name_of(row), *(row[key] for key in keys)) for row in ordered),
+        swatches=True,
+    )
+
+
+def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
+    """The latencies of a closed loop as rows, None where something did not happen."""
+    return [
+        {
+            "axis": AXES[entry.axis],
+            **{f"{name}_s": getattr(entry, name) for name in LATENCIES},
+            "at_rest_before": entry.rested,
+        }
+        for entry in latencies(run)
+    ]
+
+
+def latency_grid(run: ClosedLoop) -> Grid:
+    """The latencies of a closed loop, from the true force and as the paper times them."""
+    return Grid(
+        title="From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of "
+        "the flange; from its fall below to the estimate's; as the paper times, from the estimate "
+        "past its threshold to 5 mm, from its fall below to where the flange goes no farther",
+        columns=(
+            Column("axis", words=True),
+            *(Column(head, form=".3f") for head in LATENCIES.values()),
+            Column("at rest before"),
+        ),
+        rows=tuple(
+            (axis, *times, "yes" if rested else "no")
+            for axis, *times, rested in map(dict.values, latency_rows(run))
+        ),
+    )
+
+
+def latency_text(run: ClosedLoop) -> str:
+    """The latencies of a closed loop in words, one line a contact."""
+    if not run.stable:
+        return f"closed loop: the arm ran away at {run.t[-1]:.2f} s"
+    lines = []
+    for row in latency_rows(run):
+        detection, motion, withdrawal, reaction, turn = (
+            "never" if row[f"{name}_s"] is None else f"{row[f'{name}_s']:.3f} s"
+            for name in list(LATENCIES)[1:]
+        )
+        moving = "" if row["at_rest_before"] else " (the arm was moving already)"
+        lines.append(
+            f"closed loop: force past the threshold of {row['axis']} at {row['force_s']:.2f} s, "
+            f"detected after {detection}, moved after {motion}{moving}, "
+            f"withdrawal seen after {withdrawal}; from detection to motion {reaction}, from "
+            f"withdrawal to turn {turn}"
+        )
+    return "\n".join(lines) or "closed loop: no force passed a threshold"
+
+
+def parameter_text(replay: Replay) -> str:
+    """Mass, damping, stiffness, threshold and control period in use, on one line."""
+    p = replay.parameters
+    named = {
+        "M": p.mass,
+        "B": p.damping,
+        "K": p.stiffness,
+        "ξ": p.damping_ratio,
+        "F_tsd": p.threshold,
+        "limit": p.speed_limit,
+    }
+    words = ", ".join(f"{label} {position_rotation(values)}" for label, values in named.items())
+    return f"{words}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
+
+
+def position_rotation(values: Array | float) -> str:
+    """Six numbers as position / rotation, three equal ones told once."""
+    texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
+    halves = (texts[:3], texts[3:])
+    return " / ".join(half[0] if len(set(half)) == 1 else ",".join(half) for half in halves)
+
+
+def parameter_grid(replay: Replay) -> Grid:
+    """Tables III and IV of the paper with the values used."""
+    p = replay.parameters
+    rows: list[tuple[str | float, ...]] = []
+    for k, axis in enumerate(AXES):
+        force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
+        limit = float(np.broadcast_to(p.speed_limit, 6)[k])
+        numbers = (float(v[k]) for v in (p.mass, p.damping, p.stiffness, p.alpha))
+        bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"
+        tail = (f"{p.threshold[k]:g} {force}", bound)
+        rows.append((axis, *numbers, f"{p.damping_ratio[k]:.3g}", *tail))
+    heads = {
+        **{f"{letter}_d": f"${letter}_d$" for letter in "MBK"},
+        "α": "",
+        "ξ": "",
+        "F_tsd": r"$F_\mathrm{tsd}$",
+        "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
+    }
+    return Grid(
+        title=f"Values used; {p.source or 'the command line'}",
+        columns=(
+            Column("coordinates", words=True),
+            *(Column(h, form="g", symbol=s) for h, s in heads.items()),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def stability_grid(replay: Replay) -> Grid:
+    """The numbers that decide before anything moves: the worst of the axes of each kind."""
+    rows: list[tuple[str | float, ...]] = []
+    for verdict in replay.verdicts:
+        for axes, part, unit in (
+            ("position", slice(0, 3), "m"),
+            ("rotation", slice(3, 6), "rad"),
+        ):
+            bound = float(np.min(verdict.escape[part]))
+            numbers = (float(np.max(values[part])) for values in (verdict.drag, verdict.recovery))
+            escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
+            rows.append((verdict.controller.name, axes, *numbers, escape))
+    return Grid(
+        title="2TsB/M + Ts²K/M, stable below 4",
+        columns=(
+            Column("controller", words=True),
+            Column("axes", words=True),
+            Column("drag phase", form=".3g"),
+            Column("recovery, at the limit", form=".3g"),
+            Column("escape bound"),
+        ),
+        rows=tuple(rows),
+        swatches=True,
+    )
+
+
+def latex_text(replay: Replay) -> str:
+    """The parameters (Tables III and IV of the paper) and the comparison as LaTeX tables."""
+    grids = [parameter_grid(replay)]
+    if replay.rows:
+        found = comparison_grid(replay.rows, title="The same force through every controller")
+        grids.append(replace(found, notes=(RETURNS,)))
+    return "\n".join(latex(grid) for grid in grids)

@@ -1,0 +1,351 @@
+"""Plots on paper: lines of the page's charts, and one number a joint and observer as dots."""
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from vftcli.outputs.figures.paper import sheet, shortened
+from vftcli.outputs.log.rmse_tables import DAGGER
+from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine
+from vftcli.outputs.page.svg import ends_of_family, thinned, thinned_log
+from vftcli.signals.arrays import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Stretches of a line in one plot, two samples each: finer than a printer tells in two inches.
+STRETCHES = 500
+#: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
+#: wide. [in]
+NARROW, HIGH = 5.0, {False: 0.95, True: 1.15}
+#: Marks in turn: what they stand for is told by their shape where colours are not printed.
+MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
+#: Width of a digit of a contact's number, and room between two numbers: where there is less, the
+#: second is left out. [in]
+DIGIT, BETWEEN = 0.046, 0.02
+SPREAD = 0.66  #: Share of a joint's room that its dots take.
+RANGE = 10.0  #: Numbers that differ by more than this factor stand on a logarithmic axis.
+PLOTTED = 0.75  #: About which share of a plot's room its axes take.
+AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
+
+
+class Plot(NamedTuple):
+    """One plot of a figure."""
+
+    chart: Chart  #: What it is a panel of.
+    panel: int  #: Which, from 0.
+    #: A chart whose same panel is drawn over it with an axis of its own, or None.
+    over: Chart | None = None
+
+
+def plots_of(
+    chart: Chart, over: Chart | None = None, only: Sequence[int] | None = None
+) -> list[Plot]:
+    """Every panel of a chart, or only some, as plots."""
+    return [Plot(chart, j, over) for j in (range(len(chart.panels)) if only is None else only)]
+
+
+def line_figure(
+    width: float,
+    plots: Sequence[Plot],
+    *,
+    numbers: Mapping[int, float] | None = None,
+    marks: Mapping[str, tuple[Array, Array]] | None = None,
+    columns: int | None = None,
+    below: str | None = None,
+) -> "Figure":
+    """Plots row by row under one legend.
+
+    Args:
+        width: Of the figure. [in]
+        plots: What is drawn.
+        numbers: Numbers that stand above the first row → where. [s]
+        marks: Name → where in each plot a mark stands, across and up. 2 × (n,)
+        columns: Plots beside one another; None for what fits.
+        below: What the horizontal axis is called, None for what its unit says.
+    """
+    wide = width > NARROW
+    if columns is None:
+        columns = min(len(plots), 2 if not wide else 4 if len(plots) > 6 else 3)
+    labels = legend_handles(plots, list(marks or ()))
+    figure, grid = sheet(width, len(plots), columns, HIGH[wide], labels)
+    if numbers:
+        figure.set_figheight(figure.get_figheight() + 0.12)
+    for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
+        draw_plot(axes, plot)
+        axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
+        last = k + columns >= len(grid)
+        if last or (k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit):
+            axes.set_xlabel(below or AXES[plot.chart.unit])
+        else:
+            axes.tick_params(labelbottom=False)
+        if numbers and k < columns:
+            write_numbers(axes, numbers, PLOTTED * width / columns)
+        for n, (x, y) in enumerate((marks or {}).values()):
+            axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
+        if plot.over is not None:
+            draw_over(axes, plot, named=(k + 1) % columns == 0)
+    for k in range(len(plots), len(grid)):
+        if k >= columns:
+            hang_axis(grid[k], plots[k - columns], below or AXES[plots[k - columns].chart.unit])
+    figure.align_ylabels(list(grid[: len(plots)]))
+    return figure
+
+
+def draw_plot(axes: "Axes", plot: Plot) -> None:
+    """One panel with its contacts, bands and lines."""
+    from matplotlib.ticker import MaxNLocator
+
+    chart, j = plot.chart, plot.panel
+    for start, stop in chart.spans:
+        axes.axvspan(start, stop, facecolor="0.9", linewidth=0.0)
+    if chart.band is not None and np.isfinite(chart.band[j]):
+        for sign in (1.0, -1.0):
+            axes.axhline(sign * chart.band[j], **band_look())
+    for series in chart.series:
+        if series.shown:
+            draw_line(axes, chart, series, j)
+    set_scale(axes, chart)
+    axes.set_ylim(*ends_of_family(chart, j))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+
+
+def set_scale(axes: "Axes", chart: Chart) -> None:
+    """The horizontal axis of a chart."""
+    from matplotlib.ticker import FuncFormatter, NullFormatter
+
+    if chart.log:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FuncFormatter(plain))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
+
+
+def hang_axis(axes: "Axes", above: Plot, label: str) -> None:
+    """In a place without a plot, the numbers and the label of the axis above it."""
+    set_scale(axes, above.chart)
+    axes.patch.set_visible(False)
+    axes.spines[:].set_visible(False)
+    axes.yaxis.set_visible(False)
+    # Numbers inside of the empty place take no room of their own.
+    axes.tick_params(which="both", bottom=False, labelbottom=False)
+    axes.tick_params(labeltop=True, pad=-10.0)
+    axes.annotate(
+        label,
+        (0.5, 1.0),
+        xycoords="axes fraction",
+        xytext=(0, -12),
+        textcoords="offset points",
+        ha="center",
+        va="top",
+    )
+
+
+def plain(value: float, _place: int) -> str:
+    """A number along a logarithmic axis, without a power where one can do without."""
+    return f"{value:g}"
+
+
+def draw_over(axes: "Axes", plot: Plot, *, named: bool) -> None:
+    """The same panel of another chart with its axis to the right, named at the end of a row."""
+    assert plot.over is not None
+    right = axes.twinx()
+    draw_plot(right, Plot(plot.over, plot.panel))
+    if named:
+        right.set_ylabel(f"{plot.over.title} ({plot.over.units[plot.panel]})")
+    else:
+        right.tick_params(labelright=False)
+
+
+def draw_line(axes: "Axes", chart: Chart, series: ChartLine, j: int) -> None:
+    """One line of a panel with its ribbon."""
+    x = chart.x if series.x is None else series.x
+    thin = thinned_log if chart.log else thinned
+    t, y = thin(x, series.values[:, j], STRETCHES)
+    for width, style in zip(series.ribbons(j) or (), ribbon_looks(series), strict=False):
+        half = np.interp(t, x, width)
+        axes.fill_between(t, y - half, y + half, **style)
+    axes.plot(t, y, **look(series))
+
+
+def dot_look(k: int) -> dict[str, Any]:
+    """How the marks of one name look: black, told by their shape."""
+    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": "white"}
+    return {"color": "black", "linestyle": "none", "markeredgewidth": 0.7, **shape}
+
+
+def ribbon_looks(series: ChartLine) -> tuple[dict[str, Any], dict[str, Any]]:
+    """How the band about a line looks, and where no contact is listed."""
+    common = {"alpha": 0.25, "linewidth": 0.0}
+    return {"facecolor": paint(series), **common}, {"facecolor": "0.4", **common}
+
+
+def band_look() -> dict[str, Any]:
+    """How the ends of a band about zero look."""
+    return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
+
+
+#: Colours of the page that follow its theme → theirs on white paper.
+PAINTS = {INK: "black", REFERENCE: "0.65"}
+
+
+def paint(series: ChartLine) -> str:
+    """A line's colour on paper."""
+    return PAINTS.get(series.colour, series.colour)
+
+
+#: Dashes of the page → those on paper, where they are too much like others.
+PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
+
+
+def look(series: ChartLine) -> dict[str, Any]:
+    """How a line looks: in grey too it is told by its dashes or its width."""
+    dash = PAPER_DASHES.get(series.dash, series.dash)
+    dashes = tuple(float(part) for part in dash.split())
+    broad = series.colour == REFERENCE
+    return {
+        "color": paint(series),
+        "linestyle": (0, tuple(0.6 * part for part in dashes)) if dashes else "solid",
+        "linewidth": 1.8 if broad else 0.9,
+        "solid_capstyle": "butt",
+    }
+
+
+def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any]:
+    """Everything that the legend names: lines, their ribbon, bands, contacts; alone, no line."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    found: dict[str, Any] = {}
+    charts = {id(c): c for plot in plots for c in (plot.chart, plot.over) if c is not None}
+    for chart in charts.values():
+        shown = [series for series in chart.series if series.shown]
+        for series in shown:
+            found[shortened(series.name)] = Line2D([], [], **look(series))
+        for series in shown:
+            if series.half is not None:
+                own, grey = ribbon_looks(series)
+                found["95 % band"] = Patch(**own)
+                if series.quiet is not None:
+                    found[QUIET] = Patch(**grey)
+        if chart.band is not None:
+            found[chart.band_label] = Line2D([], [], **band_look())
+        if chart.spans:
+            found["contact"] = Patch(facecolor="0.9", linewidth=0.0)
+    for k, name in enumerate(marks):
+        found[f"{name}, chosen"] = Line2D([], [], **dot_look(k))
+    return found if len(found) > 1 else {}
+
+
+def write_numbers(axes: "Axes", numbers: Mapping[int, float], inches: float) -> None:
+    """Numbers of contacts above a plot of about this width, as far as they have room."""
+    start, stop = axes.get_xlim()
+    taken = -np.inf
+    for number, at in numbers.items():
+        half = 0.5 * DIGIT * len(str(number)) * (stop - start) / inches
+        if at - half >= taken:
+            axes.annotate(
+                str(number),
+                (at, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(0, 1),
+                textcoords="offset points",
+                ha="center",
+                va="bottom",
+                fontsize=6.5,
+            )
+            taken = at + half + BETWEEN * (stop - start) / inches
+
+
+class DotRow(NamedTuple):
+    """One number a joint, of one observer."""
+
+    name: str  #: Whose they are.
+    values: Array  #: NaN where not known. (n,)
+    low: Array | None = None  #: Lower ends of their intervals, or None. (n,)
+    high: Array | None = None  #: Upper ends. (n,)
+
+
+class DotPlot(NamedTuple):
+    """One plot."""
+
+    title: str  #: Which log.
+    joints: Sequence[str]  #: What stands below. (n,)
+    rows: Sequence[DotRow]  #: Dots, observer by observer.
+    floor: Array  #: The reference's own error, NaN where it is not known. (n,)
+
+
+def dot_figure(
+    width: float, plots: Sequence[DotPlot], paints: Mapping[str, str], label: str
+) -> "Figure":
+    """Plots under one legend, their logs' names above them where there are several.
+
+    Args:
+        width: Of the figure. [in]
+        plots: What is drawn.
+        paints: Name of every row → its colour.
+        label: What the vertical axis is, with its unit.
+    """
+    from matplotlib.lines import Line2D
+
+    columns = 1 if width <= NARROW or len(plots) == 1 else 2
+    looks = {name: dots_look(k, paint) for k, (name, paint) in enumerate(paints.items())}
+    handles: dict[str, Any] = {shortened(n): Line2D([], [], **how) for n, how in looks.items()}
+    if any(np.isfinite(plot.floor).any() for plot in plots):
+        handles["floor of the reference"] = Line2D([], [], color="black", linewidth=1.2)
+    figure, grid = sheet(width, len(plots), columns, 1.7 if len(plots) == 1 else 1.45, handles)
+    for axes, plot in zip(grid, plots, strict=False):
+        draw_dots(axes, plot, looks)
+        axes.set_ylabel(label)
+        doubtful = any(DAGGER in joint for joint in plot.joints)
+        axes.set_xlabel(f"Joint{f' ({DAGGER} rests: reference not to be trusted)' * doubtful}")
+        if len(plots) > 1:
+            axes.set_title(shortened(plot.title), fontsize=7.0, pad=3.5)
+    for axes in grid[len(plots) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def dots_look(k: int, paint: str) -> dict[str, Any]:
+    """How the dots of one row look: every second one is hollow."""
+    hollow = {"markerfacecolor": "white"} if k % 2 else {}
+    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markeredgewidth": 0.8}
+    return {"color": paint, "linestyle": "none", **shape, **hollow}
+
+
+def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, dict[str, Any]]) -> None:
+    """The dots of one log, side by side at each joint, and the floor below them."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    places = np.arange(len(plot.joints), dtype=np.float64)
+    step = SPREAD / max(len(plot.rows), 1)
+    axes.hlines(plot.floor, places - 0.42, places + 0.42, color="black", linewidth=1.2)
+    for k, row in enumerate(plot.rows):
+        whiskers = None
+        if row.low is not None and row.high is not None:
+            # An interval of resampled errors need not hold the error itself.
+            ends = (row.values - row.low, row.high - row.values)
+            whiskers = np.nan_to_num(np.maximum(np.array(ends), 0.0))
+        axes.errorbar(
+            places + step * (k - 0.5 * (len(plot.rows) - 1)),
+            row.values,
+            yerr=whiskers,
+            elinewidth=0.6,
+            capsize=1.4,
+            capthick=0.6,
+            **looks[row.name],
+        )
+    axes.set_xticks(places, list(plot.joints))
+    axes.set_xlim(-0.5, len(places) - 0.5)
+    axes.tick_params(axis="x", length=0.0)
+    shown = np.concatenate([plot.floor, *(row.values for row in plot.rows)])
+    shown = shown[np.isfinite(shown)]
+    if shown.size and shown.min() > 0.0 and shown.max() > RANGE * shown.min():
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FuncFormatter(plain))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.set_ylim(bottom=0.0)

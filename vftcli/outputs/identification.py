@@ -1,0 +1,312 @@
+"""Outputs of an identification: robot file, page, figures, `run.json`, and what is printed."""
+
+from collections.abc import Mapping, Sequence
+from functools import partial
+from html import escape
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from vftcli.doctor.examination import Examination
+from vftcli.identification.result import Identification, Trace
+from vftcli.outputs.examination import health_record, overridden_lines
+from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
+from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
+from vftcli.outputs.log.run_record import (
+    CONVENTIONS,
+    file_sha256,
+    input_record,
+    log_remarks,
+    robot_record,
+    seal,
+    versions,
+)
+from vftcli.outputs.page import shell, svg
+from vftcli.outputs.page.charts import Chart, ChartLine, families_of
+from vftcli.outputs.page.log_charts import joint_panels
+from vftcli.outputs.palette import SPARE
+from vftcli.outputs.quantity import DASH, counted, signed
+from vftcli.outputs.seals import SEAL
+from vftcli.robots.writing import robot_toml
+from vftcli.signals.errors import OutputError
+
+IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Names of its figures.
+DOTS = 600  #: Samples drawn in a residual-over-velocity plot.
+
+
+def beside(path: Path) -> dict[str, Path]:
+    """The robot file and what goes with it, by kind."""
+    if path.suffix.lower() != ".toml":
+        raise OutputError(f"{path}: -o needs a name that ends in .toml, as my_robot.toml")
+    return {"toml": path, "html": path.with_suffix(".html"), "run": path.with_suffix(f".{SEAL}")}
+
+
+def files_beside(path: Path, form: str | None) -> list[str]:
+    """Names of all files that go with a robot file; `form` is what figures are written as."""
+    drawn = figure_files(form, IDENTIFICATION_FIGURES, f"{path.stem}-")
+    return [*(file.name for file in beside(path).values()), *drawn]
+
+
+def write_identification(
+    path: Path,
+    found: Identification,
+    logs: Sequence[Examination],
+    command: str,
+    force: bool,
+    form: str | None = None,
+) -> str:
+    """Write all files or none; those of an earlier run stay as they were if one fails.
+
+    `logs` are the examinations of all that were read, also of those that no fit used; `form` is
+    what figures are written as, None for no figures.
+
+    Returns:
+        The text of `run.json`.
+    """
+    names = {kind: file.name for kind, file in beside(path).items()}
+    record = identification_record(found, logs, command)
+    heading = [
+        *overridden_lines(logs, fitting=False),
+        f"{found.robot.title}; written by vftcli identify, keys: docs/robots.md.",
+        command,
+    ]
+    with OutputFolder(path.parent, force, files_beside(path, form)) as folder:
+        folder.write(names["html"], render_identification(found, record, logs))
+        folder.write(names["toml"], robot_toml(found.robot, heading))
+        if form is not None:
+            write_figures(folder, identification_figures(found), form, f"{path.stem}-")
+        return seal(folder, names["run"], record)
+
+
+def identification_record(
+    found: Identification, logs: Sequence[Examination], command: str
+) -> dict[str, Any]:
+    """Everything `run.json` holds, and `--json` prints."""
+    recordings = [one.recording for one in logs]
+    return {
+        "command": command,
+        "versions": versions(),
+        "examination": health_record(logs, fitting=False),
+        "method": found.method,
+        "inputs": [input_record(log) for log in recordings],
+        "profile": robot_record(found.profile),
+        "profile_sha256": file_sha256(found.profile.path),
+        "robot": found.robot.name,
+        "processing": dict(found.processing),
+        "residuals": found.residuals.to_dicts(),
+        "parameters": found.parameters.to_dicts(),
+        "friction_models": found.shape_choices.to_dicts(),
+        "base_parameters": found.base.to_dicts() if found.base is not None else [],
+        "conventions": CONVENTIONS,
+        **log_remarks(recordings),
+        "remarks": list(found.remarks),
+    }
+
+
+def render_identification(
+    found: Identification, record: Mapping[str, Any], examinations: Sequence[Examination] = ()
+) -> str:
+    """The page as text: self-contained, nothing is loaded from anywhere."""
+    logs = list(dict.fromkeys(t.motion.recording.name for t in found.traces))
+    title, charts = found.robot.title or found.robot.name, torque_charts(found)
+    source = f" from {counted(len(logs), 'log')}" if logs else ""
+    grids = {
+        "residuals": residual_grid(found),
+        "Identified numbers": parameter_grid(found),
+        "Friction models compared": shape_choice_grid(found.shape_choices),
+    }
+    if found.base is not None:
+        grids[f"Base parameters ({len(found.base)})"] = base_grid(found.base)
+    tables = {name: shell.table(grid) for name, grid in grids.items() if grid.rows}
+    residuals = tables.pop("residuals", "")
+    over_time = "".join(
+        f"<h3>{escape(c.title)}</h3>{shell.multiples(c)}{shell.large(c)}" for c in charts
+    )
+    inputs = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
+    made = f"<pre>{escape(str(record.get('command', '')))}</pre>{shell.bullets(inputs)}"
+    shown = shown_trace(found) if charts else None
+    about = "Residual: measured less predicted torque, from the first to the last movement."
+    parts = (
+        shell.alarms(examinations, fitting=False),
+        shell.top(
+            (title, f"method {found.method}", ", ".join(logs)),
+            f"{title}{source}.",
+            shell.lead(about),
+        ),
+        residuals and f"<h2>How much torque is left unexplained</h2>{residuals}",
+        velocity_section(found),
+        "<h2>Details</h2>",
+        *(shell.section(name, x, opened=name.startswith("Ident")) for name, x in tables.items()),
+        shell.section("Torques over time", over_time, shown.motion.recording.name if shown else ""),
+        shell.health(examinations, opened=True),
+        shell.section("Signal processing", shell.pairs(found.processing)),
+        shell.all_remarks(found.remarks),
+        shell.section("Provenance", made + shell.pairs(record.get("versions", {}))),
+    )
+    return shell.document(f"{found.robot.name}: identification", "".join(parts), charts)
+
+
+def velocity_section(found: Identification) -> str:
+    """Residual over velocity, one small plot a joint: friction that is missed shows here."""
+    if not found.traces:
+        return ""
+    coloured = [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(found.traces)]
+    plots = "".join(velocity_plot(coloured, j) for j in range(found.robot.joints))
+    key = "".join(
+        f'<span style="color:{colour}">● {escape(t.motion.recording.name)} ({t.role})</span> '
+        for t, colour in coloured
+    )
+    words = "Friction that the model misses shows here as a curve."
+    return (
+        f'<h2>Residual over velocity</h2><p class="legend">{key}</p>'
+        f'<div class="multiples">{plots}</div>{shell.soft(words)}'
+    )
+
+
+def velocity_plot(coloured: Sequence[tuple[Trace, str]], j: int) -> str:
+    """One joint: residual over velocity, each log in its colour."""
+    # One scale for all logs of a joint, or their dots could not be compared.
+    speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t, _ in coloured) or 1.0
+    sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
+    # A few samples at reversals are far off; they are drawn at the edge.
+    high = float(np.quantile(sizes, 0.995)) or 1.0
+    across, up = svg.Span(-speed, speed), svg.Span(-high, high)
+    scales = svg.Scales(svg.Box(height=180), across, up)
+    drawn = [shell.axes(scales, "rad/s", (4, 4))]
+    for trace, colour in coloured:
+        pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
+        x = scales.across(trace.motion.dq[pick, j])
+        y = scales.up(np.clip(trace.residual[pick, j], *up))
+        # One path of strokes without length: 600 circles a log and joint would make a slow page.
+        path = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
+        drawn.append(
+            f'<path d="{path}" stroke="{colour}" stroke-width="2.4" stroke-linecap="round" '
+            'stroke-opacity=".55" fill="none"/>'
+        )
+    picture = shell.frame(scales.box, f"Residual over velocity, J{j + 1}", "".join(drawn))
+    return f"<figure><figcaption>J{j + 1} <span>N·m</span></figcaption>{picture}</figure>"
+
+
+def shown_trace(found: Identification) -> Trace:
+    """The log that is drawn over time: the first held-out one, else the first."""
+    # A log that the fit has not seen shows how well it predicts.
+    return next((t for t in found.traces if t.role == "held-out"), found.traces[0])
+
+
+def torque_charts(found: Identification) -> tuple[Chart, ...]:
+    """Measured and predicted torque of one log, and what is left."""
+    if not found.traces:
+        return ()
+    trace, n = shown_trace(found), found.robot.joints
+    measured = ChartLine("measured", trace.measured)
+    predicted = ChartLine("predicted", trace.predicted, SPARE[1], "5 2")
+    panels, families = joint_panels(trace.measured), families_of(found.robot.limits.tau_max)
+    left = ChartLine("measured − predicted", trace.residual)
+    return tuple(
+        Chart(key, title, ("N·m",) * n, panels, trace.motion.t, lines, families=families)
+        for key, title, lines in (
+            ("torque", "Drive torque, filtered", (measured, predicted)),
+            ("left", "Measured − predicted", (left,)),
+        )
+    )
+
+
+def identification_figures(found: Identification) -> dict[str, Drawing]:
+    """Torque measured and predicted, and what is left of each log; none where no log was used."""
+    drawings = {}
+    if found.traces:
+        name = shown_trace(found).motion.recording.name
+        plots = plots_of(torque_charts(found)[0])
+        drawings["torque"] = Drawing(
+            f"{name}: drive torque, filtered, measured and predicted",
+            partial(line_figure, plots=plots),
+        )
+    # The last number of a row of the table is the mean.
+    rows = [DotRow(str(name), np.array(v[:-1])) for name, *v in residual_grid(found).rows]
+    if rows:
+        joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
+        plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
+        paints = {row.name: SPARE[k % len(SPARE)] for k, row in enumerate(rows)}
+        drawings["residuals"] = Drawing(
+            "RMS of the measured less the predicted torque",
+            partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)"),
+        )
+    return drawings
+
+
+def tables_text(found: Identification) -> str:
+    """Residuals and identified numbers for the terminal."""
+    grids = (residual_grid(found), parameter_grid(found))
+    return "\n".join(terminal(grid) for grid in grids if grid.rows).removesuffix("\n")
+
+
+def residual_grid(found: Identification) -> Grid:
+    """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
+    # Two logs of one label are told apart by their place in the command.
+    keys = ("log_index", "log", "role", "model")
+    rows: list[tuple[Entry, ...]] = []
+    for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
+        values = part["rms_Nm"].to_list()
+        rows.append((", ".join(map(str, names)), *values, sum(values) / len(values)))
+    numbers = (*joint_columns(found.robot.joints), Column("mean"))
+    return Grid(
+        columns=(
+            Column("residual rms [N·m]", words=True, width=44),
+            *(column._replace(form=".3f", width=6) for column in numbers),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def parameter_grid(found: Identification) -> Grid:
+    """The identified numbers with their spread, and what the profile had."""
+    rows = []
+    for row in found.parameters.iter_rows(named=True):
+        unit = row["unit"] + ("" if row["determined"] else "  (not determined)")
+        # A dash for what the profile does not have, or the log does not determine: it is no zero.
+        texts = [
+            f"{row[key]:{form}}" if isfinite(row[key]) else DASH
+            for key, form in (("value", ".5g"), ("sd", ".2g"), ("profile", ".5g"))
+        ]
+        rows.append((row["parameter"], row["joint"], *texts, unit))
+    return Grid(
+        columns=(
+            Column("number", words=True, width=19),
+            Column("joint", width=4),
+            Column("value", width=10),
+            Column("sd", width=8),
+            Column("profile", width=10),
+            Column("unit", words=True),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def shape_choice_grid(choices: pl.DataFrame) -> Grid:
+    """How the friction models competed on what was left out of the fit."""
+    return Grid(
+        title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
+        columns=(Column("friction", words=True), *map(Column, ("joint", "RMS [N·m]", ""))),
+        rows=tuple(
+            (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
+            for r in choices.iter_rows(named=True)
+        ),
+    )
+
+
+def base_grid(base: pl.DataFrame) -> Grid:
+    """Base parameters as the least squares gave them."""
+    numbers = (Column(head, form=signed) for head in ("value (SI)", "sd"))
+    return Grid(
+        title="Weighted least squares, before physical consistency",
+        columns=(Column("parameter", words=True), *numbers, Column("determined")),
+        rows=tuple(
+            (r["parameter"], r["value"], r["sd"], "yes" if r["determined"] else "no")
+            for r in base.iter_rows(named=True)
+        ),
+    )

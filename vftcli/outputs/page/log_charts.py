@@ -1,0 +1,266 @@
+"""The charts of one log: torques, wrenches, what the pose tells, responses, spectra and tuning."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.observers.auto_tuning import Curve
+from vftcli.observers.spectra import Spectra
+from vftcli.observers.table import BEST
+from vftcli.outputs.log.rmse_tables import blocks
+from vftcli.outputs.page.charts import (
+    REFERENCE,
+    Chart,
+    ChartLine,
+    LineStyle,
+    families_of,
+    observer_lines,
+)
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.wrench import AXES, Wrench, unit_of
+
+FREQUENCIES = 120  #: Points of a frequency response.
+#: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
+#: that is shown. [–], [dB]
+QUIETEST, LOWEST = 1e-12, -80.0
+#: Colours of the two spectra.
+FREE, LOADED = "#3b7ea1", "#c2410c"
+
+
+def torque_chart(analysis: Analysis) -> Chart:
+    """External torque joint by joint: the best estimate with its band, the reference below it."""
+    n, reference = analysis.recording.joints, analysis.reference
+    found = blocks(analysis.errors) if analysis.errors is not None else ()
+    lines = estimate_lines(analysis)
+    return Chart(
+        "tau",
+        "External torque on the robot",
+        ("N·m",) * n,
+        # A dagger where the reference is not to be trusted, as in the tables.
+        tuple(found[0].joint_heads) if found else joint_panels(lines[0].values),
+        analysis.t,
+        (*reference_lines(analysis), *lines),
+        families=families_of(analysis.robot.limits.tau_max),
+        band=None if reference is None else reference.floor,
+        band_label="± floor of the reference",
+        spans=contact_spans(analysis),
+    )
+
+
+def contact_spans(analysis: Analysis) -> tuple[tuple[float, float], ...]:
+    """When something touched the arm. [s]"""
+    found = analysis.contacts.contacts if analysis.contacts is not None else ()
+    return tuple((contact.start, contact.stop) for contact in found if not contact.is_load)
+
+
+def lines_of(
+    analysis: Analysis, found: Sequence[tuple[str, Array, Array | None]], *, alike: bool
+) -> list[ChartLine]:
+    """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
+
+    Beside `best` no other bears a band: five would hide one another.
+
+    Args:
+        analysis: What gives every observer its colour.
+        found: Name, values and their standard deviation of every observer. (T, n)
+        alike: Whether every line bears its band where `best` did not run.
+    """
+    styles = observer_lines(analysis.estimates)
+    names = [name for name, *_ in found]
+    first = BEST if BEST in names else next(iter(names), "")
+    banded = set(names) if alike and first != BEST else {first}
+    lines = [
+        ChartLine(
+            name,
+            values,
+            *styles[name],
+            half=COVERS * sd if sd is not None and name in banded else None,
+            leads=name == first,
+            shown=name == first,
+        )
+        for name, values, sd in found
+    ]
+    return sorted(lines, key=lambda line: line.leads)
+
+
+def estimate_lines(analysis: Analysis) -> list[ChartLine]:
+    """Every observer's torque."""
+    each = [(e.name, e.tau, e.error_sd) for e in analysis.estimates]
+    return lines_of(analysis, each, alike=True)
+
+
+def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
+    """The reference as a broad line below the others; dotted where it is not to be trusted."""
+    if analysis.reference is None:
+        return ()
+    tau, moving = analysis.reference.tau, analysis.reference.moving
+    whole = ChartLine(legend_name(analysis, "reference"), tau, REFERENCE)
+    if moving is None or np.all(moving | ~np.isfinite(tau)):
+        return (whole,)
+    trusted = np.where(moving, tau, np.nan)
+    resting = np.where(moving, np.nan, tau)
+    name = "reference while the joint rests"
+    return (whole._replace(values=trusted), ChartLine(name, resting, "#8a94a0", "1.5 3"))
+
+
+def legend_name(analysis: Analysis, name: str) -> str:
+    """A series' name in the legend: the reference's says which it is."""
+    if name == "reference" and analysis.reference is not None:
+        return f"reference ({analysis.reference.name})"
+    return name
+
+
+def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
+    """Gain, phase and delay of every observer over frequency, up to half the sample rate.
+
+    Of observers whose joints differ the first joint is drawn.
+    """
+    step, n = analysis.recording.median_step, analysis.recording.joints
+    frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
+    styles = observer_lines(analysis.estimates)
+    columns: dict[str, list[ChartLine]] = {"gain": [], "phase": [], "delay": []}
+    for observer in analysis.observers:
+        response = observer.frequency_response(frequency, step, n)[:, :1]
+        # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
+        phase = np.degrees(np.unwrap(np.angle(response), axis=0))
+        decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
+        # A phase of −φ degrees at f is a delay of φ / (360 f).
+        delay = -1e3 * phase / (360.0 * frequency[:, None])
+        for key, values in (("gain", decibel), ("phase", phase), ("delay", delay)):
+            columns[key].append(ChartLine(observer.name, values, *styles[observer.name]))
+    gain, *others = (
+        over_frequency(title.lower(), title, unit, frequency, lines)._replace(
+            panels=(f"{title}, joint 1",)
+        )
+        for title, unit, lines in zip(
+            ("Gain", "Phase", "Delay"), ("dB", "°", "ms"), columns.values(), strict=True
+        )
+    )
+    return gain._replace(lowest=LOWEST), *others
+
+
+def over_frequency(key: str, title: str, unit: str, x: Array, lines: Sequence[ChartLine]) -> Chart:
+    """A chart over frequency, a panel a joint. (T,) [Hz]"""
+    panels = joint_panels(lines[0].values)
+    units = (unit,) * len(panels)
+    return Chart(key, title, units, panels, x, tuple(lines), unit="Hz", log=True)
+
+
+def joint_panels(values: Array) -> tuple[str, ...]:
+    """Names of the panels of a chart with one a joint."""
+    return tuple(f"J{j}" for j in range(1, values.shape[1] + 1))
+
+
+def wrench_chart(analysis: Analysis) -> Chart | None:
+    """Force and moment axis by axis: the first wrench with its band, the reference below it."""
+    found = [wrench for wrench in analysis.wrenches if wrench.name != "reference"]
+    if not found:
+        return None
+    each = [(wrench.name, wrench.known, wrench.sd) for wrench in found]
+    lines = [
+        line._replace(quiet=quiet_samples(analysis, line.name))
+        for line in lines_of(analysis, each, alike=False)
+    ]
+    reference = [w for w in analysis.wrenches if w.name == "reference"]
+    below = [ChartLine(legend_name(analysis, w.name), w.known, REFERENCE) for w in reference]
+    return Chart(
+        "wrench",
+        f"Wrench in {found[0].frame} axes",
+        tuple(map(unit_of, AXES)),
+        AXES,
+        analysis.t,
+        (*below, *lines),
+        families=(1, 1, 1, 2, 2, 2),
+        spans=contact_spans(analysis),
+    )
+
+
+def quiet_samples(analysis: Analysis, name: str) -> Mask | None:
+    """Samples of a wrench outside of every listed contact, None where it asks no list. (T,)"""
+    sensed = analysis.virtual_sensor
+    found = None if sensed is None else sensed.smoothed.get(name)
+    return found.unlisted(analysis.t) if found is not None and found.gate else None
+
+
+def condition_charts(analysis: Analysis) -> Iterator[Chart]:
+    """σ_min with the masked zone, what the solver says there, and the null-space channel."""
+    sensed = analysis.virtual_sensor
+    if sensed is None or not sensed.wrenches:
+        return
+    # σ_min and the mask follow from the pose, so that every observer has the same.
+    first, least = sensed.wrenches[0], sensed.sensor.least_sigma
+    styles = observer_lines(analysis.estimates)
+
+    def chart(key: str, title: str, unit: str, lines: Sequence[ChartLine]) -> Chart:
+        """A chart of one panel."""
+        return Chart(key, title, (unit,), (title,), analysis.t, tuple(lines))
+
+    if first.sigma_min is not None:
+        lines = [ChartLine("σ_min of J", first.sigma_min[:, None])]
+        yield chart("sigma_min", "What the pose can tell: σ_min", "m", lines)._replace(
+            band=np.array([least]), band_label="masked below", lowest=0.0
+        )
+    if sensed.hides:
+        title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
+        blown = [w for w in sensed.wrenches if w.hidden.any()]
+        lines = [ChartLine(w.name, masked_force(w), *styles[w.name]) for w in blown]
+        yield chart("blow-up", title, "N", lines)
+    if first.null_space is not None:
+        lines = [
+            ChartLine(w.name, w.null_space[:, None], *styles[w.name])
+            for w in sensed.wrenches
+            if w.null_space is not None
+        ]
+        limit = np.array([e.threshold for e in sensed.elsewhere[:1]])
+        title = "Torque that no wrench at the flange explains"
+        yield chart("null_space", title, "N·m", lines)._replace(
+            band=limit if limit.size else None, band_label="free part"
+        )
+
+
+def masked_force(wrench: Wrench) -> Array:
+    """Norm of the force in masked samples, NaN elsewhere. (T, 1) [N]"""
+    norm = np.linalg.norm(wrench.values[:, :3], axis=1)
+    return np.where(wrench.hidden, norm, np.nan)[:, None]
+
+
+def refined_charts(analysis: Analysis) -> list[Chart]:
+    """Spectra and tuning of a complete log, as far as there are any."""
+    found, charts = analysis.refinement, list[Chart]()
+    if found is not None and (spectra := found.baselines.plain.spectra) is not None:
+        charts.append(spectra_chart(spectra))
+    if found is not None and found.curves:
+        charts.append(tuning_chart(found.curves, observer_lines(analysis.estimates)))
+    return charts
+
+
+def spectra_chart(found: Spectra) -> Chart:
+    """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
+
+    def level(power: Array) -> Array:
+        """Power in decibels; the least number above 0 stands for none at all."""
+        decibels: Array = 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
+        return decibels
+
+    free = level(found.free)
+    lines = (
+        ChartLine("free part, S_n", free, FREE),
+        ChartLine("loaded part, S_d", level(found.loaded), LOADED, "5 2"),
+    )
+    title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
+    families = (1,) * free.shape[1]
+    chart = over_frequency("spectra", title, "dB", found.frequency[1:], lines)
+    return chart._replace(families=families)
+
+
+def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
+    """What was minimised for every observer that the log tuned."""
+    lines = tuple(
+        ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
+        for name, curve in curves.items()
+    )
+    x = np.concatenate([line.x for line in lines if line.x is not None])
+    title, ends = "Expected error against natural frequency ω_n/2π", np.array([x.min(), x.max()])
+    return over_frequency("curve", title, "N·m", ends, lines)

@@ -1,0 +1,266 @@
+"""The pages of one log, of several logs and of a batch: what each of them is filled with."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from vftcli.analysis import Analysis
+from vftcli.evaluation.errors import JointMeans
+from vftcli.outputs.answer import hardest_words, headline, otherwise
+from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
+from vftcli.outputs.contacts import by_force
+from vftcli.outputs.grid import Column, Grid, GridCell
+from vftcli.outputs.log.rmse_tables import blocks, detail_grids, marks_on_page, rmse_grid
+from vftcli.outputs.log.run_record import run_record
+from vftcli.outputs.log.wrench_tables import (
+    axis_grids,
+    contact_grids,
+    drift_grid,
+    nothing_to_compare,
+    paper_bounds,
+)
+from vftcli.outputs.page import details, log_charts
+from vftcli.outputs.page.charts import Chart, observer_lines
+from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
+from vftcli.outputs.page.shell import page, part
+from vftcli.outputs.quantity import DASH, banded, counted, significant
+from vftcli.signals.remarks import sentence
+from vftcli.virtual_sensor.frames import FRAMES
+
+if TYPE_CHECKING:
+    import polars as pl
+
+#: Heads of the overview.
+HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
+
+
+def render(analysis: Analysis) -> str:
+    """The report of one log: self-contained, nothing is loaded from anywhere."""
+    found, record = analysis.contacts, analysis.run or run_record(analysis, "")
+    torque, wrench = log_charts.torque_chart(analysis), log_charts.wrench_chart(analysis)
+    untold = [r for r in analysis.remarks if r.code == "contacts-not-told"]
+    sentences = [f"What touched the arm is unknown: {sentence(r)}." for r in untold]
+    view: dict[str, Any] = {"grounds": grounds(analysis), "record": record}
+    if found is not None:
+        sentences = [otherwise(found)]
+        ranges = [contact.anywhere[1] for contact in found.contacts if contact.anywhere is not None]
+        view |= {
+            "most": max(ranges, default=1.0),
+            "drawings": [(contact, arm_drawing(analysis, contact)) for contact in found.contacts],
+            "free": free_spans(analysis),
+            "timelines": timelines(analysis, found),
+            "contact_grids": details.contact_details(found),
+            "model": details.model_pairs(found),
+        }
+    if (sensed := analysis.virtual_sensor) is not None:
+        grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
+        if analysis.errors is not None:
+            grids += contact_grids(analysis.errors)
+        view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
+        view["condition"] = log_charts.condition_charts(analysis)
+    if (refined := analysis.refinement) is not None:
+        view["budget"] = details.budget_grid(refined.budgets) if refined.budgets else None
+        view["refined"] = log_charts.refined_charts(analysis)
+    if analysis.published is not None:
+        view["printed"] = details.beside_print(analysis.published)
+    answer = headline(analysis)
+    return page(
+        "report.html",
+        f"{answer} – {analysis.recording.name}",
+        [chart for chart in (torque, wrench) if chart is not None],
+        observer_lines(analysis.estimates),
+        analysis=analysis,
+        found=found,
+        headline=answer,
+        eyebrow=eyebrow(analysis),
+        sentences=sentences,
+        torque=torque,
+        wrench=wrench,
+        scale_words=scale_words(torque),
+        errors=errors_view(analysis),
+        observers=details.observers_view(analysis),
+        responses=log_charts.response_charts(analysis),
+        guide=details.selection_guide(analysis),
+        remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["notes"]],
+        **view,
+    )
+
+
+def eyebrow(analysis: Analysis) -> tuple[str, ...]:
+    """The log, the robot, the span at its rate, and what measured the force."""
+    recording, robot, reference = analysis.recording, analysis.robot, analysis.reference
+    measured = "nothing else measured the force"
+    if reference is not None:
+        measured = f"compared with {reference.name}"
+    elif recording.wrench is not None:
+        measured = "beside a sensor's own wrench"
+    elif recording.tau_ext is not None:
+        measured = "beside the controller's own estimate"
+    rate = 1.0 / recording.median_step if recording.samples > 1 else float("nan")
+    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if np.isfinite(rate) else "")
+    return recording.name, robot.title or robot.name, span, measured
+
+
+def scale_words(chart: Chart) -> str:
+    """Which pictures share a scale, in words."""
+    numbered = groupby(zip(chart.families, chart.panels, strict=False), key=itemgetter(0))
+    families = [[name for _, name in members] for _, members in numbered]
+    shared = [f"{names[0]}–{names[-1]}" for names in families if len(names) > 1]
+    if not shared:
+        return "Every joint has its own scale."
+    rest = "; the others have their own" if any(len(names) == 1 for names in families) else ""
+    return f"One scale in {' and in '.join(shared)}{rest}."
+
+
+def errors_view(analysis: Analysis) -> dict[str, Any]:
+    """The tables of errors and what they come to, without tables where there is no reference."""
+    table = analysis.errors
+    found = blocks(table) if table is not None else ()
+    if table is None or not found:
+        return {"state": "none given", "first": ()}
+    means, state = found[0].means, "no sample in common with the estimates"
+    if means.least is not None:
+        state = f"{least_error(means)} against {found[0].reference}{means.left_out}"
+    return {
+        "state": state,
+        "first": [rmse_grid(block) for block in found],
+        "marks": marks_on_page(found),
+        "axes": axis_grids(table, paper_bounds([analysis])),
+        "missing": nothing_to_compare(table),
+        "details": detail_grids(table),
+        "bias": details.bias_grid(table),
+    }
+
+
+def least_error(means: JointMeans) -> str:
+    """The least mean RMSE and its observer."""
+    return DASH if means.least is None else f"{significant(means.least[1])} N·m ({means.least[0]})"
+
+
+def render_index(
+    analyses: Sequence[tuple[str, Analysis]], failed: Mapping[str, str] = MappingProxyType({})
+) -> str:
+    """The page over several reports, each with its folder."""
+    lines = [(index_line(*each), each[1].errors) for each in analyses]
+    lines.sort(key=lambda line: line[0].rank)
+    robots = dict.fromkeys(a.robot.title or a.robot.name for _, a in analyses)
+    title, words = index_headline([analysis for _, analysis in analyses])
+    return page(
+        "logs.html",
+        title,
+        scripts=["sort.js"],
+        eyebrow=(f"{len(analyses) + len(failed)} logs", ", ".join(robots)),
+        words=words,
+        examinations=[one for _, analysis in analyses for one in analysis.examinations],
+        overview=overview([line for line, _ in lines]),
+        failed=failed,
+        tables=[(line, map(rmse_grid, blocks(e))) for line, e in lines if e is not None],
+    )
+
+
+def index_line(folder: str, analysis: Analysis) -> LogSummary:
+    """One log's line, with its page in a sub-folder and its least error."""
+    line = log_line(analysis, grounds(analysis))._replace(page=f"{folder}/index.html")
+    for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
+        line = line._replace(error=least_error(block.means))
+    return line
+
+
+def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
+    """How many logs were touched, and where the hardest contact is."""
+    lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
+    pushed = [found for found in lists if found.contacts and not found.contacts[0].is_load]
+    loads = sum(bool(found.contacts and found.contacts[0].is_load) for found in lists)
+    if not lists:
+        return f"External joint torques from {len(analyses)} logs.", ""
+    title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
+    if not pushed and not loads:
+        title = "Nothing pushed the arm, as far as these logs can tell."
+    words = ""
+    if hard := [(by_force(found.hardest), found) for found in pushed if found.hardest is not None]:
+        most = max(hard, key=itemgetter(0))[1]
+        words = f"Hardest in {most.recording}: {hardest_words(most)}."
+    if loads:
+        words += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
+    return title, words.strip()
+
+
+def overview(lines: Sequence[LogSummary]) -> Grid:
+    """The table of all logs, the worst first; a click on a head sorts by it."""
+    rows = tuple(map(overview_row, sorted(lines, key=lambda line: line.rank)))
+    return Grid(columns=tuple(Column(head, words=True) for head in HEADS), rows=rows)
+
+
+def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
+    """A line of the overview: the log's name links to its own page, where it has one."""
+    return (
+        GridCell(line.name, html=part("parts/link", line.page, line.name) if line.page else ""),
+        line.robot,
+        f"{line.duration:.1f} s",
+        line.contacts,
+        line.hardest,
+        DASH if line.least is None else f"{line.least:.0f} N",
+        line.error,
+        GridCell(f"{MARKS[line.standing]} {line.words}", html=part("parts/state", line, MARKS)),
+    )
+
+
+def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
+    """The page over a batch."""
+    touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
+    told = sum(line.contacts != DASH for line in lines)
+    count = failures.height
+    grid = Grid(
+        columns=tuple(Column(head, words=True) for head in ("Log", "Stage", "Error", "Why")),
+        rows=tuple(
+            (*where, GridCell(line, html=part("parts/wrapped", line)))
+            for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
+        ),
+    )
+    return page(
+        "logs.html",
+        f"{len(lines)} logs" + (f", {touched} of {told} touched." if told else "."),
+        scripts=["sort.js"],
+        eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
+        words=f"{counted(count, 'log')} could not be analysed." if count else "",
+        failures=grid,
+        count=count,
+        overview=overview(lines),
+    )
+
+
+def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[LogSummary]:
+    """The line of every log, made from the table of a batch alone."""
+    from vftcli.evaluation.errors import joint_means
+
+    if table.is_empty():
+        return
+    best = {str(log): least_error(joint_means(rows)) for (log,), rows in table.group_by("log")}
+    for row in table.unique("log", keep="first", maintain_order=True).iter_rows(named=True):
+        yield batch_line(row, pages.get(row["log"], ""), best.get(row["log"], DASH))
+
+
+def batch_line(row: Mapping[str, Any], page: str, error: str) -> LogSummary:
+    """One log's line, from the first of its rows."""
+    force, band, count = row["hardest_N"], row["hardest_band_N"], row["contacts"]
+    hardest = DASH
+    if force is not None:
+        hardest = f"{banded(force, band)} at {row['hardest_s']:.1f} s"
+        hardest = hardest if force > band else f"unknown ({hardest})"
+    return LogSummary(
+        row["log"],
+        row["robot"],
+        row["duration_s"],
+        DASH if count is None else "load" if row["load"] else str(count),
+        hardest,
+        force or 0.0,
+        row["told_N"],
+        row["health"],
+        row["reason"],
+        page,
+        error,
+    )

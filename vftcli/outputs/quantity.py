@@ -1,0 +1,56 @@
+"""Quantity: a number with its unit as text, the same on the screen, in tables and on the page."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+DASH = "–"  #: What stands where nothing is known.
+
+
+def significant(value: float, digits: int = 3) -> str:
+    """A number with three significant digits and no exponent where one can do without."""
+    if not np.isfinite(value):
+        return DASH
+    if value == 0.0:
+        return "0"
+    # Rounding comes first: 9.996 has its three digits as 10.0.
+    exponent = int(np.floor(np.log10(abs(float(f"{value:.{digits - 1}e}")))))
+    if exponent < -4:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}"
+
+
+def minus(text: str) -> str:
+    """A number's text with a true minus sign."""
+    return text.replace("-", "−")
+
+
+def signed(value: float) -> str:
+    """Three significant digits with a true minus sign, for the page."""
+    return minus(significant(value))
+
+
+def banded(value: float | None, band: float | None, form: str = ".0f", unit: str = " N") -> str:
+    """A value with the half width of its 95 % band, or its standard deviation."""
+    return f"{minus(format(value, form))} ± {band:{form}}{unit}"
+
+
+def ranged(low: float, high: float) -> str:
+    """Between which forces something lies. [N]"""
+    return f"{low:.0f}–{high:.0f} N"
+
+
+def counted(count: int, noun: str) -> str:
+    """How many of a thing: ``1 contact``, ``2 contacts``."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
+def vector(values: Iterable[float]) -> str:
+    """Numbers with one digit behind the point, none of them a negative nought."""
+    return ", ".join(minus(f"{x + 0.0:.1f}") for x in np.round(list(values), 1))
+
+
+def percent(share: float) -> str:
+    """A share in per cent, with one digit behind the point, or one that is not zero."""
+    value = 100.0 * share
+    return f"{value:.1f} %" if value >= 0.095 else f"{value:.1g} %"
