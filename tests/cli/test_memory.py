@@ -4,7 +4,7 @@ import ctypes
 
 import pytest
 
-from vftcli.cli.memory import LARGE, MMAP_THRESHOLD, give_back
+from vftcli.cli.analysis import LARGE, MMAP_THRESHOLD, give_back
 
 
 def test_the_c_library_is_told_once_it_can_be(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
-from vftcli.cli.options import AnalysisOptions, Bundle, Needed, Typed, command
+from vftcli.cli.analysis import AnalysisOptions, LogOptions
+from vftcli.cli.options import Bundle, Needed, Typed, command
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.choice import OutputChoice
@@ -118,15 +119,14 @@ def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, object]) -> None:
     nothing = {
         name: Typed(choice, {})
         for name, choice in (
-            ("reading", ReadChoice),
-            ("robot", RobotChoice),
             ("observers", ObserverChoice),
             ("free", FreeChoice),
             ("refinement", RefinementChoice),
         )
     }
+    log = LogOptions(reading=Typed(ReadChoice, {}), robot=Typed(RobotChoice, {}))
     asked = AnalysisOptions(
-        **nothing, also_wrench=also, wrench=Typed(WrenchChoice, words), no_contacts=False,
+        **nothing, log=log, also_wrench=also, wrench=Typed(WrenchChoice, words), no_contacts=False,
         anyway=False,
     ).choice(Library())  # fmt: skip
     assert (asked.wrench is not None) == bool(typed)

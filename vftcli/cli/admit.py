@@ -8,6 +8,7 @@ import typer
 
 from vftcli.admittance.choice import WITHOUT_LOG, ControlChoice, ReleaseChoice
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import AnalysisOptions
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
@@ -79,7 +80,7 @@ def admit(
     release: opt.Typed[ReleaseChoice],
     loop: LoopOptions,
     source: ForceOptions,
-    analysis: opt.AnalysisOptions,
+    analysis: AnalysisOptions,
     shown: ShownOptions,
     log: Annotated[
         Path | None,
@@ -150,7 +151,7 @@ def admit(
             open_made(output)
 
 
-def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":
+def chosen(analysis: AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":
     """What is asked of the log: one observer, and its wrench in base axes."""
     from vftcli.readers.library import Library
     from vftcli.signals.errors import ParameterError
@@ -168,7 +169,7 @@ def chosen(analysis: opt.AnalysisOptions, log: Path | None = None) -> "AnalysisC
 
 
 def released(
-    release: opt.Typed[ReleaseChoice], analysis: opt.AnalysisOptions, control: ControlChoice
+    release: opt.Typed[ReleaseChoice], analysis: AnalysisOptions, control: ControlChoice
 ) -> "Replay":
     """A release from rest."""
     from vftcli.admittance.choice import released_robot
@@ -189,7 +190,7 @@ def released(
 
 
 def replayed(
-    log: Path, source: ForceOptions, analysis: opt.AnalysisOptions, control: ControlChoice
+    log: Path, source: ForceOptions, analysis: AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
@@ -197,12 +198,12 @@ def replayed(
     from vftcli.readers.estimates import estimates_columns
 
     stored, typed = None, analysis.observers.words
-    if analysis.reading.words["columns"] is None:
+    if analysis.log.reading.words["columns"] is None:
         name = (typed["observer"] or [OBSERVER])[0]
         if (columns := estimates_columns(log, name)) is not None:
             # A table of estimates may hold those of an observer that is none of ours.
             stored, typed["observer"] = name, None
-            analysis.reading.words["columns"] = columns
+            analysis.log.reading.words["columns"] = columns
     choice = chosen(analysis, log)
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     check_logged(recording, "admit runs a controller that must not see the future")
@@ -249,7 +250,7 @@ def force_of(
 
 
 def looped(
-    loop: LoopOptions, analysis: opt.AnalysisOptions, control: ControlChoice
+    loop: LoopOptions, analysis: AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, ClosedLoop]":
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop

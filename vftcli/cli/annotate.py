@@ -5,9 +5,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import LogOptions
 from vftcli.observers.choice import ObserverChoice
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.virtual_sensor.choice import WrenchChoice
 
@@ -54,8 +53,7 @@ def annotate_dataset(
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
     ],
     output: Annotated[Path, Option("-o/--output", "COPY", "Folder of the copy.", group=WRITE)],
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     observers: opt.Typed[ObserverChoice],
     also_wrench: opt.Wrench,
     wrench: opt.Typed[WrenchChoice],
@@ -78,8 +76,8 @@ def annotate_dataset(
     from vftcli.cli.console import command_line, detail, say, say_json, stages
 
     asked = ForceChoice(
-        read=reading.choice(),
-        robot=robot.choice(),
+        read=logged.reading.choice(),
+        robot=logged.robot.choice(),
         observers=observers.choice(observer=observers.words["observer"] or [USUAL]),
         wrench=wrench.choice() if also_wrench or wrench.is_asked else None,
         sd=columns.sd,

@@ -9,6 +9,7 @@ import typer
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import Option
 
@@ -31,8 +32,8 @@ def batch(
     do: Annotated[str, Option("--do", "COMMAND", "estimate, compare, report or contacts.")],
     workers: opt.Typed[WorkersChoice],
     reference: opt.Typed[ReferenceChoice],
-    analysis: opt.AnalysisOptions,
-    also: opt.ExtraOptions,
+    analysis: AnalysisOptions,
+    also: ExtraOptions,
     force: opt.Force,
 ) -> None:
     """Ask many logs the same, on every core or on a cluster.

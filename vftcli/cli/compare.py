@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import AnalysisOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import COMPARE, OUTPUT, WRITE, Option
 
@@ -75,7 +76,7 @@ class DrawnErrors(opt.Bundle):
 def compare(
     logs: opt.Logs,
     reference: opt.Needed[ReferenceChoice],
-    analysis: opt.AnalysisOptions,
+    analysis: AnalysisOptions,
     table: TableOptions,
     drawn: DrawnErrors,
     significance: Annotated[

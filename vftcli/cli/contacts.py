@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.readers.reader import ReadChoice
+from vftcli.cli.analysis import LogOptions
 from vftcli.repetition.choice import FreeChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import OUTPUT, Option
 
 if TYPE_CHECKING:
@@ -28,8 +27,7 @@ class ListOptions(opt.Bundle):
 @opt.command
 def list_contacts(
     logs: opt.Logs,
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     free: opt.Typed[FreeChoice],
     form: ListOptions,
     anyway: opt.Anyway,
@@ -44,22 +42,21 @@ def list_contacts(
     if form.json and form.csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
-    from vftcli.cli.console import LeftOut, health_of, say_analysis, stages
-    from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
+    from vftcli.cli.console import LeftOut, say_analysis, stages
+    from vftcli.pipeline import analyse_logs, list_touches
     from vftcli.readers.estimates import stored_observers
     from vftcli.readers.library import Library
 
-    if len(logs) == 1 and reading.words["columns"] is None and stored_observers(logs[0]):
+    if len(logs) == 1 and logged.reading.words["columns"] is None and stored_observers(logs[0]):
         print_stored(logs[0], form)
         return
     library = Library(logs)
-    choice = AnalysisChoice(
-        read=reading.choice(),
-        robot=robot.choice(),
+    choice = logged.asked(
+        library,
+        anyway=anyway,
+        on_screen=not (form.json or form.csv),
         free=free.choice(),
-        library=library,
         progress=stages(),
-        examiner=health_of(library, anyway=anyway, on_screen=not (form.json or form.csv)),
     )
     left_out = LeftOut(library, logs)
     found = []

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.signals.option import WRITE, Option
 
 if TYPE_CHECKING:
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 def estimate(
     log: opt.Log,
     output: opt.Folder,
-    analysis: opt.AnalysisOptions,
-    also: opt.ExtraOptions,
+    analysis: AnalysisOptions,
+    also: ExtraOptions,
     csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.", group=WRITE)],
     rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.", group=WRITE)],
     json: opt.Json,
@@ -53,9 +54,9 @@ def estimate(
     # Of a large log only the columns that are looked at are read; outputs show the others too.
     causal = analysis.observers.words["causal"] or analysis.no_contacts
     signals = EXAMINED if causal and not (analysis.asks_wrench or written.extras) else None
-    if analysis.reading.words["columns"] is None:
+    if analysis.log.reading.words["columns"] is None:
         refuse_estimates(log)
-    library, chosen = Library([log]), replace(analysis.reading.choice(), signals=signals)
+    library, chosen = Library([log]), replace(analysis.log.reading.choice(), signals=signals)
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:

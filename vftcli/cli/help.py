@@ -5,7 +5,6 @@ Nothing here loads more than the command line itself, so that help comes at once
 
 import shutil
 import textwrap
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -191,6 +190,8 @@ TOPICS = Path(__file__).parent / "topics.toml"  #: Topic → its summary and its
 @cache
 def topics() -> Mapping[str, Mapping[str, str]]:
     """Every topic: its summary and its text."""
+    import tomllib
+
     return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
 
 

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.readers.reader import ReadChoice
+from vftcli.cli.analysis import LogOptions
 from vftcli.repetition.choice import FreeChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import interval
 
 if TYPE_CHECKING:
     from vftcli.identification import Task
+    from vftcli.readers.reader import ReadChoice
     from vftcli.signals.recording import Recording
 
 
@@ -79,8 +79,7 @@ def logs_without_load(free: list[str] | None, find_payload: bool) -> tuple[Path,
 def identify_robot(
     logs: opt.Logs,
     output: Annotated[Path, Option("-o/--output", "FILE.toml", "The new robot file.", group=WRITE)],
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     asked: TaskOptions,
     validate: Annotated[
         list[Path] | None,
@@ -115,10 +114,10 @@ def identify_robot(
     )
     from vftcli.readers.library import Library
 
-    task = asked.task(output.stem, friction=robot.words["friction"] != "none")
+    task = asked.task(output.stem, friction=logged.robot.words["friction"] != "none")
     form = made.form()
     OutputFolder(output.parent, made.force, files_beside(output, form)).check()
-    choice, chosen = reading.choice(), robot.choice()
+    choice, chosen = logged.reading.choice(), logged.robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
     held_out_choice = replace(choice.whole, interval=None if span is None else interval(span))
     unloaded_choice = replace(choice.whole, interval=choice.interval)

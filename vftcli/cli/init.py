@@ -5,9 +5,8 @@ from pathlib import Path
 from typing import Annotated
 
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import LogOptions
 from vftcli.cli.config import NAME
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
 
 
@@ -15,8 +14,7 @@ from vftcli.signals.option import WRITE, Option
 def write_config(
     *,
     logs: opt.Logs,
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     _talk: opt.TalkOptions,
     output: Annotated[
         Path, Option("-o/--output", "FILE", "The file of options.", group=WRITE)
@@ -31,22 +29,15 @@ def write_config(
 
     Example: vftcli init fixtures/ur5_circle.csv -o vftcli.toml
     """
-    from vftcli.cli.console import health_of, say, say_json
+    from vftcli.cli.console import say, say_json
     from vftcli.outputs.files import check_file, write_text
-    from vftcli.pipeline import AnalysisChoice
     from vftcli.proposal import config_text, propose
     from vftcli.readers.library import Library
 
     check_file(output, force)
-    words = {**reading.words, **robot.words}
+    words = {**logged.reading.words, **logged.robot.words}
     given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
-    library = Library(logs)
-    choice = AnalysisChoice(
-        read=reading.choice(),
-        robot=robot.choice(),
-        library=library,
-        examiner=health_of(library, anyway=False),
-    )
+    choice = logged.asked(Library(logs))
     proposed = [
         option._replace(value=from_folder(output.parent, option.key, option.value))
         for option in propose(logs, choice, given)

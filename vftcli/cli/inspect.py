@@ -5,16 +5,14 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
+from vftcli.cli.analysis import LogOptions
 from vftcli.signals.option import Option
 
 
 @opt.command
 def inspect_log(
     log: opt.Log,
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     _talk: opt.TalkOptions,
     strict: Annotated[bool, Option("--strict", "", "Exit with 1 if there is any warning, for CI.")],
     json: opt.Json,
@@ -28,10 +26,10 @@ def inspect_log(
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.readers import read_first_recording
 
-    choice = reading.choice()
+    choice = logged.reading.choice()
     recording = read_first_recording(log, choice)
     recording = choice.within(choice.taken(recording))
-    chosen = robot.choice()
+    chosen = logged.robot.choice()
     examiner, arm = Examiner(), None
     if chosen.name or choice.effort == "auto":
         arm = examiner.robot(recording, chosen)

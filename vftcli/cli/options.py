@@ -9,11 +9,9 @@ that has it. A command is handed one object for all options of a choice::
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
 from pathlib import Path
 from types import NoneType
 from typing import (
-    TYPE_CHECKING,
     Annotated,
     Any,
     Generic,
@@ -25,19 +23,7 @@ from typing import (
 
 import typer
 
-from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.log.choice import OutputChoice
-from vftcli.readers.reader import ReadChoice
-from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import LOG, OUTPUT, WRENCH, WRITE, Choice, Option
-from vftcli.virtual_sensor.choice import WrenchChoice
-
-if TYPE_CHECKING:
-    from vftcli.pipeline import AnalysisChoice
-    from vftcli.readers.library import Library
 
 C = TypeVar("C", bound=Choice)
 EMPTY = inspect.Parameter.empty
@@ -133,26 +119,6 @@ class MadeOptions(Bundle):
         return checked_form(self.figures)
 
 
-class ExtraOptions(Bundle):
-    """What else is written for other programs."""
-
-    mcap: Annotated[
-        bool,
-        Option(
-            "--mcap",
-            "",
-            "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.",
-            group=WRITE,
-        ),
-    ]
-    written: Typed[OutputChoice]
-
-    def choice(self, **others: bool) -> OutputChoice:
-        """What is written, with what the command's own options ask for."""
-        extras = tuple(name for name, asked in {**others, "mcap": self.mcap}.items() if asked)
-        return replace(self.written.choice(), extras=extras)
-
-
 class TalkOptions(Bundle):
     """How much a command says; heard before it runs."""
 
@@ -168,64 +134,13 @@ class TalkOptions(Bundle):
     ]
 
 
-class AnalysisOptions(Bundle):
-    """All that can be asked of a log but what it is compared with."""
-
-    reading: Typed[ReadChoice]
-    robot: Typed[RobotChoice]
-    observers: Typed[ObserverChoice]
-    free: Typed[FreeChoice]
-    refinement: Typed[RefinementChoice]
-    also_wrench: Wrench
-    wrench: Typed[WrenchChoice]
-    no_contacts: Annotated[
-        bool, Option("--no-contacts", "", "Leave the list of contacts out.", group=WRITE)
-    ]
-    anyway: Anyway
-    talk: TalkOptions
-
-    @property
-    def asks_wrench(self) -> bool:
-        """Whether an option asks for a wrench."""
-        return self.also_wrench or self.wrench.is_asked
-
-    def choice(
-        self,
-        library: "Library",
-        reference: Typed[ReferenceChoice] | None = None,
-        *,
-        on_screen: bool = False,
-        **observers: Any,  # noqa: ANN401 - words in place of those that are typed
-    ) -> "AnalysisChoice":
-        """The choice that the options state, a reference's with it where there is one."""
-        from vftcli.cli.console import health_of, stages
-        from vftcli.cli.memory import give_back
-        from vftcli.pipeline import AnalysisChoice
-
-        give_back()
-        compared = reference is not None and reference.words["reference"]
-        return AnalysisChoice(
-            read=self.reading.choice(),
-            robot=self.robot.choice(),
-            observers=self.observers.choice(**observers),
-            free=self.free.choice(),
-            refinement=self.refinement.choice(),
-            wrench=self.wrench.choice() if self.asks_wrench else None,
-            reference=reference.choice() if reference is not None and compared else None,
-            contacts=not self.no_contacts,
-            library=library,
-            progress=stages(),
-            examiner=health_of(library, anyway=self.anyway, on_screen=on_screen),
-        )
-
-
 def command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command as typer wants it: every option of its choices a parameter of its own.
 
     Its `options` are the option of every parameter by name.
     """
     arguments = inspect.signature(function).parameters.values()
-    parts = {a.name: taken_apart(a.name, a.annotation, a.default) for a in arguments}
+    part = members("", {a.name: (a.annotation, a.default) for a in arguments})
 
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.cli.config import taken
@@ -238,13 +153,12 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
         loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
         with protected(inputs), loud:
-            function(**{name: part.made(values) for name, part in parts.items()})
+            function(**part.made(values))
 
-    flat = [one for part in parts.values() for one in part.parameters]
     called.__name__, called.__doc__ = function.__name__, function.__doc__
     # typer asks for the signature; without annotations of its own it finds nothing else.
-    vars(called)["__signature__"] = inspect.Signature([parameter for parameter, _ in flat])
-    vars(called)["options"] = {parameter.name: option for parameter, option in flat}
+    vars(called)["__signature__"] = inspect.Signature([each for each, _ in part.parameters])
+    vars(called)["options"] = {each.name: option for each, option in part.parameters}
     called.__annotations__ = {}
     return called
 
@@ -256,66 +170,56 @@ class Part(NamedTuple):
     made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.
 
 
+def members(prefix: str, kinds: Mapping[str, tuple[Any, object]]) -> Part:
+    """Arguments by name, each of a kind and with a default, as one that makes them all."""
+    parts = {name: taken_apart(prefix + name, *what) for name, what in kinds.items()}
+    flat = [one for part in parts.values() for one in part.parameters]
+    return Part(flat, lambda values: {name: part.made(values) for name, part in parts.items()})
+
+
 def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 - an annotation
     """One argument of a command as parameters: itself, or every option of what it is."""
     if isinstance(kind, type) and issubclass(kind, Bundle):
-        parts = {
-            own: taken_apart(f"{name}_{own}", what, getattr(kind, own, EMPTY))
-            for own, what in inspect.get_annotations(kind).items()
-        }
-        flat = [one for part in parts.values() for one in part.parameters]
-        return Part(flat, lambda values: kind(**{n: p.made(values) for n, p in parts.items()}))
+        each = inspect.get_annotations(kind).items()
+        part = members(f"{name}_", {own: (k, getattr(kind, own, EMPTY)) for own, k in each})
+        return Part(part.parameters, lambda values: kind(**part.made(values)))
     if (typed := get_origin(kind)) in {Typed, Needed}:
         (choice,) = get_args(kind)
-        found = choice.options().items()
-        flat = [
-            parameter_of(
-                f"{name}_{word}",
-                typed_kind(what, option),
-                default_of(getattr(choice, field, EMPTY), option, needed=typed is Needed),
-                option._replace(group=choice.GROUP),
-            )
-            for word, (field, what, option) in found
-        ]
-        return Part(flat, lambda v: typed(choice, {word: v[f"{name}_{word}"] for word, _ in found}))
-    if get_origin(kind) is not Annotated:  # typer's own context
+        fields = choice.options().items()
+        needed = typed is Needed
+        part = members(f"{name}_", {w: typed_as(choice, *f, needed=needed) for w, f in fields})
+        return Part(part.parameters, lambda values: typed(choice, part.made(values)))
+    if typed is not Annotated:  # typer's own context
         plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
         return Part([(plain, Option("", "", ""))], lambda values: values[name])
     what, option = get_args(kind)
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
-    return Part([parameter_of(name, what, default, option)], lambda values: values[name])
-
-
-def typed_kind(kind: Any, option: Option) -> Any:  # noqa: ANN401 - annotations
-    """What typer makes of the typed text of a field of a kind."""
-    if not option.metavar:
-        return bool
-    among = (kind, *get_args(kind))
-    one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
-    return list[one] | None if option.several else one | None  # type: ignore[valid-type]
-
-
-def default_of(default: object, option: Option, *, needed: bool) -> object:
-    """What typer gives where an option of a choice is not typed: mostly nothing, the room knows."""
-    if default is EMPTY and needed:
-        return EMPTY
-    return (default if option.shows_default else None) if option.metavar else False
-
-
-def parameter_of(
-    name: str,
-    kind: Any,  # noqa: ANN401 - an annotation
-    default: object,
-    option: Option,
-) -> tuple[inspect.Parameter, Option]:
-    """A parameter as typer reads it, beside its option."""
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
     how["metavar"] = option.metavar or None
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
-    annotation = Annotated[kind, info]
-    where = inspect.Parameter.KEYWORD_ONLY
-    return inspect.Parameter(name, where, default=default, annotation=annotation), option
+    single = inspect.Parameter(
+        name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]
+    )
+    return Part([(single, option)], lambda values: values[name])
+
+
+def typed_as(
+    choice: type[Choice],
+    field: str,
+    kind: Any,  # noqa: ANN401 - an annotation
+    option: Option,
+    *,
+    needed: bool,
+) -> tuple[Any, object]:
+    """What typer makes of a field's typed text, and where that is missing: the room knows."""
+    among, default = (kind, *get_args(kind)), getattr(choice, field, EMPTY)
+    one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
+    what: Any = list[one] if option.several else one if option.metavar else bool  # type: ignore[valid-type]
+    if not (needed and default is EMPTY) and option.metavar:
+        what = what | None
+    grouped = option._replace(group=choice.GROUP)
+    return Annotated[what, grouped], default if option.shows_default else EMPTY
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import COMPARE, Option
 
@@ -23,8 +24,8 @@ def report(
     logs: opt.Logs,
     output: opt.Folder,
     reference: opt.Typed[ReferenceChoice],
-    analysis: opt.AnalysisOptions,
-    also: opt.ExtraOptions,
+    analysis: AnalysisOptions,
+    also: ExtraOptions,
     figures: opt.Figures,
     published: Annotated[
         str | None,

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.analysis import LogOptions
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
-from vftcli.readers.reader import ReadChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import COMPARE, Option
 
 if TYPE_CHECKING:
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
 @opt.command
 def contact_thresholds(
     logs: opt.Logs,
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     reference: Annotated[str | None, ReferenceChoice.option("reference", group=COMPARE)],
     columns: Annotated[str | None, ReferenceChoice.option("reference_columns", group=COMPARE)],
     anyway: opt.Anyway,
@@ -50,14 +48,14 @@ def contact_thresholds(
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
-    from vftcli.cli.console import health_of, say, say_json, say_recording, say_robots
+    from vftcli.cli.console import say, say_json, say_recording, say_robots
     from vftcli.contacts.caught import check_contacts
     from vftcli.contacts.compared_signals import check_alike, compared_signals
     from vftcli.contacts.thresholds import find_thresholds, left_out
     from vftcli.notebook import modelled, touched
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
-    from vftcli.pipeline import AnalysisChoice, prepared
+    from vftcli.pipeline import prepared
     from vftcli.readers.library import Library
     from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
@@ -66,12 +64,7 @@ def contact_thresholds(
     if asked is not None and check is None:
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
     library = Library([*logs, *([check] if check else [])])
-    choice = AnalysisChoice(
-        read=reading.choice(),
-        robot=robot.choice(),
-        library=library,
-        examiner=health_of(library, anyway=anyway),
-    )
+    choice = logged.asked(library, anyway=anyway)
     models = Runs()
     opened = library.open_logs(logs, choice.read)
     free = [modelled(*prepared(log, choice), choice, models) for log in opened]

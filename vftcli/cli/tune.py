@@ -6,10 +6,9 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.readers.reader import ReadChoice
+from vftcli.cli.analysis import LogOptions
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
-from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
 
 
@@ -18,8 +17,7 @@ def tune_gains(
     *,
     log: opt.Log,
     output: Annotated[Path, Option("-o/--output", "FILE.toml", "The gains file.", group=WRITE)],
-    reading: opt.Typed[ReadChoice],
-    robot: opt.Typed[RobotChoice],
+    logged: LogOptions,
     free: opt.Typed[FreeChoice],
     bias: opt.Typed[RefinementChoice],
     made: opt.MadeOptions,
@@ -44,7 +42,7 @@ def tune_gains(
 
     Example: vftcli tune fixtures/ur5_circle.csv --robot ur5 -o gains.toml
     """
-    from vftcli.cli.console import command_line, detail, health_of, say, say_json, say_recording
+    from vftcli.cli.console import command_line, detail, say, say_json, say_recording
     from vftcli.observers.choice import LOG_GAINS, ObserverChoice
     from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.outputs.examination import health_record, overridden_lines
@@ -53,7 +51,7 @@ def tune_gains(
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.figures import write_tuned
     from vftcli.outputs.log.run_record import jsonable
-    from vftcli.pipeline import AnalysisChoice, examine, model, prepared, read
+    from vftcli.pipeline import examine, model, prepared, read
     from vftcli.readers.library import Library
     from vftcli.robots.run import Runs
     from vftcli.signals.errors import ParameterError
@@ -61,15 +59,12 @@ def tune_gains(
     wanted = parse_goal(goal, threshold)
     form = made.form()
     check_file(output, made.force)
-    library = Library([log])
-    choice = AnalysisChoice(
-        read=reading.choice(),
-        robot=robot.choice(),
+    choice = logged.asked(
+        Library([log]),
+        anyway=anyway,
         free=free.choice(),
         observers=ObserverChoice(gains=LOG_GAINS, causal=True),
         refinement=bias.choice(),
-        library=library,
-        examiner=health_of(library, anyway=anyway),
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     motion = read(recording, arm, choice, Runs())

@@ -8,16 +8,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
 
-from vftcli.readers.columns import ColumnSpec, parse_columns
-from vftcli.readers.opening import Wrapping, head_of, unwrapped
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import LOG, Choice, Option
-from vftcli.signals.remarks import Remark, caution, warning
 
 if TYPE_CHECKING:
+    from vftcli.readers.columns import ColumnSpec
+    from vftcli.readers.opening import Wrapping
     from vftcli.signals.arrays import Array, Indices
     from vftcli.signals.recording import Recording
+    from vftcli.signals.remarks import Remark
     from vftcli.signals.wrench import WrenchFrame
 
 
@@ -29,7 +29,7 @@ class LogFile:
     #: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
     head: bytes = b""
     entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
-    wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
+    wrapping: "Wrapping | None" = None  #: What the file is compressed with as a whole, or None.
 
     @property
     def is_folder(self) -> bool:
@@ -62,8 +62,10 @@ class LogFile:
         release(self.content)
 
     @property
-    def remarks(self) -> tuple[Remark, ...]:
+    def remarks(self) -> "tuple[Remark, ...]":
         """What had to be left behind to open the file."""
+        from vftcli.signals.remarks import warning
+
         if self.wrapping is None or not self._unwrapped[1]:
             return ()
         return (warning("file-cut", wrapping=self.wrapping),)
@@ -71,6 +73,8 @@ class LogFile:
     @cached_property
     def _unwrapped(self) -> tuple[memoryview, bool]:
         """The content, and whether it was cut; read once."""
+        from vftcli.readers.opening import unwrapped
+
         return unwrapped(self.path, self.wrapping)
 
     @cached_property
@@ -105,7 +109,7 @@ class RawLog:
     robot_hint: str | None = None  #: Name of the profile that the log itself settles, or None.
     degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
     #: What the reader dropped, turned or derived, and what looks suspicious.
-    remarks: tuple[Remark, ...] = ()
+    remarks: "tuple[Remark, ...]" = ()
     #: Last values of the columns with the payload: its mass, its centre of mass.
     constants: tuple[float, ...] = ()
     payload_mass: float | None = None  #: Mass the controller was told of. [kg]
@@ -251,8 +255,10 @@ class ReadChoice(Choice):
         return super().parsed(episode=episode, **words)
 
     @property
-    def spec(self) -> ColumnSpec:
+    def spec(self) -> "ColumnSpec":
         """What ``--columns`` says, of nothing where there is no such text."""
+        from vftcli.readers.columns import ColumnSpec, parse_columns
+
         return parse_columns(self.columns) if self.columns is not None else ColumnSpec()
 
     @property
@@ -298,18 +304,22 @@ def open_log(path: Path) -> LogFile:
     """
     if path.is_dir():
         return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
+    from vftcli.readers.opening import head_of
+
     head, wrapping = head_of(path)
     return LogFile(path=path, head=head, wrapping=wrapping)
 
 
 def episode_of(
     path: Path | str, request: ReadChoice, numbers: Sequence[int]
-) -> tuple[int, str, tuple[Remark, ...]]:
+) -> "tuple[int, str, tuple[Remark, ...]]":
     """The episode that is read of those a file holds: the one asked for, else the first, and said.
 
     Returns:
         Its number, its name as a part ("" for the only one), and what is to be said of it.
     """
+    from vftcli.signals.remarks import caution
+
     number, count = request.episode, len(numbers)
     if number is not None and number not in numbers:
         there = f"{count} episodes, {numbers[0]} to {numbers[-1]}"
@@ -324,8 +334,10 @@ def episode_of(
 
 def arm_of(
     path: Path | str, request: ReadChoice, arms: Sequence[str], told: str = ""
-) -> tuple[str, tuple[Remark, ...]]:
+) -> "tuple[str, tuple[Remark, ...]]":
     """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
+    from vftcli.signals.remarks import caution
+
     if request.arm is not None and request.arm not in arms:
         raise LogError(f"{path}: holds the {arms[0]} arm alone; leave --arm out.")
     if request.arm is not None or len(arms) == 1:

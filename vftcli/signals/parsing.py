@@ -1,6 +1,5 @@
 """Words that rooms share: a span of time, a list of numbers, an assignment, a TOML text."""
 
-import tomllib
 from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
@@ -85,6 +84,8 @@ LONGEST = 10_000  #: Letters of a line of TOML; 50 000 dots in one take Python's
 
 def toml_tables(text: str) -> dict[str, Any]:
     """The tables of a TOML text."""
+    import tomllib  # loaded where a file is read, not for --help
+
     for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > LONGEST:
             raise ParameterError(

@@ -3,16 +3,16 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from html import escape
-from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from vftcli.signals.arrays import Array
 from vftcli.signals.letters import printable
 
 if TYPE_CHECKING:
     import polars as pl
-
-    from vftcli.signals.arrays import Array
 
 LONGEST = 160  #: Letters of a line at most.
 #: An array of so many numbers, one a joint of most arms, is shown; of a larger one its shape.
@@ -54,7 +54,7 @@ class Shown:
 
 def cell(value: object) -> str:
     """A value as a table shows it: a dash for what is not known, four digits of a number."""
-    if value is None or (isinstance(value, float) and isnan(value)):
+    if value is None or (isinstance(value, float) and np.isnan(value)):
         return UNKNOWN
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
@@ -69,8 +69,6 @@ def field_texts(owner: object) -> list[tuple[str, str]]:
 
 def value_text(value: object) -> str:
     """A value in a few letters, "" for none."""
-    import numpy as np
-
     if value is None or (isinstance(value, (str, tuple, list, Mapping)) and not value):
         return ""
     if isinstance(value, np.ndarray):
@@ -89,10 +87,8 @@ def joined(values: Iterable[float]) -> str:
     return " ".join(cell(float(value)) for value in values)
 
 
-def per_joint(name: str, values: "Array") -> "Iterator[tuple[str, Array]]":
+def per_joint(name: str, values: Array) -> Iterator[tuple[str, Array]]:
     """One contiguous column a joint, named from 1."""
-    import numpy as np
-
     for j, column in enumerate(np.ascontiguousarray(values.T), start=1):
         yield f"{name}/{j}", column
 
@@ -110,7 +106,5 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
 
 def has_nan(values: Any) -> bool:  # noqa: ANN401 - of an array, or what makes one
     """Whether any number is NaN: the lowest is, then."""
-    import numpy as np
-
     numbers = np.asarray(values, dtype=np.float64)  # of what is not known, None, NaN
     return bool(numbers.size and np.isnan(numbers.min()))
