@@ -1,5 +1,6 @@
 """Options once: a choice's fields say how they are typed, commands are handed what was typed."""
 
+import sys
 from dataclasses import MISSING, dataclass, fields
 from typing import Annotated, ClassVar
 
@@ -10,7 +11,7 @@ from typer.testing import CliRunner
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli.analysis import AnalysisOptions, LogOptions
-from vftcli.cli.options import Bundle, Needed, Typed, command
+from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, command
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.choice import OutputChoice
@@ -19,6 +20,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
+from vftcli.signals.errors import PackageError, ParameterError
 from vftcli.signals.option import Choice, Option
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 
@@ -135,3 +137,14 @@ def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, object]) -> None:
 def test_a_reference_s_options_are_those_of_its_choice() -> None:
     made = ReferenceChoice.parsed(reference="zero", reference_columns=None, contacts=True)
     assert made == ReferenceChoice(name="zero", contacts=True)
+
+
+def test_a_form_of_figures_is_checked_before_anything_is_computed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert [checked_form(form) for form in FORMS] == list(FORMS)
+    with pytest.raises(ParameterError, match="'gif' is not pdf, svg or png"):
+        checked_form("gif")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    with pytest.raises(PackageError, match=r"pip install 'vftcli\[figures\]'"):
+        checked_form("pdf")

@@ -106,7 +106,6 @@ def admit(
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
     from vftcli.outputs.admittance import files_of_replay, write_admittance
-    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
 
@@ -117,7 +116,7 @@ def admit(
     typed = analysis.observers.words
     own, typed["set"] = split_settings(typed["set"] or ())
     control = replace(controllers.choice(), assignments=tuple(own), as_printed=typed["as_printed"])
-    form = checked_form(shown.figures)
+    form = shown.figures
     if output is not None:
         OutputFolder(output, force, files_of_replay(form)).check()
     elif show_made or form:

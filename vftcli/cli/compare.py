@@ -46,17 +46,16 @@ class DrawnErrors(opt.Bundle):
 
     def folder(self) -> "OutputFolder | None":
         """Where the figure goes, None where none is asked for."""
-        from vftcli.outputs.figures.paper import checked_form, figure_files
-
-        form = checked_form(self.figures)
-        if (form is None) != (self.output is None):
+        if (self.figures is None) != (self.output is None):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
         if self.output is None:
             return None
+        from vftcli.outputs.figures.paper import figure_files
         from vftcli.outputs.files import OutputFolder
         from vftcli.outputs.log.figures import ERROR_FIGURES
 
-        folder = OutputFolder(self.output, self.force, figure_files(form, ERROR_FIGURES))
+        names = figure_files(self.figures, ERROR_FIGURES)
+        folder = OutputFolder(self.output, self.force, names)
         folder.check()
         return folder
 

@@ -86,10 +86,12 @@ def identify_robot(
         Option("--validate", "LOG", "Score on this log too. Repeatable."),
     ],
     span: Annotated[
-        str | None,
-        Option("--validate-interval", "A:B", "Use only this span of the --validate logs."),
+        tuple[float, float] | None,
+        Option(
+            "--validate-interval", "A:B", "Use only this span of the --validate logs.", interval
+        ),
     ],
-    free: Annotated[list[str] | None, FreeChoice.option("free")],
+    free: Annotated[list[str] | None, FreeChoice.option("free", reads=None)],
     made: opt.MadeOptions,
     anyway: opt.Anyway,
     _talk: opt.TalkOptions,
@@ -115,11 +117,11 @@ def identify_robot(
     from vftcli.readers.library import Library
 
     task = asked.task(output.stem, friction=logged.robot.words["friction"] != "none")
-    form = made.form()
+    form = made.figures
     OutputFolder(output.parent, made.force, files_beside(output, form)).check()
     choice, chosen = logged.reading.choice(), logged.robot.choice()
     # An episode is one of LOG's; the others are logs of their own.
-    held_out_choice = replace(choice.whole, interval=None if span is None else interval(span))
+    held_out_choice = replace(choice.whole, interval=span)
     unloaded_choice = replace(choice.whole, interval=choice.interval)
     validated, without_load = validate or [], logs_without_load(free, asked.find_payload)
     library = Library([*logs, *validated, *without_load])

@@ -23,7 +23,9 @@ from typing import (
 
 import typer
 
+from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import LOG, OUTPUT, WRENCH, WRITE, Choice, Option
+from vftcli.signals.packages import check_installed
 
 C = TypeVar("C", bound=Choice)
 EMPTY = inspect.Parameter.empty
@@ -65,12 +67,26 @@ Anyway = Annotated[
 Wrench = Annotated[
     bool, Option("--wrench", "", "Also the wrench, as force on the robot.", group=WRENCH)
 ]
+
+
+FORMS = ("pdf", "svg", "png")  #: What figures may be written as.
+
+
+def checked_form(form: str) -> str:
+    """What figures are written as; refused where what draws them is missing."""
+    if form not in FORMS:
+        raise ParameterError(f"--figures {form!r} is not {', '.join(FORMS[:-1])} or {FORMS[-1]}")
+    check_installed("matplotlib", "--figures")
+    return form
+
+
 Figures = Annotated[
     str | None,
     Option(
         "--figures",
-        "pdf|svg|png",
+        "|".join(FORMS),
         "Also figures for a paper, one and two columns wide.",
+        checked_form,
         group=WRITE,
     ),
 ]
@@ -111,12 +127,6 @@ class MadeOptions(Bundle):
     figures: Figures
     json: Json
     force: Force
-
-    def form(self) -> str | None:
-        """What figures are written as, checked; None where none are asked for."""
-        from vftcli.outputs.figures.paper import checked_form
-
-        return checked_form(self.figures)
 
 
 class TalkOptions(Bundle):
@@ -193,6 +203,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
         plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
         return Part([(plain, Option("", "", ""))], lambda values: values[name])
     what, option = get_args(kind)
+    what = str | None if option.reads else what
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
@@ -201,7 +212,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     single = inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]
     )
-    return Part([(single, option)], lambda values: values[name])
+    return Part([(single, option)], lambda values: option.read(values[name]))
 
 
 def typed_as(
@@ -218,7 +229,7 @@ def typed_as(
     what: Any = list[one] if option.several else one if option.metavar else bool  # type: ignore[valid-type]
     if not (needed and default is EMPTY) and option.metavar:
         what = what | None
-    grouped = option._replace(group=choice.GROUP)
+    grouped = option._replace(group=choice.GROUP, reads=None)
     return Annotated[what, grouped], default if option.shows_default else EMPTY
 
 

@@ -46,7 +46,6 @@ def report(
     from vftcli.cli.jacobian import write_by_jacobian
     from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published
-    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
     from vftcli.pipeline import WRITING
@@ -54,8 +53,8 @@ def report(
     from vftcli.readers.table import JacobianError
 
     library = Library(logs)
-    written, form = also.choice(), checked_form(figures)
-    names = report_files([library.label(log) for log in logs], written.extras, form)
+    written = also.choice()
+    names = report_files([library.label(log) for log in logs], written.extras, figures)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
     if published is not None:
@@ -73,11 +72,17 @@ def report(
     command, failed = command_line(), left_out.reasons
     if len(analyses) + len(failed) == 1:
         record = write_report(
-            output, analyses[0], command=command, force=force, choice=written, form=form
+            output, analyses[0], command=command, force=force, choice=written, form=figures
         )
     else:
         record = write_reports(
-            output, analyses, command=command, force=force, choice=written, form=form, failed=failed
+            output,
+            analyses,
+            command=command,
+            force=force,
+            choice=written,
+            form=figures,
+            failed=failed,
         )
     say_left_out(FILES)
     if json:

@@ -34,7 +34,6 @@ def reproduce(
     Example: vftcli reproduce huang2025 --only table3 -o paper
     """
     from vftcli.cli.console import command_line, say, show, stages
-    from vftcli.outputs.figures.paper import checked_form
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
@@ -43,9 +42,9 @@ def reproduce(
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli reproduce")
-    wanted, form = paper_of(paper), checked_form(figures)
+    wanted = paper_of(paper)
     names = wanted.chosen(only)
-    folder = OutputFolder(output, force, files_of(wanted, names, form))
+    folder = OutputFolder(output, force, files_of(wanted, names, figures))
     folder.check()
     jobs, progress = jobs_of(wanted, names, fast), stages()
     progress(f"{len(jobs)} runs", 0.0, 0.0)
@@ -55,7 +54,7 @@ def reproduce(
 
     found = gather(wanted, names, run_jobs(jobs, told))
     with folder:
-        write_reproduction(folder, wanted, found, jobs, command_line(), form)
+        write_reproduction(folder, wanted, found, jobs, command_line(), figures)
     show(terminal(short_overview(found)))
     say(f"wrote {output}: vftcli open {output}")
     if any(shown.failures for shown in found.values()):

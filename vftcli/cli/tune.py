@@ -57,7 +57,6 @@ def tune_gains(
     from vftcli.signals.errors import ParameterError
 
     wanted = parse_goal(goal, threshold)
-    form = made.form()
     check_file(output, made.force)
     choice = logged.asked(
         Library([log]),
@@ -78,7 +77,7 @@ def tune_gains(
     notes = [str(remark) for remark in (*found.remarks, *reached)]
     doubts = overridden_lines(examinations)
     heading = [*doubts, command_line(), f"goal: {goal}", f"robot: {arm.name}", *notes]
-    write_tuned(output, heading, spectra, tuned, force=made.force, form=form)
+    write_tuned(output, heading, spectra, tuned, force=made.force, form=made.figures)
     if made.json:
         rows = [jsonable(line.record) for line in tuned]
         health = jsonable(health_record(examinations))

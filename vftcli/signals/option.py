@@ -31,6 +31,10 @@ class Option(NamedTuple):
     least: float | None = None  #: Smallest number that is taken.
     most: float | None = None  #: Largest number that is taken.
 
+    def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
+        """What a typed value means, None where nothing was typed."""
+        return self.reads(typed) if self.reads and typed is not None else typed
+
     @property
     def word(self) -> str:
         """The name as a keyword, ``robot_arg`` of ``--robot-arg``."""
@@ -64,6 +68,5 @@ class Choice:
         for word, typed in words.items():
             field, _, option = options[word]
             if typed is not None and (typed or not option.several):
-                value = tuple(typed) if option.several else typed
-                values[field] = option.reads(value) if option.reads else value
+                values[field] = option.read(tuple(typed) if option.several else typed)
         return cls(**values)

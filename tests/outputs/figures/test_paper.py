@@ -1,21 +1,17 @@
 import re
-import sys
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from vftcli.outputs.figures.paper import (
-    FORMS,
     Drawing,
-    checked_form,
     figure_files,
     sheet,
     shortened,
     write_figures,
 )
 from vftcli.outputs.files import OutputFolder
-from vftcli.signals.errors import PackageError, ParameterError
 
 matplotlib = pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
@@ -34,7 +30,7 @@ def written(folder: Path, form: str) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", ["pdf", "svg", "png"])
 def test_the_same_figure_has_the_same_bytes_whatever_its_user_prefers(
     form: str, tmp_path: Path
 ) -> None:
@@ -74,17 +70,6 @@ def test_a_png_has_600_dots_an_inch_and_an_svg_needs_no_font(tmp_path: Path) -> 
     assert 'width="515.52pt"' in text
     assert "<text" not in text
     assert "font-family" not in text
-
-
-def test_a_form_is_checked_before_anything_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert checked_form(None) is None
-    assert [checked_form(form) for form in FORMS] == list(FORMS)
-    with pytest.raises(ParameterError, match="'gif' is not pdf, svg or png"):
-        checked_form("gif")
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(PackageError, match=r"pip install 'vftcli\[figures\]'"):
-        checked_form("pdf")
-    assert checked_form(None) is None
 
 
 @pytest.mark.slow

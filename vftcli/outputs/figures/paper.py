@@ -10,9 +10,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.outputs.files import OutputFolder
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
-from vftcli.signals.packages import check_installed
 from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
@@ -20,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
-FORMS = ("pdf", "svg", "png")  #: What a figure may be written as.
 WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
 RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. [dots/in]
 
@@ -69,16 +66,6 @@ class Drawing(NamedTuple):
     title: str  #: What it shows, with sign and frame, as its file says.
     #: Its width [in] → the figure; called where the style of a paper holds.
     draw: "Callable[[float], Figure]"
-
-
-def checked_form(form: str | None) -> str | None:
-    """What figures shall be written as; None where none are asked for."""
-    if form is None:
-        return None
-    if form not in FORMS:
-        raise ParameterError(f"--figures {form!r} is not {', '.join(FORMS[:-1])} or {FORMS[-1]}")
-    check_installed("matplotlib", "--figures")
-    return form
 
 
 def figure_files(form: str | None, names: Sequence[str], before: str = "figures/") -> list[str]:
