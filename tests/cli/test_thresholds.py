@@ -86,7 +86,7 @@ def test_a_simulated_log_is_checked_against_the_truth_beside_it(run: Run) -> Non
     words = ("--robot", "panda", "--rate", 60, "--anyway")
     code, out, err = run("thresholds", log, *words, "--check", log)
     assert code == 0, err
-    assert "of 3 contacts caught" in out
+    assert "of 3 contacts detected" in out
     assert "contacts are those of the reference file:panda_bearing.csv.truth.parquet" in err
     # It is no free log: J2 bears the load for half of it.
     assert "looks touched" in err

@@ -162,7 +162,7 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
     efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
     if not efforts:
         raise MissingSignalError(
-            f"{recording.name}: no joint torques or currents, so no forces can be told; ports of "
+            f"{recording.name}: no joint torques or currents, so no forces can be estimated; ports of "
             "DROID and Open X-Embodiment leave them out, DROID's raw release has them"
         )
     for value in efforts if not anyway else ():
@@ -238,7 +238,7 @@ def force_columns(
         "version": f"vftcli {VERSION}",
     }
     joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}
-    flag = {"units": "1", "frame": "none", "sign": "1 where told, 0 where filled with 0", **made}
+    flag = {"units": "1", "frame": "none", "sign": "1 where known, 0 where filled with 0", **made}
     found = [("external_torque", tuple(names), joint)]
     if choice.sd:
         found.append(("external_torque_sd", tuple(names), {**joint, "sign": "not negative"}))

@@ -95,7 +95,7 @@ def load_at_flange(
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
     if mass <= 0 or mass_sd > 0.5 * mass:
         raise IdentificationError(
-            f"{names}: no load can be told: mass {mass:.3g} ± {mass_sd:.2g} kg; "
+            f"{names}: no load found: mass {mass:.3g} ± {mass_sd:.2g} kg; "
             "use poses or motions in which gravity loads several joints differently"
         )
     R = robot.chain.flange_rotation

@@ -29,7 +29,7 @@ def load_doubt(analysis: Analysis) -> str:
         return ""
     if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
         return ""
-    return "But the arm bears a load that nobody told: they may be its weight."
+    return "But the arm carries an unknown load: they may be its weight."
 
 
 def otherwise(found: ContactList) -> str:
@@ -170,7 +170,7 @@ def reason(contact: Contact) -> str:
     if contact.evidence is None or contact.evidence < SURE_NATS:
         return "little evidence: friction explains nearly as much"
     if contact.peak_force is None or contact.peak_band is None:
-        return "no force can be told with so few joints"
+        return "too few joints to know the force"
     share = contact.peak_band / max(contact.peak_force, 1e-9)
     text = f"the band is {share:.0%} of the force"
     if contact.trust == "good" and share <= TIGHT and contact.anywhere is not None:

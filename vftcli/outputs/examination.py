@@ -74,7 +74,7 @@ def examination_text(examination: Examination) -> str:
     if recording.wrench_frame:
         lines.append(f"  wrench    {recording.wrench_frame}")
     if recording.payload_mass is not None:
-        lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller was told")
+        lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller assumes")
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
     lines += [
         f"  fit       {fit}{'' if fit.fits else ': does not fit'}"

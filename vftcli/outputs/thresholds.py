@@ -87,7 +87,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
 def check_grid(check: ContactCheck) -> Grid:
     """The contacts of a log, and what told them."""
     return Grid(
-        title=f"{check.log}: what they would have caught",
+        title=f"{check.log}: what they would have detected",
         columns=(
             Column("#"),
             Column("from", unit="s", form=".2f"),
@@ -115,12 +115,12 @@ def check_line(check: ContactCheck) -> str:
         least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
         return f"{check.log}: {counted(count, 'alarm')}{least}"
     caught, all_of_them = len(check.caught), len(check.contacts)
-    words = [f"{check.log}: {caught} of {all_of_them} contacts caught"]
+    words = [f"{check.log}: {caught} of {all_of_them} contacts detected"]
     if caught:
         words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
         words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
     if not isnan(check.smallest_caught):
-        words.append(f"the weakest caught {significant(check.smallest_caught)} N")
+        words.append(f"the weakest detected {significant(check.smallest_caught)} N")
     if not isnan(check.largest_missed):
         words.append(f"the hardest missed {significant(check.largest_missed)} N")
     if on := sum(contact.was_on for contact in check.contacts):

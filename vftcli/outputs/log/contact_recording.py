@@ -89,7 +89,7 @@ def contact_log(found: ContactList) -> list[LogLine]:
         begins = remark.where.span[0] if remark.where.span is not None else 0.0
         lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
     if not found.contacts:
-        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", GREY))
+        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as known", GREY))
     return lines
 
 

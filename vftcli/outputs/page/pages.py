@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 #: Heads of the overview.
-HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
+HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
 
 def render(analysis: Analysis) -> str:
