@@ -243,17 +243,17 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
     if rests.any():
         dry, joints = dry_friction(robot.friction, robot.joints), np.flatnonzero(rests).tolist()
         sizes = ", ".join(f"{dry[j]:.2g}" for j in joints)
-        words = f"friction holds {joint_words(joints)} against what touches"
+        words = f"{joint_words(joints)}: friction hides pushes"
         if robot.friction:
-            words = f"friction hides up to {sizes} N·m on {joint_words(joints)}"
+            words = f"{joint_words(joints)}: pushes below {sizes} N·m do not show"
         subject = "the arm is still" if rests.all() else "joints at rest"
         yield Ground("caution", subject, words, of_log=False)
     name, own = robot_option(analysis), f"my_{robot.name}.toml"
     if not robot.friction or is_profile(analysis):
         free = next((path_of(run.recording) for run in analysis.motion.runs), "free.csv")
-        where = "the profile's" if robot.friction else "none is modelled"
+        where = "a typical arm's" if robot.friction else "none is modelled"
         remedy = shlex.join(["vftcli", "identify", free, "--robot", name, "-o", own])
-        words = f"{where}; your own arm's from one free minute:"
+        words = f"{where}. Measure yours (1 min contact-free):"
         yield Ground("caution", "friction", words, remedy, of_log=False)
     else:
         yield Ground("good", "friction", f"from {name}", of_log=False)
@@ -289,7 +289,7 @@ def reference_ground(analysis: Analysis) -> Ground:
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
     standing: Standing = "unknown"
-    words, remedy = "nothing here measures the force; sizes are checked by nothing", None
+    words, remedy = "no force sensor in the log: sizes are unchecked", None
     for kind, name in (("vendor", "the vendor's own estimate"), ("sensor", "the log's own sensor")):
         forces = [getattr(contact, f"{kind}_force") for contact in contacts]
         own = kind == "vendor" and not contacts and analysis.recording.tau_ext is not None

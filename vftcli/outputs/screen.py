@@ -91,7 +91,7 @@ def facts(analysis: Analysis) -> str:
     fit = ""
     if match is not None:
         left = percent(match.misfit)
-        fit = f" (fits {left})" if match.fits else f" (does not fit: {left} unexplained)"
+        fit = f" (model error {left})" if match.fits else f" (does not fit: model error {left})"
     span = f"{recording.duration:.1f} s"
     if recording.samples > 1:
         rate = 1.0 / recording.median_step

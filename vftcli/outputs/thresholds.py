@@ -30,7 +30,7 @@ def thresholds_text(
 def thresholds_grid(thresholds: Thresholds) -> Grid:
     """Every threshold with its interval, and the tail it comes from."""
     return Grid(
-        title=f"passed untouched by any joint, or any axis, {thresholds.rate:g} × an hour",
+        title=f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis",
         columns=(
             Column("", words=True, width=3),
             Column("threshold"),
