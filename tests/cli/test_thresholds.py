@@ -43,7 +43,7 @@ def pushed(free: Path) -> Path:
 def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run: Run) -> None:
     code, out, err = run("thresholds", free, *COLUMNS, "--rate", 60, "--check", pushed)
     assert code == 0, err
-    assert "any axis, 60 × an hour" in out
+    assert "contact 60 × an hour" in out
     assert "robot.set_collision_behavior(" in out
     assert "collision_config:" in out
     assert "pushed.npy: 1 alarm, the weakest at" in out
