@@ -2,13 +2,12 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +19,9 @@ class LogFormat:
     recording: str  #: How a user records one.
     takes: str  #: Which signals are taken from it.
     pitfalls: str  #: What to look out for.
-    module: str  #: Module of this room that reads it, imported when it is needed.
+    #: Module of this room that reads it, imported when it is needed: by its `read`, or by its
+    #: `episodes`, which gives each one's number and the function that reads it.
+    module: str
     begins: str = ""  #: Pattern of the content's first bytes, "" for any.
     line: str = ""  #: Pattern of a text's first line, "" for any.
     folder: bool = False  #: Whether it is a folder.
@@ -50,13 +51,21 @@ class LogFormat:
 
     def read(self, file: LogFile, request: ReadChoice) -> RawLog:
         """Read a file of this format."""
-        found: RawLog = self._module.read(file, request, self)
-        return found
+        if not self.episodes:
+            found: RawLog = self._module.read(file, request, self)
+            return found
+        with self._module.episodes(file) as each:
+            number, part, remarks = episode_of(file.path, request, tuple(each))
+            raw: RawLog = each[number](request)
+        part = " ".join(word for word in (part, raw.part) if word)
+        return replace(raw, part=part, remarks=(*remarks, *raw.remarks))
 
-    def numbers(self, file: LogFile) -> Sequence[int]:
+    def numbers(self, file: LogFile) -> tuple[int, ...]:
         """The numbers of a file's episodes; of a format that holds one recording none."""
-        found: Sequence[int] = self._module.episodes_in(file) if self.episodes else ()
-        return found
+        if not self.episodes:
+            return ()
+        with self._module.episodes(file) as each:
+            return tuple(each)
 
 
 #: Every format by its name.

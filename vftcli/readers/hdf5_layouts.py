@@ -7,23 +7,25 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.formats import LogFormat
+from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.hdf5 import Hdf5Table, natural, opened, table_of
 from vftcli.readers.picking import rate_words
 from vftcli.readers.reader import (
     ARMS,
+    Episodes,
     LogFile,
     RawLog,
     ReadChoice,
     arm_of,
-    episode_of,
     open_log,
     refuse_arm,
 )
@@ -200,48 +202,40 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
     return any(path is not None for _, path in looked_at)
 
 
-def episodes_below(file: LogFile) -> list[Path]:
-    """The episodes of DROID's folder, by name."""
-    found = [path for path in trajectories(file.path) if path is not None]
-    if not found:
-        raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
-    return found
-
-
-def read_release(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read one episode of DROID's folder."""
-    paths = episodes_below(file)
-    number, part, remarks = episode_of(file.path, request, range(len(paths)))
-    raw = read(open_log(paths[number]), replace(request, episode=None))
-    if part:
-        place = str(paths[number].parent.relative_to(file.path))
-        remarks = (*remarks, fact("episode-place", place=place))
-    return replace(raw, part=part, files=(paths[number],), remarks=(*remarks, *raw.remarks))
-
-
-def read(file: LogFile, request: ReadChoice, _: LogFormat | None = None) -> RawLog:
-    """Read an HDF5 log, or one episode of it or of DROID's folder."""
+@contextmanager
+def episodes(file: LogFile) -> Iterator[Episodes]:
+    """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
     if file.is_folder:
-        return read_release(file, request)
+        paths = [path for path in trajectories(file.path) if path is not None]
+        if not paths:
+            raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
+        places = [str(path.parent.relative_to(file.path)) for path in paths]
+        yield placed(range(len(paths)), places, [partial(read_trajectory, path) for path in paths])
+        return
     with opened(file) as content:
         table = table_of(file.path, content)
         layout, groups = layout_of(table)
-        numbers = numbers_of(groups)
-        number, part, remarks = episode_of(file.path, request, numbers)
-        group = groups[numbers.index(number)]
-        if part:
-            remarks = (*remarks, fact("episode-place", place=group.rstrip("/")))
-        raw = layout.read(table.within(group), request)
-        parts = " ".join(word for word in (part, raw.part) if word)
-        return replace(raw, part=parts, remarks=(*remarks, *raw.remarks))
+        each = [partial(layout.read, table.within(group)) for group in groups]
+        yield placed(numbers_of(groups), [group.rstrip("/") for group in groups], each)
 
 
-def episodes_in(file: LogFile) -> tuple[int, ...]:
-    """The numbers of the episodes of an HDF5 file, or of DROID's folder, counted from 0."""
-    if file.is_folder:
-        return tuple(range(len(episodes_below(file))))
-    with opened(file) as content:
-        return numbers_of(layout_of(table_of(file.path, content))[1])
+def placed(
+    numbers: Sequence[int], places: Sequence[str], each: Sequence[Callable[[ReadChoice], RawLog]]
+) -> Episodes:
+    """Episodes by number; the place of one of several is said."""
+
+    def read(k: int, request: ReadChoice) -> RawLog:
+        raw = each[k](request)
+        said = (fact("episode-place", place=places[k]),) if len(places) > 1 else ()
+        return replace(raw, remarks=(*said, *raw.remarks))
+
+    return {number: partial(read, k) for k, number in enumerate(numbers)}
+
+
+def read_trajectory(path: Path, request: ReadChoice) -> RawLog:
+    """Read the file of one of DROID's episodes."""
+    raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
+    return replace(raw, part="", files=(path,))
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
