@@ -2,20 +2,18 @@
 
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from vftcli.readers.opening import check_unpacked, unpacked_limit
 from vftcli.readers.reader import LogFile
 from vftcli.readers.table import Column, listed
+from vftcli.readers.tables import ArrayTable
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
-from vftcli.signals.remarks import Remark
 
 #: Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders.
 DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
@@ -81,66 +79,35 @@ def opened(file: LogFile) -> Iterator[Any]:
         raise LogError(f"{file.path}: a damaged HDF5 file ({reason})") from None
 
 
-class Hdf5Table:
+class Hdf5Table(ArrayTable):
     """The datasets of numbers in an open HDF5 file, or in one group of it, each a column.
 
     Images, texts, references, links to other files and what claims more than it stores are left
     out; nothing is read before it is asked for.
-
-    Attributes:
-        path: The file.
     """
 
-    remarks: tuple[Remark, ...] = ()  #: Nothing: whoever reads it knows what there is to say.
-
-    def __init__(self, path: Path, datasets: Mapping[str, Any]) -> None:
-        self.path: Path | str = path
-        self._datasets = dict(datasets)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The datasets' paths."""
-        return tuple(self._datasets)
-
-    @property
-    def width(self) -> int:
-        """Number of datasets."""
-        return len(self._datasets)
-
-    @property
-    def lists(self) -> Mapping[int, int]:
-        """Datasets of rows, and the length of a row."""
-        kinds = enumerate(self._datasets.values())
-        return {k: data.shape[1] for k, data in kinds if data.ndim == 2 and data.shape[1] != 1}
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.lists = {k: width for k, width in self.lists.items() if width != 1}
 
     def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
         """The datasets below a group, by their paths from there on, and others by theirs."""
-        below = {n.removeprefix(group): d for n, d in self._datasets.items() if n.startswith(group)}
-        return Hdf5Table(Path(self.path), {name: self._datasets[name] for name in also} | below)
+        below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
+        return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
-        names, datasets = list(self._datasets), list(self._datasets.values())
-        if len({datasets[c].shape[0] for c in columns}) > 1:
-            lengths = ", ".join(f"{names[c]} {datasets[c].shape[0]}" for c in columns)
-            raise LogError(f"{self.path}: the datasets differ in length: {lengths} rows.")
-        return {c: self._numbers(datasets[c], c == clock) for c in columns}
+        return super().load(columns, clock)
 
     def check_size(self, columns: Sequence[int]) -> None:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
-        names, datasets = list(self._datasets), list(self._datasets.values())
+        names, datasets = list(self.columns), list(self.columns.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
         what = f"{self.path}: {listed([names[c] for c in columns])}"
         check_unpacked(what, 8 * sum(datasets[c].size for c in columns), stored)
         for c in columns:
             check_chunks(f"{self.path}: {names[c]}", datasets[c], unpacked_limit(stored))
-
-    def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
-        """One dataset. (T,) or (T, k)"""
-        whole = is_clock and dataset.dtype.kind in "iu" and dataset.dtype.itemsize == 8
-        numbers: Column = np.asarray(dataset[()]).astype(np.int64 if whole else np.float64)
-        return numbers[:, 0] if numbers.ndim == 2 and numbers.shape[1] == 1 else numbers
 
 
 def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # noqa: ANN401 - h5py

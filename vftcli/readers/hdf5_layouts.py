@@ -85,16 +85,10 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     usual += f",current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
-    raw = described(table, recorded(usual, names), request, remarks=remarks)
+    raw = described(table, usual, request, remarks=remarks)
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
     own = raw.clock == rate_words(ALOHA_RATE)
     return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
-
-
-def recorded(usual: str, names: Sequence[str]) -> str:
-    """The items of a text of which a file has the columns; its clock and positions always."""
-    items = [(item, item.partition("=")[2].partition("[")[0]) for item in usual.split(",")]
-    return ",".join(item for item, name in items if name in names or re.match(r"[tq]\b", item))
 
 
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
@@ -105,8 +99,7 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     names = table.names
     remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
-    usual = recorded(DROID_USUAL, names)
-    raw = described(table, usual, request, remarks=remarks, clock_name=clock)
+    raw = described(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
     return replace(raw, robot_hint=robot_of(Path(table.path).parent))
 
 
