@@ -179,7 +179,7 @@ class LogCollection:
                 return
         except LogError:
             pass
-        from vftcli.readers.hdf5_layouts import TRAJECTORY
+        from vftcli.readers.hdf5 import TRAJECTORY
 
         written = files_written(folder)
         if (folder / TRAJECTORY).is_file():

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
 from vftcli.readers.formats import FORMATS
-from vftcli.readers.hdf5_layouts import episode_places
+from vftcli.readers.hdf5 import episode_places
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
