@@ -18,8 +18,7 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
 from vftcli.outputs.page.pages import batch_lines, render_batch
-from vftcli.readers.collection import LogEntry
-from vftcli.readers.library import absolute, labelled
+from vftcli.readers.library import LogEntry, absolute, labelled
 
 if TYPE_CHECKING:
     import polars as pl

@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -256,6 +256,10 @@ def open_log(path: Path) -> LogFile:
         return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
     head, wrapping = head_of(path)
     return LogFile(path=path, head=head, wrapping=wrapping)
+
+
+#: The number of each episode of a file, rising, and the function that reads it.
+Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 
 
 def episode_of(
