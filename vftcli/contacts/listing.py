@@ -279,7 +279,7 @@ def limits(run: Run, free: Untouched, stops: tuple[float, ...], smallest: float)
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     if free.basis != "free motion":
         return found
-    unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
+    unseen = [j + 1 for j in np.flatnonzero(~free.noise.seen).tolist()]
     if len(unseen) == run.robot.joints:
         # At rest the free part shows no friction of motion: the share of F_c that is added does.
         dry = UNSEEN_SHARE * free.noise.dry

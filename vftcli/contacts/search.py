@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
 from vftcli.contacts.evidence import evidence
-from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, spiked_white
+from vftcli.contacts.model_error import UNKNOWN, error_course, spiked_white
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
@@ -16,6 +16,7 @@ from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import runs_of
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
@@ -57,7 +58,7 @@ class Found(NamedTuple):
         )
 
 
-def search(run: Run, noise: ErrorNoise, level: Array, seconds: float) -> Found:
+def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Found:
     """Look for contacts along a log.
 
     Args:
