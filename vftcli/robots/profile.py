@@ -11,10 +11,9 @@ import numpy as np
 from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
 from vftcli.robots.conventions import CONVENTIONS, Kinematics
-from vftcli.robots.friction import PRESLIDING, falling_friction
+from vftcli.robots.friction import PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section
-from vftcli.robots.temperature import lawless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_matrix

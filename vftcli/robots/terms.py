@@ -7,8 +7,7 @@ import numpy as np
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
 from vftcli.robots.kernels import momentum_chunks
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction
-from vftcli.robots.temperature import measured_temperature
+from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import Clock
