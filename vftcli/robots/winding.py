@@ -24,13 +24,11 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:
             # A sample that is missing is no number; what is wound up behind it would be none.
-            steps = np.abs(np.diff(values[:, columns], axis=0)).max(axis=0, initial=0.0)
-            turns = [j for j, step in zip(columns, steps, strict=True) if step > np.pi]
-            if turns:
-                smooth = values.copy()
+            steps = np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
+            if turns := [j for j in columns if steps[j] > np.pi]:
+                changed[signal] = smooth = values.copy()
                 smooth[:, turns] = np.unwrap(values[:, turns], axis=0)
-                changed[signal] = smooth
-                jumping |= set(turns)
+                jumping.update(turns)
     if not changed:
         return recording
     said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
