@@ -10,7 +10,7 @@ import numpy as np
 
 from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
-from vftcli.robots.conventions import CONVENTIONS
+from vftcli.robots.conventions import CONVENTIONS, kinematics
 from vftcli.robots.friction import PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section
@@ -134,15 +134,15 @@ def joint_names(joints: Sequence[Section]) -> tuple[str, ...]:
 
 def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     """The chain, each joint with the keys of the file's convention and a body that can be."""
-    convention = CONVENTIONS[root.choice("convention", CONVENTIONS)]
+    convention = root.choice("convention", CONVENTIONS)
+    numbers, vectors = CONVENTIONS[convention]
     frames: list[dict[str, Any]] = [
-        {key: joint.number(key) for key in convention.numbers}
-        | {key: joint.vector(key, 3) for key in convention.vectors}
+        {key: joint.number(key) for key in numbers} | {key: joint.vector(key, 3) for key in vectors}
         for joint in joints
     ]
     end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
     end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
-    placements, inertial_frames, tip = convention.kinematics(frames, end)
+    placements, inertial_frames, tip = kinematics(convention, frames, end)
     masses, coms, inertias = [], [], []
     for joint, frame in zip(joints, inertial_frames, strict=True):
         mass, com, tensor = checked_body(joint)
