@@ -62,7 +62,7 @@ FILES = (
     "robots/robot.py",
     "robots/robot_file.py",
     "robots/writing.py",
-    "robots/xacro_text.py",
+    "robots/xml_text.py",
     "signals/identity.py",  # the digest of what was read
     "signals/remarks.py",  # the catalogue of words
     "simulation/load.py",

@@ -13,7 +13,6 @@ from vftcli.admittance.parameters import (
     from_table,
     is_admittance_setting,
     parse_settings,
-    release_deviation,
 )
 from vftcli.robots import PROFILES, Robot
 from vftcli.robots.choice import RobotChoice
@@ -89,39 +88,15 @@ def split_settings(assignments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, [text for text in assignments if text not in own]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReleaseChoice:
-    """A release from rest."""
-
-    deviation: Array  #: From the target pose. (6,) [m, rad]
-    #: Joint positions of the target pose, None for the robot file's. [rad]
-    start: tuple[float, ...] | None = None
-    duration: float | None = None  #: How long to watch, None for as long as it takes. [s]
-
-    @classmethod
-    def parsed(
-        cls,
-        *,
-        release: Sequence[str],
-        start: str | None = None,
-        duration: float | None = None,
-    ) -> "ReleaseChoice":
-        """The choice that ``--release AXIS=VALUE``, ``--start`` and ``--duration`` state."""
-        return cls(
-            deviation=release_deviation(release),
-            start=listed(start, "--start") if start is not None else None,
-            duration=duration,
+def start_pose(robot: Robot, text: str | None) -> Array:
+    """Joint positions of a release's target pose: ``--start``, else the robot file's. (n,) [rad]"""
+    start = robot.admittance.get("start") if text is None else listed(text, "--start")
+    if start is None:
+        raise ParameterError(
+            f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"
+            f"q{robot.joints} [rad]"
         )
-
-    def pose(self, robot: Robot) -> Array:
-        """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]"""
-        start = self.start or robot.admittance.get("start")
-        if start is None:
-            raise ParameterError(
-                f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"
-                f"q{robot.joints} [rad]"
-            )
-        return np.array(start, dtype=np.float64)
+    return np.array(start, dtype=np.float64)
 
 
 def released_robot(choice: RobotChoice) -> Robot:

@@ -229,19 +229,20 @@ def released(
     release: ReleaseOptions, analysis: opt.AnalysisOptions, control: "ControlChoice"
 ) -> "Replay":
     """A release from rest."""
-    from vftcli.admittance.choice import ReleaseChoice, released_robot
+    from vftcli.admittance.choice import released_robot, start_pose
+    from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
 
-    choice = ReleaseChoice.parsed(**release.words())
+    deviation = release_deviation(release.release or ())
     arm = released_robot(chosen(analysis).robot)
     settings = control.parameters(arm)
     return replay_release(
-        choice.deviation,
+        deviation,
         arm,
         settings,
         control.controllers(settings),
-        start=choice.pose(arm),
-        duration=choice.duration,
+        start=start_pose(arm, release.start),
+        duration=release.duration,
         force_unstable=control.force_unstable,
     )
 

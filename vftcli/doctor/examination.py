@@ -17,9 +17,8 @@ from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
-from vftcli.robots.pairing import paired
+from vftcli.robots.pairing import paired, unwound
 from vftcli.robots.robot import Robot
-from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording

@@ -7,8 +7,8 @@ import numpy as np
 
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
-from vftcli.robots.friction import steady_torque
-from vftcli.robots.temperature import friction_factor, measured_temperature
+from vftcli.robots.friction import friction_factor, steady_torque
+from vftcli.robots.running_friction import measured_temperature
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning

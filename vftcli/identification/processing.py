@@ -10,8 +10,7 @@ from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction
-from vftcli.robots.temperature import measured_temperature
+from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase

@@ -21,9 +21,8 @@ from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.terms import DynamicsTerms
