@@ -28,9 +28,9 @@ from vftcli.signals.recording import Recording
 RANGE = 10.0
 EXPLAINED = 0.6  #: Most of the misfit that a cause leaves.
 SLIGHT = 0.75  #: That of an offset: it lowers the misfit less than a sign.
-OPEN = 0.45  #: Largest misfit beside a cause; no gravity beside a hand leaves .37.
+OPEN = 0.45  #: Largest misfit that a cause leaves; no gravity beside a hand leaves .37.
 GOOD = 0.03  #: Below this misfit the costly swap of two joints is not tried.
-AMBIGUOUS = 1.25  #: Ratio of misfits below which a second cause is named too.
+AMBIGUOUS = 1.25  #: A second cause nearer than this ratio of misfits is named too.
 CLEAR = 1.5  #: Ratio of misfits by which another reading beats the second best.
 #: Ratio of misfits by which another reading beats the stated one that fits.
 #:
@@ -44,15 +44,15 @@ SUSPECT = 0.35  #: Least misfit of a joint to try its sign and place.
 #: Most of the misfit after one joint's sign change, and after two joints' exchange.
 TURNED, SWAPPED = 0.5, 0.7
 FEW = 60  #: Windows for every pair of joints: each pair evaluates the model again.
-CARRIES = 0.25  #: Gravity's least share of an effort that shows the joint's place.
+CARRIES = 0.25  #: Least share of gravity in an effort that shows the joint's place.
 OFFSET = 0.1  #: Least offset of a joint's effort, relative to the effort.
 #: Windows of a joint's motion, each way and both, for an offset beyond stiction.
 FORTH_AND_BACK, BOTH = 8, 30
 #: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its weight
 #: then, relative to the robot file's.
 TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
-#: Least deviation of a drive's factor from 1, of all joints (sound logs: .06) and of one,
-#: which a load moves too.
+#: Least deviation of a drive's factor from 1, of all joints (sound logs stay within .06)
+#: and of one, which a load moves too.
 OFF, ALONE = 0.08, 0.1
 OTHERS = 0.05  #: Largest error of the other joints' factors beside one wrong one.
 LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
@@ -129,7 +129,7 @@ class Diagnosis(NamedTuple):
 
 
 def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Diagnosis | None:
-    """The one cause for a log of an arm; None without an effort to judge."""
+    """The cause of a log's misfit with its arm; None without an effort to judge."""
     may_be = list(readings(recording, robot, windows_of(recording, robot), ignored))
     if not may_be:
         return None
@@ -297,7 +297,7 @@ def swapped(case: Case) -> Iterator[Cause]:
     far = case.by_joint > SUSPECT
     gravity = np.sqrt(np.mean(case.gravity**2, axis=0))
     if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
-        return  # the model asks no gravity torque of a joint far from it
+        return  # gravity loads none of the joints with a large misfit
     few = spread(len(case.given), FEW)
     for i, j in combinations(np.flatnonzero(far).tolist(), 2):
         given = case.exchanged(i, j).given[few]
@@ -353,7 +353,7 @@ def is_modelled(case: Case, robot: Robot) -> bool:
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)
     if moving.sum() < WITHOUT:
         return False
-    # An empty joint gets the model's torque as its effort.
+    # A joint without information has the model's torque as its effort.
     tells = np.abs(case.given - case.needed).max(axis=0) > 1e-9 * case.size
     static = solve((case.given - case.gravity) * tells, case.windows.friction)
     for fit in (case.bare, static):

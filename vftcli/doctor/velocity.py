@@ -42,9 +42,9 @@ LATE = 0.008
 #: Ratio of open shares at which another joint's position beats the own with a lag, and the
 #: largest gain error of the own for this.
 ANOTHER, ALIKE = 0.25, 0.3
-OPEN = 0.1  #: Most of a velocity that its position leaves open.
+OPEN = 0.1  #: Largest open share of a velocity for its gain to count.
 DAMPED_MOST = 0.15  #: Below this gain a velocity is not late: its size differs.
-#: Least visible loss of a velocity's square by a filter; sound logs: 0.0065.
+#: Least visible loss of a velocity's square by a filter; sound logs lose up to 0.0065.
 DAMPED = 0.01
 WIDE = 0.15  #: Tolerance of a factor between units.
 #: Degrees in a radian, and tolerance: gears of 50 and 51 are common.
@@ -107,10 +107,10 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
     """The first seven fields of `VelocityFit` for one joint. (7,)
 
     Args:
-        Derivative of the position. (W,) [rad/s]
-        Logged velocity. (W,) [rad/s]
-        −v̇ by the position. (W,) [rad/s²]
-        −q̈ by the velocity. (W,) [rad/s²]
+        v: Derivative of the position. (W,) [rad/s]
+        logged: Logged velocity. (W,) [rad/s]
+        w: −v̇ by the position. (W,) [rad/s²]
+        logged_w: −q̈ by the velocity. (W,) [rad/s²]
     """
     size, total = v @ v, logged @ logged
     rest, turn, tool = (x - v * (v @ x) / size for x in (logged, w, logged_w))
@@ -196,8 +196,8 @@ def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Re
 
     Args:
         fit: The fit.
-        Joints without another cause. (n,)
-        Least lag of a late one. [s]
+        judged: Joints without another cause. (n,)
+        limit: Least lag of a late one. [s]
     """
     gain, sure = fit.gain, SURE * fit.gain_error
     late = judged & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (gain > DAMPED_MOST)

@@ -30,7 +30,7 @@ TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
 WRONG = 0.95
 LOAD_EXPLAINS = 0.8  #: Least share of the misfit that a load explains.
 UNKNOWN_LOAD = 0.5  #: Smallest suspected load. [kg]
-#: Least variation of a joint's gravity torque that carries weight, of the largest.
+#: A joint carries weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
 #: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0 to 2.5
 #: where friction or contact hide the torque, wrong ones 4 to 12.
@@ -53,7 +53,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     """Friction fitted twice, the second time without contacts.
 
     Raises:
-        If it is `strict` and only other links explain the torque.
+        IdentificationError: If it is `strict` and only other links explain the torque.
     """
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
@@ -110,7 +110,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
 
     Args:
         motion: The prepared log.
-        Torque that the model leaves. (M, n) [N·m]
+        residual: Torque that the model leaves. (M, n) [N·m]
         dry: Coulomb torque of each joint. (M, n) [N·m]
     """
     usable = motion.usable

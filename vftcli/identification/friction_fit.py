@@ -40,7 +40,7 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
 )
 #: Presliding lengths compared with none, one for the whole arm. [rad]
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-#: Terms that points of a bent line allow.
+#: Terms allowed beside the points of a bent line.
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
 #: Terms that push the joint if negative.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
@@ -131,7 +131,7 @@ class JointFit(NamedTuple):
 
     shape: Shape  #: The chosen structure.
     fit: ColumnFit  #: Friction coefficients, then q̈'s, then the rigid torque's.
-    #: Candidate → RMS missed of stretches left out; empty for one candidate. [N·m]
+    #: Candidate → RMS missed of stretches left out; empty without competition. [N·m]
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
     presliding: PreslidingScore  #: The presliding length of all joints.
@@ -237,7 +237,7 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         terms, parts = tellable_terms(RICHEST, data), data.parts
         y = data.slow(data.y[:, None])[:, 0]
         plain = data.slow(data.columns(Shape(terms, SLIDING)))
-        # Fixed weights of outliers: all lengths answer for all samples.
+        # Outliers' weights are fixed: all lengths answer for one set of samples.
         weights = fit_column(plain, y, data.weights).weights
         # A smoother sign that explains as much beats presliding; an even smoother one is
         # presliding in disguise.
@@ -274,7 +274,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
         return plain, {}  # positions may still rub correctly
     if not bounded.terms or bounded.terms == ("offset",):
         return bounded, {}
-    # Fixed weights of outliers: all candidates answer for all samples.
+    # Outliers' weights are fixed: candidates answer for one set of samples.
     weights, parts = data.fit(Shape(rich)).weights, data.parts
 
     def error(shape: Shape) -> float:
@@ -301,10 +301,10 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
     """A joint's competing friction shapes, with `best`'s smoothing and bend.
 
-    Its smoothing, bend and presliding length stay.
-        best: Its smoothing, its bend and its presliding length stay.
-        The joint's highest speed, for the points of a bent line. [rad/s]
-        speed: The joint's highest speed, which decides the points of a bent line. [rad/s]
+    Args:
+        best: Its smoothing, bend and presliding length stay.
+        data: The joint's equations.
+        speed: The joint's highest speed, for the points of a bent line. [rad/s]
     """
     shapes: list[Shape] = []
     line = bent(speed)
@@ -377,7 +377,7 @@ def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
     Args:
         shape: The structure.
         values: Its coefficients, others may follow. (k,)
-        It may not fall below this speed. [rad/s]
+        speed_limit: It may not fall below this speed. [rad/s]
     """
     friction = shape.friction(values[: len(shape.terms)])
     return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

@@ -24,10 +24,10 @@ from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, 
 
 ROWS = 512  #: Samples stacked at once.
 REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
-#: Smaller singular values, by the largest, stay at the start (columns scaled).
+#: Singular values below this share of the largest stay at the start (columns scaled).
 TRUNCATION = 1e-3
 PROBES = 400  #: Random states for the structure of base parameters.
-#: Smaller diagonal entries of R, by the largest, are zero: rounding is at 1e-15.
+#: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
 RANK_TOLERANCE = 1e-8
 #: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3
@@ -126,7 +126,7 @@ def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -
     Args:
         layout: The unknowns.
         logs: The training logs.
-        A first solution: the profile with fitted friction. (size,)
+        start: A first solution: the profile with fitted friction. (size,)
     """
     rows = sum(int(np.count_nonzero(log.weights)) for log in logs)
     if rows < 4 * layout.size:

@@ -35,7 +35,7 @@ from vftcli.signals.series import resample_columns
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
 STATIC = 4  #: Parameters that gravity shows: mass, three first moments.
-SAME_MOTION = 5e-3  #: Largest difference of position in one motion. [rad rms]
+SAME_MOTION = 5e-3  #: Largest position difference of two logs of one motion. [rad rms]
 COARSE, FINE = 0.05, 5e-4  #: Steps of the search for the shift between two logs. [s]
 DWELL = 0.5  #: Shortest rest that is a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
@@ -85,11 +85,11 @@ def load_at_flange(
     """A load in flange axes from a solution.
 
     Args:
-        Mass and first moments in the last link's frame. (4,) [kg, kg·m]
+        x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
         sd: Their standard deviations. (4,)
-        RMS torque left in each joint. (n,) [N·m]
+        left: RMS torque left in each joint. (n,) [N·m]
         robot: The arm.
-        The logs with the load.
+        loaded: The logs with the load.
         origin: How it was found.
     """
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
@@ -154,7 +154,7 @@ class JointsFit(NamedTuple):
         each one.
 
         Args:
-            The torque to explain. (N, n)
+            y: The torque to explain. (N, n)
             gain: Relative standard deviation of a joint's torque.
         """
         # Each joint's torque adds its part to the solution.
@@ -182,7 +182,7 @@ def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
-    """A load from one motion with and without it; the logs' order shows by itself.
+    """A load from one motion with and without it; the loaded log shows by itself.
 
     At equal phase the torque differs by the load and by friction that grows with it.
     """
@@ -262,9 +262,9 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from poses at rest, by torque beyond the robot's own gravity.
 
-    Stiction acts in every pose: the residual shows its size, many poses average it. The
-    model's errors and a day's drives act alike in all poses of a log: the standard deviations
-    include the difference of logs.
+    Stiction acts in every pose: the residual shows its size, many poses average it. The model's
+    errors and a day's effect on the drives are alike in all poses of a log: with several logs,
+    their difference is part of the standard deviations.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
@@ -356,8 +356,8 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     through these drives is subtracted: their errors act on the arm's own weight.
 
     Args:
-        Logs with the load.
-        Mass and first moment in their models. (4,) [kg, kg·m]
+        runs: Logs with the load.
+        carried: Mass and first moment in their models. (4,) [kg, kg·m]
 
     Returns:
         Mass and first moment in flange axes (4,) [kg, kg·m], their covariance (4, 4), RMS left in

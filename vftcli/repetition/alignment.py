@@ -262,7 +262,7 @@ def gauss_newton_step(
     Args:
         recording: The log.
         free: The free run.
-        Its clock at the log's samples so far. (T,) [s]
+        t: Its clock at the log's samples, by shift and rate so far. (T,) [s]
         slope: Its velocities. (S, n) [rad/s]
     """
     distance = apart(t, recording.q, free)
@@ -287,7 +287,7 @@ def gauss_newton_step(
 def lying_at(
     recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
 ) -> Alignment:
-    """Alignment of two logs at a shift [s] and rate, or only `within`. (T,)
+    """Alignment of two logs at a shift [s] and rate, in the overlap or `within`. (T,)
 
     The deviation is infinite for fewer than two samples.
     """

@@ -13,7 +13,7 @@ from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
 #: Least band of a noise estimate: contacts fill lower ones. [Hz]
 LEAST_BAND = 12.0
-#: Wrong share of the correction by the best model.
+#: Share of the correction that is wrong even with the best model.
 LEAST_SHARE = 0.05
 PIECE = 0.4  #: Length of pieces that separate noise from slow loads. [s]
 #: Fewest pieces for a noise estimate: a short cycle may hold contact throughout.
@@ -85,9 +85,9 @@ def error_model(
 
     Args:
         laid: The log over its free runs.
-        The difference where known. (S, n) [N·m]
-        The low-passed difference. (S, n) [N·m]
-        Whether the model's torque corrects it.
+        signal: The difference where known. (S, n) [N·m]
+        smooth: The low-passed difference. (S, n) [N·m]
+        corrected: Whether the model's torque corrects it.
         cutoff: Cutoff of its low-pass, None without. [Hz]
     """
     motion, known = laid.motion, laid.known
