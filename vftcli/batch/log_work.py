@@ -1,4 +1,4 @@
-"""The work on one log of a batch: what `--do` asks, written before the task is told done."""
+"""The work of `--do` on one log of a batch, written before it counts as done."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -13,7 +13,7 @@ Task = TypeVar("Task")
 
 #: What is done with each task; what it returns is small, and can be pickled.
 Work = Callable[[Task], Any]
-KILLED = "KilledWorker"  #: Error type of a task whose worker died each time.
+KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
 
 _stage: ContextVar[str] = ContextVar("stage", default="")
 
@@ -45,11 +45,11 @@ class Outcome(NamedTuple, Generic[Task]):
     task: Task  #: The task.
     value: Any = None  #: What the work returned, None if it failed.
     failure: Failure | None = None  #: Why it failed, or None.
-    effort: Effort | None = None  #: What it took; None of a task whose worker died.
+    effort: Effort | None = None  #: Its effort; None if its worker died.
 
 
 def begin(stage: str) -> None:
-    """Say what the work does now; a failure is told with it."""
+    """Name the work's stage; a failure is reported with it."""
     _stage.set(stage)
 
 

@@ -1,4 +1,4 @@
-"""Rows of a batch: a log × observer × joint or axis, the same columns whatever was asked."""
+"""Rows of a batch: a log × observer × joint or axis, in fixed columns."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,7 +12,7 @@ from vftcli.outputs.believability import grounds, health
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import AXES
 
-#: Columns that are the same in every row of a log.
+#: Columns with one value a log.
 OF_LOG: dict[str, Any] = {
     "robot": pl.String,
     "samples": pl.Int64,

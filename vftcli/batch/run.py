@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
 TOGETHER = 64  #: At most so many.
-SHARES = 8  #: A worker gets at least so many groups, so that all end at about the same time.
+SHARES = 8  #: Least groups of a worker: all end at about one time.
 
 Tell = Callable[[str], None]
 
@@ -55,8 +55,8 @@ class BatchRun:
     folder: BatchFolder  #: Where it is written.
     workers: WorkersChoice  #: Where it is done.
     command: str  #: The command line, for the records.
-    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
-    #: Who is told after each log how many are done.
+    tell: Tell = field(repr=False)  #: Receives a sentence on each step.
+    #: Receives the number of finished logs after each.
     progress: Callable[[BatchCount], None] = field(repr=False)
 
     def __post_init__(self) -> None:
@@ -158,7 +158,7 @@ class BatchRun:
         if failure is None:
             self.done.add(task.key)
             return
-        for name in (f"{task.path}: ", f"{task.label}: "):  # it is told with the log's name
+        for name in (f"{task.path}: ", f"{task.label}: "):  # the report has the log's name
             failure = failure._replace(line=failure.line.removeprefix(name))
         for number in [n for n, key in self.keys.items() if key == task.key]:
             self.failures[number] = failure

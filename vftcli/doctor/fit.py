@@ -26,7 +26,7 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
-CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not distinguished.
+CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #: Misfit up to which a profile fits: the maker's own model, and a measured effort.
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.

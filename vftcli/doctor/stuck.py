@@ -216,7 +216,7 @@ def is_clipped(value: Array, position: Array, least: int = 10) -> bool:
         extreme = up.max()
         at = up == extreme
         count = np.count_nonzero(at)
-        # A drive saturates far from zero; one that often reads the same small value rests.
+        # A drive saturates far from zero; one that often repeats a small value rests.
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
         # The rounded top of a smooth effort of coarse resolution is wide on the next level too.

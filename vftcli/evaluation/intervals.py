@@ -16,7 +16,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
-SEED = 20250811  #: Seed of every bootstrap: the same log gives the same interval.
+SEED = 20250811  #: Seed of every bootstrap: a log has one interval.
 #: Most blocks in a repetition: more change nothing but the time it takes.
 MOST_BLOCKS = 300
 #: Fewest blocks in a repetition, however long errors remember.
@@ -37,7 +37,7 @@ SIGNIFICANCE: dict[str, type[pl.DataType]] = {
     "high_Nm": pl.Float64,
     "p": pl.Float64,
 }
-SAME = 1e-9  #: RMSEs that differ by less than this share are the same number twice.
+SAME = 1e-9  #: RMSEs closer than this share are one number.
 
 
 class Resampled(NamedTuple):
@@ -48,7 +48,7 @@ class Resampled(NamedTuple):
 
 
 def resample(squares: Array, length: int) -> Resampled:
-    """Mean squares of moving-block bootstrap repetitions; all columns share the same blocks.
+    """Mean squares of moving-block bootstrap repetitions; all columns share blocks.
 
     Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
     series closed to a ring, so that every sample counts alike (Politis and Romano's circular
@@ -153,7 +153,7 @@ def paired_significance(
 def p_value(first: Array, second: Array) -> float:
     """Two-sided p that two mean squares differ by chance, from paired draws.
 
-    At least one over the number of draws; 1 where both are the same number.
+    At least one over the number of draws; 1 where both numbers are equal.
     """
     size = max(float(np.mean(np.abs(first))), float(np.mean(np.abs(second))), 1e-300)
     if np.max(np.abs(first - second)) <= SAME * size:

@@ -63,7 +63,7 @@ def judge(
         estimates: The observers' torques.
         sensed: Their wrenches, or None.
         choice: Which reference.
-        told: What is known of the log's contacts, None for nothing.
+        told: Known contacts of the log, None for none.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.

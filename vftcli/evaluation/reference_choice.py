@@ -204,7 +204,7 @@ def file_reference(
     about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
     """
     table = read_reference(path, columns)
-    # The recording counts from its first sample, a reference file from the same zero as the log.
+    # The recording counts from its first sample, a reference file from the log's zero.
     t = table.t - recording.source.t0
     name = f"file:{path.name}"
     wrench = None

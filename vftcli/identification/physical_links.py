@@ -167,7 +167,7 @@ def pulled_links(
     """Each weight and the physical parameters (size,) under it, the strongest pull first."""
     start = x = starting_point(triangles.layout, profile)
     R, z = triangles.joined(leave_out)
-    # Correlated rows say the same thing again; dividing them makes the misfit a log-likelihood
+    # Correlated rows repeat each other; dividing them makes the misfit a log-likelihood
     # that can be weighed against the distance.
     shrink = 1.0 / np.sqrt(triangles.correlation)
     for weight in WEIGHTS[::-1]:

@@ -85,7 +85,7 @@ ENOUGH = 50  #: Samples in motion that a remark on friction needs.
 WORSE = 1.5  #: Times the training's residual from which a held-out joint is remarked on.
 #: A model that leaves this many times what the profile leaves of a log has made it worse.
 BEHIND = 1.01
-NEAR = 0.01  #: Largest joint distance at which two samples are the same place. [rad]
+NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
 SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
 #: Share of a log's samples on another's trajectory from which on it repeats that trajectory.
 REPEATED = 0.8

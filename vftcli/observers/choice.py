@@ -152,7 +152,7 @@ class ObserverChoice:
         """Build the observers for one robot and sample time, with remarks on gains nobody gave.
 
         Args:
-            robot: The arm, whose file gives the gains that are not set here.
+            robot: The arm; its file gives the gains that are not set here.
             step: Sample time. [s]
             shown: What the complete log shows of noise and contact, nothing where its free part is
                 not known.

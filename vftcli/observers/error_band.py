@@ -6,7 +6,7 @@ One model for every estimator, whatever its own covariance says,
 
 with e² the mean square of what the estimator reads where nothing touches the arm, bias and model
 error included, a resting joint's and a moving joint's apart; the integral what lag and bandwidth
-leave out of the torque there is; and c the standard deviation of a correction that was taken off.
+leave out of the torque there is; and c the standard deviation of a subtracted correction.
 A resting joint holds stiction that no estimator sees: there e is at least the share of the dry
 friction that drives were measured to hold.
 """

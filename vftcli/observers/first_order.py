@@ -15,7 +15,7 @@ GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 
 
 class FirstOrderState(NamedTuple):
-    """Where a first-order observer stands after a block of a log."""
+    """State of a first-order observer after a block of a log."""
 
     states: Array  #: Its states, the estimate first. (m, n) [N·m]
     gaps: int = 0  #: Number of gaps that it started afresh after.

@@ -227,7 +227,7 @@ def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
 
 
 class KalmanState(NamedTuple):
-    """Where a Kalman observer stands after a block of a log."""
+    """State of a Kalman observer after a block of a log."""
 
     error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
     posterior: Covariance  #: Their covariance. (n,) each

@@ -8,7 +8,7 @@ from vftcli.observers.observer import Observer
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.terms import DynamicsTerms
 
-LEAD = 60.0  #: For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log.
+LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.
 SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
 

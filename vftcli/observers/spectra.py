@@ -33,7 +33,7 @@ LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded par
 IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. [s]
 #: How far the average of neighbouring frequencies reaches, as a share of the frequency.
 NEIGHBOURS = 0.2
-SLOW = 5.0  #: Up to here the spectrum of the external torque is taken as it is measured. [Hz]
+SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [Hz]
 #: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
 #: and the 4 of one that has no jumps and no corners.
 FALL = 2.5
@@ -44,7 +44,7 @@ FALL = 2.5
 #: all the time 0.82 and less.
 QUIETER = 0.85
 
-CONTACT_BAND = 5.0  #: Where contacts are told from noise: below this frequency. [Hz]
+CONTACT_BAND = 5.0  #: Contacts are separated from noise below this. [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +152,7 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
 
 
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
-    """The spectra of a loaded part and a free one, by the same estimator.
+    """Spectra of a loaded part and a free one, by one estimator.
 
     Short impacts are widened to a second in a row, and their excess, thinned by that, set right.
     """

@@ -31,7 +31,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 }
 #: What an assignment of ``--set`` looks like.
 FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
-WORDS = {"noise_convention"}  #: Parameters whose value is a word.
+WORDS = {"noise_convention"}  #: Parameters with words as values.
 #: Parameters that are rates: no log resolves a microsecond. [1/s]
 LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
 #: Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second.
@@ -144,7 +144,7 @@ class LogSpectra(NamedTuple):
     """What a complete log shows of noise and contact, None where its free part is not known."""
 
     plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
-    #: Of those that `best` runs on, the bias of the whole log taken off.
+    #: Of `best`'s, less the bias of the whole log.
     best: "Spectra | None" = None
     gains: Gains | None = None  #: The gains that `plain` calls for, as a gains file holds them.
 
@@ -268,7 +268,7 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
 
 
 def build_rts(setup: Setup) -> Built:
-    """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
+    """Smoother on the zero-order-hold filter: its noise leaves no bias on a ramp."""
     from vftcli.observers.smoother import KalmanSmoother
 
     kalman, remarks = build_kfo("zoh", "kfo-rts")(setup)
@@ -378,7 +378,7 @@ def build_observers(
     for name in names:
         check_known(name, OBSERVERS, f"no observer {name!r}")
     made = [OBSERVERS[name].build(setup) for name in dict.fromkeys(names)]
-    # Several observers may miss one and the same gain: that is remarked on once.
+    # Several observers may miss one gain: remark on it once.
     remarks: list[Remark] = []
     for _, own in made:
         remarks += [remark for remark in own if remark not in remarks]

@@ -278,7 +278,7 @@ def kalman_steps(
     dt, (error, posterior, _) = np.broadcast_to(terms.dt, (samples, 1)), state
     if begins:
         tau[0], sd[0] = 0.0, np.sqrt(posterior.p22)
-    # Joints with the same numbers have the same gains: one of each kind is computed.
+    # Joints with equal numbers have equal gains: compute one of each kind.
     numbers = np.stack([*densities, *posterior])
     _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
     kind = kind.ravel()

@@ -248,7 +248,7 @@ def closed_loop_section(run: ClosedLoop | None) -> str:
 
 
 def comparison_section(replay: Replay) -> str:
-    """Every controller on the same force, axis by axis (Figs 7 and 10)."""
+    """Every controller on one force, axis by axis (Figs 7 and 10)."""
     if not replay.rows:
         return "<h2>Comparison</h2><p>No axis was dragged.</p>"
 

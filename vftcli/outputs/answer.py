@@ -152,7 +152,7 @@ def direction(force: Array) -> str:
 
 
 def place_words(contact: Contact) -> str:
-    """The part of the arm, and the links where it cannot be told."""
+    """The part of the arm, and the links where it is unknown."""
     links = [link for link in contact.places if link]
     if contact.where != "cannot tell" or not links:
         return contact.where

@@ -25,7 +25,7 @@ MARKER = "batch.json"
 TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
 GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files that are made anew by every run.
-PIECE = 500  #: Logs whose rows are in memory at a time.
+PIECE = 500  #: Logs with rows in memory at a time.
 
 
 class BatchFolder:
@@ -45,7 +45,7 @@ class BatchFolder:
 
     @staticmethod
     def place(key: str) -> str:
-        """The same relative to the folder."""
+        """Place of a log's result, relative to the folder."""
         return f"logs/{key[:2]}/{key}"
 
     @contextmanager

@@ -71,7 +71,7 @@ def save(
 
 
 def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
-    """Write one log and what stands beside it into a folder."""
+    """Write one log and its companions into a folder."""
     from vftcli.simulation.writers import WRITERS
     from vftcli.simulation.writers.tables import write_truth
 

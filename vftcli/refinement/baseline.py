@@ -26,7 +26,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.rest import standing
 
-STANDS = 0.5  #: A joint that stands in more than this share of the samples is limited by stiction.
+STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +37,7 @@ class Baseline:
     part: FreePart | None = None  #: Its free part, None where there is none.
     #: Spectra of the raw disturbance, None where the free part is too short or not free.
     spectra: Spectra | None = None
-    standing: Mask  #: Where a joint stands still. (T, n)
+    standing: Mask  #: Where a joint rests. (T, n)
     #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
     #: A load that the free part carries and the model lacks, None where none shows.
@@ -48,7 +48,7 @@ class Baseline:
     #: Whether the free part is what the fit of that bias takes for free: no contact that comes and
     #: goes, though a load that stays may be in it.
     by_fit: bool = False
-    #: What was applied of it and what was not, and what stands in for a free part.
+    #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -77,7 +77,7 @@ class Baseline:
 
     @property
     def tunable(self) -> Spectra | None:
-        """The spectra where gains may be taken from them, else None.
+        """The spectra if gains may come from them, else None.
 
         Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran to the
         slowest.
@@ -234,11 +234,11 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline whose free part is what the fit of the bias takes for free, where that will do.
+    """A baseline with the bias fit's free part, where that is enough.
 
     Args:
         found: A baseline without spectra.
-        quiet: The samples that are taken for free. (T,)
+        quiet: The samples assumed free. (T,)
     """
     log = found.motion.log
     share = float(quiet.mean())
@@ -251,7 +251,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
         return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
-    except ParameterError:  # all of it or nothing is taken for free, or never for long enough
+    except ParameterError:  # all of it or nothing is assumed free, or never long enough
         return found
 
 

@@ -49,7 +49,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the observer
     reads on the free part is model error: friction as far as sign and size of a joint's own
     velocity explain it, the rest of the model otherwise. Stiction at rest is the dry friction a
-    standing joint may hide, F_c/√3, times the share of the time that it stands.
+    resting joint may hide, F_c/√3, times the share of its time at rest.
     """
     observer = reading.observer
     response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)

@@ -154,7 +154,7 @@ class ModelError:
 
 
 def error_of(values: Array, joints: int) -> ModelError:
-    """The model error whose columns have these values, in the order of `column_numbers`."""
+    """The model error with these values, in the order of `column_numbers`."""
     inertial, own = values[: LINK * joints], values[LINK * joints :].reshape(joints, -1)
     return ModelError(
         inertial=inertial,

@@ -180,7 +180,7 @@ class Rows:
             parts: Some of them, which may overlap. (S,) each
 
         Returns:
-            The sums over all that are taken, then over each part.
+            The sums over all these samples, then over each part.
         """
         sums = [self._empty(self.loads.sizes[-1]) for _ in range(1 + len(parts))]
         for block, member in self._blocks(taken, parts):

@@ -132,7 +132,7 @@ def pace(recording: Recording) -> float | None:
 
 
 def check_same_arm(recording: Recording, free: Recording) -> None:
-    """Raise a ReferenceTorqueError if two logs cannot be of the same arm."""
+    """Raise a ReferenceTorqueError if two logs cannot be of one arm."""
     if free.joints != recording.joints:
         raise ReferenceTorqueError(
             f"{free.name} has {free.joints} joints, {recording.name} has {recording.joints}: "

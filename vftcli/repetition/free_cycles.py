@@ -17,11 +17,11 @@ from vftcli.signals.remarks import Remark, fact
 #: A cycle is free too if its difference from the freest is within this many expected errors.
 ALIKE = 1.5
 MOST_LAID = 8  #: Free cycles that are laid under the others, at most.
-SETTLES = 2.0  #: A cycle is taken with what is around it, in which filters settle. [s]
+SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
 
 
 class FreeCycles(NamedTuple):
-    """Cycles taken to be free."""
+    """Cycles assumed free."""
 
     numbers: tuple[int, ...]  #: Counted from 0.
     #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of one that
@@ -97,7 +97,7 @@ def residuals(motion: Run, cycles: Cycles) -> Array:
 
     A cycle of which a gap takes more than half has none: ∞.
     """
-    # Below 5 Hz a push stands out from the drives' ripple.
+    # Below 5 Hz a push exceeds the drives' ripple.
     cutoff = min(5.0, band(motion.step, None)[0])
     gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
     number = cycles.number(motion.t)

@@ -1,4 +1,4 @@
-"""A load that nobody told of: the free part is weighed before its noise is learned.
+"""An unknown load: the free part is weighed before its noise is learned.
 
 A payload that the model lacks pulls in the free part too. Taken for noise it makes every tuned
 gain slow and every band wide; it is an external torque, and stays in the estimates. The free

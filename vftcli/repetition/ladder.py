@@ -24,7 +24,7 @@ class Rung(NamedTuple):
 
     clock: str  #: The pairing it starts from: "commanded" or "found".
     phase: bool  #: Whether partners are moved to the nearest place on the joint-space path.
-    corrected: bool  #: Whether the model's torque of the remaining motion difference is taken off.
+    corrected: bool  #: Whether the motion difference's model torque is subtracted.
     title: str  #: What it does, in words.
 
 
@@ -69,7 +69,7 @@ def differences(
     Args:
         motion: The log.
         clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
-        rungs: Names in `RUNGS`; those whose clock is not there are left out.
+        rungs: Names in `RUNGS`; those without their clock are left out.
         cutoffs: Cutoffs of the low-pass to try, None for none. [Hz]
     """
     laid: dict[tuple[str, bool], LaidOver] = {}
@@ -93,7 +93,7 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
     """τ_ext = τ_free − τ (+ model − model_free) at paired instants, low-passed if asked.
 
     With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
-    bracket is exact; without it the two motions are taken to be the same.
+    bracket is exact; without it the two motions are assumed equal.
     """
     motion, known = laid.motion, laid.known
     if np.count_nonzero(known) < 16:

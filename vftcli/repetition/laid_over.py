@@ -15,7 +15,7 @@ STUCK = 0.3
 #: Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
 #: e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]
 HEARD = 2.0
-#: Share of the stiction that cancels between two stops of the same length at the same place.
+#: Share of the stiction that cancels between two equal stops at one place.
 REPEATED = 0.5
 
 
@@ -65,7 +65,7 @@ class LaidOver:
 
     @cached_property
     def standing(self) -> Mask:
-        """Where a joint stands in the log or in any free run. (T, n)"""
+        """Where a joint rests in the log or in any free run. (T, n)"""
         found = self.motion.standing.copy()
         for p in self.pairings:
             found |= p.there(p.free.standing.astype(np.float64)) > 0.0

@@ -69,7 +69,7 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     """Move each sample's partner to the nearest place on the free run's path.
 
     The shift along the path minimises the distance of the joint positions, by Gauss–Newton; where
-    the path stands still there is nothing to go by and the clock's word stays. The shift is
+    the path rests it shows nothing and the clock decides. The shift is
     smoothed along time.
     """
     known = pairing.known

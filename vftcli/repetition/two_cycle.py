@@ -21,7 +21,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import REST, faster
 
-BLOCK = 1.0  #: Length of the pieces whose scatter tells chance from change. [s]
+BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
 #: Standard errors from which on a change is believed: contacts alone rarely look like one.
 SURE = 3.0
 
@@ -41,7 +41,7 @@ def two_cycle_difference(
     robot: Robot,
     choice: FreeChoice | None = None,
 ) -> ExternalTorque:
-    """τ_ext = τ_free − τ at the same place of a repeated motion, with its own error.
+    """τ_ext = τ_free − τ at one place of a repeated motion, with its error.
 
     Args:
         recording: The log with contact.
@@ -64,8 +64,8 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
 
     Where position and velocity repeat, gravity, inertia and friction cancel and what is left is
     the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
-    or more cycles of the same log, which then have no reference of their own unless there are two,
-    or other logs of the same motion.
+    or more cycles of the log, which then have no reference of their own unless there are two,
+    or other logs of the motion.
     """
     log, choice = motion.log, motion.choice
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -256,7 +256,7 @@ def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, .
 
 
 def change_remarks(change: Array) -> tuple[Remark, ...]:
-    """Joints whose friction changed between the free run and the log."""
+    """Joints with a change of friction between the free run and the log."""
     found = np.flatnonzero(change)
     if not len(found):
         return ()

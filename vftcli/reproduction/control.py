@@ -1,4 +1,4 @@
-"""Figs. 6, 7, 9, 10 with Tables III and IV: the controller in the loop, and the same force anew."""
+"""Figs. 6, 7, 9, 10, Tables III and IV: the controller in the loop and replayed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ from vftcli.simulation.sensing import log_rate
 
 #: Variant → how the sensor's Kalman filter reads R and Q.
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
-#: Variant → the same with a traditional controller that the whole force always drives.
+#: Variant → its name with a traditional controller, always driven by the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 FORCE, MOMENT = slice(3), slice(3, 6)  #: Axes of force and displacement, of moment and rotation.
 CONTACTS = 2  #: Times that the hand takes hold, in either scenario.
@@ -76,7 +76,7 @@ def looped(
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # The same enters, whoever is driven by it.
+    # One force enters every controller.
     everything = replace(alone, alphas=tuple(alphas)).controllers(parameters)
     source = fact("force-of-loop")
     return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
@@ -171,7 +171,7 @@ def released(
 ) -> RunResult:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
-    It is let go off by `deviation` [m] along x; without `alphas` α is the table's own.
+    It starts off by `deviation` [m] along x; without `alphas` α is the table's own.
     """
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])

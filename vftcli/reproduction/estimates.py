@@ -193,7 +193,7 @@ def replay_bearing(
     period: float | None = None,
     as_printed: bool = False,
 ) -> Replay:
-    """The same force through the traditional and the variable controller of Table IV."""
+    """One force through Table IV's traditional and variable controllers."""
     words = [] if period is None else [f"admittance.period={period}"]
     control = ControlChoice.parsed(assignments=words, as_printed=as_printed)
     parameters = control.parameters(made.robot)

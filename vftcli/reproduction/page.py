@@ -1,4 +1,4 @@
-"""How a reproduction is shown: one page and one Markdown of the same tables, and figures."""
+"""A reproduction's page and Markdown of its tables, and figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
 
-PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and the same in Markdown.
+PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and its Markdown.
 #: What the overview compares.
 RATIOS = (
     "Ours / print: the median of the lines that print a number, in brackets the range, of the "
@@ -112,7 +112,7 @@ def overview(found: Mapping[str, ShownItem]) -> Grid:
 
 
 def short_overview(found: Mapping[str, ShownItem]) -> Grid:
-    """The same in rows that fit a terminal: item, ours over the print, what came of it."""
+    """The overview for a terminal: item, ours over the print, verdict."""
     grid = overview(found)
     return replace(grid, columns=grid.columns[::2], rows=tuple(row[::2] for row in grid.rows))
 
@@ -169,7 +169,7 @@ def render_markdown(
     jobs: Sequence[Job],
     command: str,
 ) -> str:
-    """The same in Markdown, with the command that made it."""
+    """Markdown of a reproduction, with its command."""
     parts = [
         f"# {paper.name}, reproduced\n",
         f"{paper.title}. doi {paper.doi}.\n",

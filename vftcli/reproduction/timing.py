@@ -1,6 +1,6 @@
 """Computing times: Table II by the paper's own way and by this program's, and the benchmark.
 
-All are measured interleaved round by round, so that a machine whose speed drifts drifts for all.
+All are measured interleaved round by round, so that a machine's drift of speed affects all.
 Medians over the rounds are reported.
 """
 
@@ -275,5 +275,5 @@ def dense_kalman_loop(
 
 
 def in_pairs(*rows: tuple[Array, Array]) -> Array:
-    """The matrix of two states a joint whose four blocks have these diagonals. (2n, 2n)"""
+    """Matrix of two states a joint with these diagonals in four blocks. (2n, 2n)"""
     return np.block([[np.diag(entry) for entry in row] for row in rows])

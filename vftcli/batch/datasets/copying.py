@@ -1,4 +1,4 @@
-"""Copies of datasets: made beside their place, renamed when all is there, taken up after a stop."""
+"""Copies of datasets: made beside their place, renamed at the end, resumable."""
 
 import os
 import shutil
@@ -51,7 +51,7 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
 
 @contextmanager
 def unfinished(copy: Path, key: str) -> Iterator[Path]:
-    """The folder in which a copy is made: that of an earlier run of the same key goes on.
+    """The folder in which a copy is made: an earlier run's, if its key is equal, goes on.
 
     It stays if the block fails after something was done, to go on from; if the block ends well it
     takes the copy's place, whatever was there before.

@@ -92,4 +92,4 @@ class Hdf5Dataset:
                         data.attrs["names"] = list(column.elements)
 
     def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Nothing: what there is to tell stands in the files."""
+        """Nothing: the files describe themselves."""

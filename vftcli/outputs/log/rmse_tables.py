@@ -12,7 +12,7 @@ from vftcli.outputs.grid import Column, Grid, GridCell, joint_columns
 from vftcli.outputs.quantity import DASH, significant
 from vftcli.signals.arrays import Array, Mask
 
-#: An RMSE within this factor of the reference's floor cannot be told from the reference's own.
+#: An RMSE within this factor of the reference's floor may be the reference's own.
 AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
@@ -35,7 +35,7 @@ class Block(NamedTuple):
     means: JointMeans  #: What the joints are in one number.
     #: Observer → largest share of a joint's samples without its answer, where there is.
     missing: dict[str, float]
-    #: Joints whose reference is not to be trusted, because they rest.
+    #: Joints at rest: do not trust their reference.
     untrusted: tuple[int, ...] = ()
 
     @property
@@ -45,7 +45,7 @@ class Block(NamedTuple):
 
     @property
     def best(self) -> Mask:
-        """The smallest RMSE of each joint, and what prints the same. (observers, joints)
+        """Smallest RMSE of each joint, and equals in print. (observers, joints)
 
         None where the reference cannot tell: of a joint that rests, and of several at the floor.
         """
@@ -87,7 +87,7 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
     if place not in errors.columns:
         return
     rows = errors.filter(pl.col(place).is_not_null())
-    # The second time that an observer comes with the same joint, the rows are another log's.
+    # An observer's second row of a joint begins another log.
     again = pl.int_range(pl.len()).over("recording", "reference", "observer", place)
     groups = rows.group_by("recording", "reference", again.alias("again"), maintain_order=True)
     yield from (group for _, group in groups)

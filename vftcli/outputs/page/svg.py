@@ -194,7 +194,7 @@ def thinned(t: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array,
 
 
 def thinned_log(x: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
-    """The same over a logarithmic axis: stretches of equal width there."""
+    """One series as drawn over a logarithmic axis: stretches of equal width there."""
     if len(x) <= 2 * stretches:
         return x, values
     starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))
