@@ -1,4 +1,4 @@
-"""Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
+"""Logs in, a robot out: `vftcli identify` in the order of its data."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace

@@ -69,7 +69,7 @@ def comes_back(t: Array, q: Array, shift: float) -> Mask:
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:
-    """The first instant from which three quarters of the next cycle are on the path. [s]"""
+    """First instant with three quarters of the next cycle on the path. [s]"""
     count = np.concatenate([[0], np.cumsum(on_path)])
     stop = np.searchsorted(t, t + seconds)
     here = np.arange(len(t))

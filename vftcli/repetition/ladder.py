@@ -1,4 +1,4 @@
-"""The alignment ladder: ways to lay a free run under a log, each a rung better than the last."""
+"""The alignment ladder: ways to pair a free run with a log, best last."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -64,7 +64,7 @@ def differences(
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],
 ) -> Iterator[Difference]:
-    """Make the difference on every rung asked for, with and without the low-pass, one by one.
+    """The difference on every rung, with and without the low-pass, one by one.
 
     Args:
         motion: The log.
@@ -90,7 +90,7 @@ def differences(
 
 
 def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
-    """τ_ext = τ_free − τ (+ model − model_free) at paired instants, low-passed if asked.
+    """τ_ext = τ_free − τ (+ model − model_free) at pairs, low-passed if asked.
 
     With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
     bracket is exact; without it the two motions are assumed equal.
@@ -114,14 +114,14 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
 
 
 class Climbed(NamedTuple):
-    """What the rungs brought."""
+    """Results of the rungs."""
 
     chosen: Difference  #: The difference that is most certain.
     floors: tuple[Remark, ...]  #: The floor of each rung.
 
 
 def most_certain(made: Iterable[Difference]) -> Climbed:
-    """The difference with the smallest expected error, the simpler one where they are alike.
+    """The difference with the least expected error, the simpler of equals.
 
     Compared is the mean over trusted joints of expected error in motion, relative to the lowest
     rung's. Only the best so far is kept: of a long log not all have room at once.

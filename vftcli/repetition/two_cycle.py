@@ -1,4 +1,4 @@
-"""The two-cycle difference: the paper's ground truth, from repeated cycles or from a free run."""
+"""Two-cycle difference: the paper's truth, from cycles or a free run."""
 
 from collections.abc import Mapping, Sequence
 from itertools import permutations
@@ -167,7 +167,7 @@ def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None
 
 
 def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
-    """Measured over expected error where two free runs can be compared, None else. (n,)"""
+    """Measured over expected error of two free runs, None without two. (n,)"""
     pairings = partners.clocks["found"]
     if len(pairings) < 2:
         return None
@@ -196,7 +196,7 @@ def pair_runs(first: Pairing, second: Pairing) -> Pairing:
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:
-    """Root mean square of a difference that should be zero, over its expected error. (n,)
+    """Root mean square of a zero difference over its expected error. (n,)
 
     Held between 0.3 and 3: beyond, something else than the error model is wrong.
     """
@@ -207,7 +207,7 @@ def error_ratio(found: Difference, where: Mask) -> Array:
 
 
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
-    """Change of dry friction from the free run to the log, 0 where it may be chance. (n,) [N·m]
+    """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
     Joints warm up between two logs, and then friction does not cancel. The change is the mean of
     the difference times the sign of the velocity. Contacts do not follow the sign of the velocity
@@ -236,7 +236,7 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
 
 
 def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, ...]:
-    """Where the floor comes from, and which joints it cannot speak for."""
+    """Origin of the floor, and joints without one."""
     origin = fact("floor-propagated")
     if measured is not None:
         origin = fact("floor-measured", ratio=measured.tolist())
