@@ -1,4 +1,4 @@
-"""Confidence intervals of an RMSE of errors that follow one another: moving-block bootstrap.
+"""Confidence intervals of an RMSE of correlated errors: block bootstrap.
 
 Paired, it also tells whether one observer is better than another, or was lucky.
 """
@@ -70,7 +70,7 @@ def resample(squares: Array, length: int) -> Resampled:
 
 
 def block_lengths(squares: Array) -> NDArray[np.intp]:
-    """Length of the blocks for each column: `MEMORY` times its correlation time. (m,) [samples]"""
+    """Block length per column: `MEMORY` correlation times. (m,) [samples]"""
     samples = len(squares)
     longest = max(1, samples // LEAST_BLOCKS)
     shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
@@ -79,7 +79,7 @@ def block_lengths(squares: Array) -> NDArray[np.intp]:
 
 
 def correlation_time(x: Array) -> Array:
-    """Integral of each column's autocorrelation up to its first value below 0.05. (m,) [samples]
+    """Autocorrelation's integral up to its first value below 0.05. (m,) [samples]
 
     1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or half of
     the log is reached.

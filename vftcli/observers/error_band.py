@@ -1,4 +1,4 @@
-"""How far an estimate may be off, sample by sample, as the log itself shows it.
+"""Error of an estimate, sample by sample, by the log itself.
 
 One model for every estimator, whatever its own covariance says,
 
@@ -70,7 +70,7 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
 def error_band(
     free: FreeError, missed: Array, resting: Mask, correction_sd: Array | None = None
 ) -> Array:
-    """Standard deviation of an estimate's error, as the module's equation has it. (T, n) [N·m]
+    """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
 
     Args:
         free: What the estimator reads where nothing touches the arm.

@@ -40,7 +40,7 @@ def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorq
 
 
 def settling_samples(observer: Observer, step: float, joints: int) -> int:
-    """Samples after which `SETTLED` of where an estimate started is left, of the slowest joint.
+    """Samples until `SETTLED` of a start is left, of the slowest joint.
 
     Args:
         observer: The observer.

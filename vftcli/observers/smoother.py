@@ -141,7 +141,7 @@ def innovations(tau: Array, l2: Array, a22: Array) -> Array:
 
 
 def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
-    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (2, 2, …), (2, …)"""
+    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ, backwards. (2, 2, …), (2, …)"""
     return closed_loop(gains, a12, a22).swapaxes(0, 1), np.array([-np.ones_like(a12), -a12])
 
 
@@ -163,7 +163,7 @@ def information_gain(a12: Array, S: Array) -> Array:
 
 
 def smoothed_variance(P: Covariance, information: Array) -> Array:
-    """Variance of the smoothed torque, P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ. Like P₂₂ [(N·m)²]"""
+    """Smoothed torque's variance P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ, like P₂₂. [(N·m)²]"""
     l11, l12, l22 = information
     gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
     variance: Array = P.p22 - gained

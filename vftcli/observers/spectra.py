@@ -1,4 +1,4 @@
-"""Spectra of what the model leaves unexplained, over the free and the loaded part of a log.
+"""Spectra of the model's rest over the free and the loaded part of a log.
 
 The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
 sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
@@ -102,7 +102,7 @@ class Spectra:
 
     @property
     def floor(self) -> Array:
-        """Noise alone: S_n from its quietest octave up, below it that octave's level. (F, n)
+        """Noise S_n from its quietest octave up, below at that octave's level. (F, n)
 
         Friction and model error make the rest of S_n at low frequencies.
         """
@@ -132,7 +132,7 @@ class Spectra:
 
 
 def neighbour_mean(spectrum: Array) -> Array:
-    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of its frequency. (F, n)"""
+    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of it. (F, n)"""
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)
@@ -142,7 +142,7 @@ def neighbour_mean(spectrum: Array) -> Array:
 
 
 def around_impacts(t: Array, inside: Mask) -> Mask:
-    """A part as it is, or half of `IMPACT` more on either side if none of it lasts that long. (T,)
+    """A part, or half of `IMPACT` more on either side if it is too short. (T,)
 
     Args:
         t: Clock. (T,) [s]
@@ -182,7 +182,7 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
 
 
 def looks_free(spectra: Spectra) -> bool:
-    """Whether most joints have clearly less slow power in the free part than in the loaded one."""
+    """Whether most joints have clearly less slow power free than loaded."""
     slow = spectra.frequency < CONTACT_BAND
     power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)

@@ -1,4 +1,4 @@
-"""A log's free part and spectra, and what the observers run on once the bias is off.
+"""A log's free part and spectra, and its observers' input less the bias.
 
 The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
 `best` runs on what is left, tuned on the spectra of that; the other observers do where
@@ -31,7 +31,7 @@ STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """What a log shows of itself before any observer has run."""
+    """Evidence of a log before any observer runs."""
 
     motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
     part: FreePart | None = None  #: Its free part, None where there is none.
@@ -116,7 +116,7 @@ class Baseline:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What was found, and what was not and why."""
+        """Findings, and the missing ones with reasons."""
         found = self.part.remarks if self.part is not None else ()
         load = () if self.load is None else (self.load.remark,)
         missing = () if self.missing is None else (self.missing,)
@@ -146,23 +146,23 @@ def baseline_of(motion: FreeMotion) -> Baseline:
 
 @dataclass(frozen=True, kw_only=True)
 class Baselines:
-    """What the observers of a log run on."""
+    """Input of a log's observers."""
 
     plain: Baseline  #: What all but `best` run on.
     best: Baseline  #: What `best` runs on: less the bias of the whole log, where that was fitted.
 
     def of(self, name: str) -> Baseline:
-        """What the observer of this name runs on."""
+        """Input of the observer of this name."""
         return self.best if name == BEST else self.plain
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What was found, and what was not and why."""
+        """Findings, and the missing ones with reasons."""
         apart = () if self.best is self.plain else self.best.on_correction
         return (*self.plain.remarks, *apart)
 
     def spectra(self, *, gains: bool) -> LogSpectra:
-        """What the observers that are built for the log are tuned to."""
+        """Spectra for the observers built for the log."""
         plain = self.plain.tunable
         called_for = None
         if gains and plain is not None:
@@ -172,7 +172,7 @@ class Baselines:
 
 
 class FreeReading(NamedTuple):
-    """What one observer reads of a log, and where nothing touches the arm."""
+    """One observer's reading of a log, and its free samples."""
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
@@ -183,7 +183,7 @@ class FreeReading(NamedTuple):
 
     @property
     def rms(self) -> Array:
-        """Root mean square over the free samples, bias included; NaN where none is known. (n,)"""
+        """Root mean square of free samples, with bias; NaN without any. (n,)"""
         known = np.isfinite(self.samples)
         square = np.sum(np.where(known, self.samples, 0.0) ** 2, axis=0)
         count = np.count_nonzero(known, axis=0)
@@ -191,7 +191,7 @@ class FreeReading(NamedTuple):
 
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
-    """Run an observer along the free pieces; along the log itself that is its estimate."""
+    """An observer's run along the free pieces; on the log it is its estimate."""
     log = found.motion.log
     read = [
         estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
@@ -213,7 +213,7 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
 
 
 def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:
-    """What the observers of a log run on: `best` and, where it is asked, all less the bias."""
+    """Input of a log's observers: `best` and, if asked, all less the bias."""
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
     if not (choice.corrects_all or (best and choice.corrects_best)):

@@ -13,7 +13,7 @@ REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``--remove-bias`` takes.
 
 @dataclass(frozen=True, kw_only=True)
 class RefinementChoice:
-    """What is done with the estimates once the whole log is known.
+    """A user's choice for the estimates of a whole log.
 
     Raises:
         ParameterError: If there is no such way to remove a bias.

@@ -1,4 +1,4 @@
-"""Computing times: Table II by the paper's own way and by this program's, and the benchmark.
+"""Computing times: Table II by the paper's way and by ours, and the benchmark.
 
 All are measured interleaved round by round, so that a machine's drift of speed affects all.
 Medians over the rounds are reported.
@@ -77,7 +77,7 @@ class Timings:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep this process on one core while it is measured, where the system lets it choose."""
+    """Keep this process on one core in a measurement, if the system allows."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -164,7 +164,7 @@ def work_of(robot: Robot, recording: Recording) -> dict[str, Callable[[], object
 
 
 def computing_time(_seed: int) -> RunResult:
-    """Seconds for the paper's samples by observer, dynamics in each, and the printed ratios."""
+    """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
     with one_core():
         timings = timed()
     result = RunResult()
@@ -247,7 +247,7 @@ def dense_kalman_loop(
     *,
     rebuild: bool = False,
 ) -> Array:
-    """The 2n-state textbook Kalman filter with its covariance, one sample after another.
+    """Textbook Kalman filter of 2n states with covariance, sample by sample.
 
     With `rebuild` its matrices are made anew at every sample.
     """
