@@ -112,7 +112,7 @@ def annotate(
 
 
 def started(workers: WorkersChoice, dataset: Dataset) -> WorkersChoice:
-    """Where the episodes are done: here where nothing is asked and there are few."""
+    """Place of the episodes' work: here by default if they are few."""
     some = islice(dataset.files(), FEW + 1)
     few = sum(len(file.episodes) for file in some) <= FEW
     return HERE if few and workers == WorkersChoice() else workers
@@ -165,7 +165,7 @@ class Made(NamedTuple):
 
 
 def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
-    """What a task returned."""
+    """Result of a task."""
     if outcome.failure is None:
         return outcome.value
     place = outcome.task.file.place
@@ -279,7 +279,7 @@ def record_of_copy(
     made: Made,
     sources: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What ``meta/vftcli.json`` holds."""
+    """Content of ``meta/vftcli.json``."""
     return {
         "command": command,
         "versions": versions(),

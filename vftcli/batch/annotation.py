@@ -36,7 +36,7 @@ SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 @dataclass(frozen=True, kw_only=True)
 class ForceChoice:
-    """What is asked of every episode."""
+    """Request for every episode."""
 
     read: ReadChoice = field(default_factory=ReadChoice)  #: How an episode is read.
     robot: RobotChoice = field(default_factory=RobotChoice)  #: Which arm made it.
@@ -77,11 +77,11 @@ class ForceChoice:
 
     @property
     def suffix(self) -> str:
-        """What the names of the columns end with: the arm, of a dataset of two."""
+        """Suffix of the columns' names: the arm, of a dataset of two."""
         return f"_{self.read.arm}" if self.read.arm is not None else ""
 
     def key(self, robot_file: str) -> str:
-        """What the columns depend on beside the episode: this, the robot file and the program."""
+        """Sources of the columns beside the episode: this, robot file, program."""
         return f"{self!r} {robot_file} {VERSION}"
 
     def analysis(self, number: int, library: Library, examiner: Examiner) -> AnalysisChoice:

@@ -15,7 +15,7 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 @dataclass(frozen=True, kw_only=True)
 class WorkersChoice:
-    """Where many pieces of work are done."""
+    """Place of many pieces of work."""
 
     #: How many processes of this machine; 0 for this process alone, None for as many as it has
     #: cores and memory for.

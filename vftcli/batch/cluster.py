@@ -218,7 +218,7 @@ def check_sight(client: "Client", seen: Sequence[str]) -> None:
 
 
 def heads_of(paths: Sequence[str]) -> dict[str, str]:
-    """What is at each path: the digest of a file's size and first bytes, "folder", or "nothing"."""
+    """State of each path: digest of size and first bytes, "folder", or "nothing"."""
     found = {}
     for path in paths:
         found[path] = "folder" if os.path.isdir(path) else "nothing"  # noqa: PTH112
@@ -341,7 +341,7 @@ def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[A
 
 
 def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
-    """What a group's tasks made, why they did not end, or None where that is not known yet."""
+    """Results of a group's tasks, their failures, or None if unknown yet."""
     from distributed.scheduler import KilledWorker
 
     if future.status not in {"finished", "error"}:

@@ -20,7 +20,7 @@ COMMANDS = ("estimate", "compare", "report", "contacts")  #: What may be done wi
 
 @dataclass(frozen=True, kw_only=True)
 class LogJob:
-    """What is done with every log of a batch."""
+    """Work on every log of a batch."""
 
     do: str  #: One of `COMMANDS`.
     choice: AnalysisChoice  #: What is asked of each log.

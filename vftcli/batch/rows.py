@@ -74,7 +74,7 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
 
 
 def log_facts(analysis: Analysis) -> dict[str, Any]:
-    """What is known of a log as a whole, by the names of `OF_LOG`."""
+    """Facts of a log as a whole, by the names of `OF_LOG`."""
     recording, found = analysis.recording, analysis.contacts
     worst = health(grounds(analysis))
     codes = [f.code for one in analysis.examinations[:1] for f in one.warnings]
@@ -101,7 +101,7 @@ def log_facts(analysis: Analysis) -> dict[str, Any]:
 
 
 def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
-    """How large each estimate is, a row an observer and joint, then a row an observer and axis."""
+    """Size of each estimate, a row per observer and joint, then per axis."""
     for estimate in analysis.estimates:
         for joint, column in enumerate(estimate.tau.T, start=1):
             rms, most = size_of(column)

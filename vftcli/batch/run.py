@@ -32,7 +32,7 @@ Tell = Callable[[str], None]
 
 
 class BatchCount(NamedTuple):
-    """How far a batch is."""
+    """Progress of a batch."""
 
     logs: int  #: How many logs there are.
     before: int = 0  #: How many of them an earlier run did.
@@ -42,7 +42,7 @@ class BatchCount(NamedTuple):
 
     @property
     def left(self) -> int:
-        """How many are still to be done."""
+        """Number of tasks left."""
         return self.logs - self.before - self.done - self.failed
 
 
@@ -164,7 +164,7 @@ class BatchRun:
             self.failures[number] = failure
 
     def count(self) -> BatchCount:
-        """How far it is."""
+        """Progress so far."""
         return BatchCount(
             logs=len(self.logs),
             before=self.before,
@@ -227,7 +227,7 @@ class BatchRun:
         return {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in finished}
 
     def record(self, count: BatchCount) -> dict[str, Any]:
-        """What `run.json` holds: all that depends on when and where a log was done."""
+        """Content of `run.json`: facts of the time and place of each log's work."""
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
         return {

@@ -36,11 +36,11 @@ class BatchFolder:
         self.rows = self.path / "rows"
 
     def row_file(self, key: str) -> Path:
-        """Where the rows of a log are."""
+        """Place of a log's rows."""
         return self.rows / key[:2] / f"{key}.parquet"
 
     def result(self, key: str) -> Path:
-        """Where what else is made of a log is."""
+        """Place of a log's other results."""
         return self.path / self.place(key)
 
     @staticmethod

@@ -135,7 +135,7 @@ MOST_UNEXPLAINED = 0.5
 
 
 def robot_ground(analysis: Analysis) -> Ground:
-    """How well the arm's model explains the log."""
+    """Fit of the arm's model to the log."""
     subject, name, own = "robot, gravity", analysis.robot.name, own_match(analysis)
     if own is None:
         return Ground("unknown", subject, "the log does not let the model be checked")
@@ -154,13 +154,13 @@ def robot_ground(analysis: Analysis) -> Ground:
 
 
 def own_match(analysis: Analysis) -> RobotMatch | None:
-    """How well the arm of an analysis fits its log, None where that could not be checked."""
+    """Fit of an analysis' arm to its log, None if unchecked."""
     matches = analysis.examinations[0].robots if analysis.examinations else ()
     return next((match for match in matches if match.robot == analysis.robot.name), None)
 
 
 def finding_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """What the examinations of the log and of its free runs warn of, and the wrench's warnings."""
+    """Warnings on the log, on its free runs, and on the wrench."""
     for k, examination in enumerate(analysis.examinations):
         log = examination.recording
         other = f"{log.name}: " if k else ""
@@ -196,7 +196,7 @@ def clock_ground(recording: Recording) -> Ground:
 
 
 def list_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """What the list of contacts rests on."""
+    """Grounds of the list of contacts."""
     found, subject = analysis.contacts, "free motion"
     if found is None:
         told = [r for r in analysis.remarks if r.code == "contacts-not-told"]

@@ -15,7 +15,7 @@ PLAIN = {
 
 
 class Canvas(NamedTuple):
-    """What a terminal can show."""
+    """Abilities of a terminal."""
 
     width: int = 80  #: Columns that are used.
     unicode: bool = True  #: Whether it has more letters than ASCII.

@@ -115,7 +115,7 @@ class OutputFolder:
         self._partial = ExitStack()
 
     def __truediv__(self, name: str) -> Path:
-        """Where to write the file `name`, its folder made if need be."""
+        """Path for the file `name`, with its folder."""
         path = self.temporary / name
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
@@ -288,7 +288,7 @@ def check_letters(path: Path) -> None:
 
 
 def left_out(names: Iterable[str]) -> list[str]:
-    """What of these files is not written for want of a package, a line each."""
+    """Files not written for want of a package, a line each."""
     lines = []
     for name in dict.fromkeys(names):
         if name.endswith(".rrd") and not installed("rerun"):

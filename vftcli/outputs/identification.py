@@ -288,7 +288,7 @@ def parameter_grid(found: Identification) -> Grid:
 
 
 def shape_choice_grid(choices: pl.DataFrame) -> Grid:
-    """How the friction models competed on what was left out of the fit."""
+    """Friction models' errors on stretches left out of the fit."""
     return Grid(
         title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
         columns=(Column("friction", words=True), *map(Column, ("joint", "RMS [N·m]", ""))),

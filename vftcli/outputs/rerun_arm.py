@@ -57,7 +57,7 @@ def arm_length(chain: Chain) -> float:
 
 
 def capsules(chain: Chain) -> list[list[Capsule]]:
-    """What moves with the base and with each link: n + 1 lists, base first."""
+    """Parts on the base and on each link: n + 1 lists, base first."""
     n, length = chain.joints, arm_length(chain)
     offsets = np.vstack([chain.translation, chain.flange_translation])
     radii = length * np.linspace(*THICKNESS, n + 1)

@@ -252,7 +252,7 @@ def send_plot(stream: Stream, plot: Chart) -> None:
 
 
 def width_of(line: ChartLine) -> float:
-    """How broad a line is drawn. [px]"""
+    """Width of a line. [px]"""
     if line.name.endswith(EDGES):
         return 0.6
     if line.name.startswith(BAR):

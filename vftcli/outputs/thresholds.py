@@ -104,7 +104,7 @@ def check_grid(check: ContactCheck) -> Grid:
 
 
 def verdict(contact: CheckedContact) -> str:
-    """What raised the alarm, or why there is none."""
+    """Cause of the alarm, or reason for none."""
     return contact.by or ("on already" if contact.was_on else "missed")
 
 

@@ -21,7 +21,7 @@ FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".j
 
 
 def partial_of(copy: Path) -> Path:
-    """Where a copy is made."""
+    """Place of a copy."""
     return copy.with_name(f"{copy.name}.partial")
 
 
@@ -109,7 +109,7 @@ def take_place(partial: Path, copy: Path) -> None:
 
 @contextmanager
 def finished(path: Path) -> Iterator[Path]:
-    """Where to write a file of a copy: it has its name when the block ends well."""
+    """Path for a file of a copy; it gets its name when the block ends well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.partial")
     yield temporary

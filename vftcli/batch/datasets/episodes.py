@@ -48,7 +48,7 @@ class Dataset(Protocol):
         """The data files with their episodes."""
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has, also one that cannot be read as a log."""
+        """Number of frames of an episode, even of one unreadable as a log."""
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
         """Refuse a file that has such columns already.

@@ -42,7 +42,7 @@ class Hdf5Dataset:
             yield DataFile(path.relative_to(self.folder), path, tuple(episodes_in(open_log(path))))
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has: those of the first data set beside its positions."""
+        """Number of an episode's frames: those of the first set beside positions."""
         import h5py
 
         path = self.folder / file.place

@@ -72,7 +72,7 @@ class Drawing(NamedTuple):
 
 
 def checked_form(form: str | None) -> str | None:
-    """What figures shall be written as; None where none are asked for."""
+    """Format of the figures; None without any."""
     if form is None:
         return None
     if form not in FORMS:

@@ -177,13 +177,13 @@ def dot_look(k: int) -> dict[str, Any]:
 
 
 def ribbon_looks(series: ChartLine) -> tuple[dict[str, Any], dict[str, Any]]:
-    """How the band about a line looks, and where no contact is listed."""
+    """Looks of the band about a line: itself, and where no contact is listed."""
     common = {"alpha": 0.25, "linewidth": 0.0}
     return {"facecolor": paint(series), **common}, {"facecolor": "0.4", **common}
 
 
 def band_look() -> dict[str, Any]:
-    """How the ends of a band about zero look."""
+    """Look of the ends of a band about zero."""
     return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
 
 
@@ -309,7 +309,7 @@ def dot_figure(
 
 
 def dots_look(k: int, paint: str) -> dict[str, Any]:
-    """How the dots of one row look: every second one is hollow."""
+    """Look of a row's dots: every second one is hollow."""
     hollow = {"markerfacecolor": "white"} if k % 2 else {}
     shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markeredgewidth": 0.8}
     return {"color": paint, "linestyle": "none", **shape, **hollow}

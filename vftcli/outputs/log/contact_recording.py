@@ -80,7 +80,7 @@ def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine
 
 
 def contact_log(found: ContactList) -> list[LogLine]:
-    """When each contact begins, with what is known of it, and what limits the list."""
+    """Start of each contact, its facts, and limits of the list."""
     lines = []
     for contact in found.contacts:
         path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]

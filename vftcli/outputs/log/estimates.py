@@ -1,4 +1,4 @@
-"""What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
+"""Files of `vftcli estimate`: estimates as columns, `run.json`, extras."""
 
 import json
 from collections.abc import (

@@ -1,4 +1,4 @@
-"""What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
+"""Files of `vftcli report`: page, recording, estimates, errors, run.json."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence

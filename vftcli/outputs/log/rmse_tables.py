@@ -63,7 +63,7 @@ class Block(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Which log, which reference, how many samples."""
+        """Log, reference, number of samples."""
         low, high = self.samples
         samples = f"{high}" if low == high else f"{low} to {high}"
         return f"{self.recording} against {self.reference}, {samples} samples"
@@ -160,7 +160,7 @@ def rmse_grid(table: Block) -> Grid:
 
 
 def details(row: dict[str, Any]) -> dict[str, str]:
-    """What the tables below the RMSE table say of one row: title of the table → text."""
+    """Text below the RMSE table for one row, by the table's title."""
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share = row.get("coverage_95")
     interval = DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
@@ -196,7 +196,7 @@ def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
 
 
 def marks_in_words(found: Sequence[Block]) -> str:
-    """What floor, star and dash mean, where they occur."""
+    """Meaning of floor, star and dash, if present."""
     lines = []
     if any(table.has_floor for table in found):
         lines.append("floor: RMSE that the reference itself is known to have")
@@ -222,7 +222,7 @@ def without_answer(found: Sequence[Block]) -> list[str]:
 
 
 def marks_on_page(found: Sequence[Block]) -> str:
-    """What the marks of the RMSE table mean, as HTML."""
+    """Meaning of the RMSE table's marks, as HTML."""
     text = (
         "Torque on the robot about each joint's own axis; bold is the best of its joint; "
         "the mean is over the joints with a reference to be trusted."

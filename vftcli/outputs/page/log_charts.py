@@ -256,7 +256,7 @@ def spectra_chart(found: Spectra) -> Chart:
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
-    """What was minimised for every observer that the log tuned."""
+    """Minimised error of every observer tuned by the log."""
     lines = tuple(
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
         for name, curve in curves.items()

@@ -62,12 +62,12 @@ class Scales(NamedTuple):
 
     @property
     def floor(self) -> float:
-        """Where the plot ends below."""
+        """Lower end of the plot."""
         return self.box.height - self.box.bottom
 
     @property
     def side(self) -> float:
-        """Where the plot ends to the right."""
+        """Right end of the plot."""
         return self.box.width - self.box.right
 
 
