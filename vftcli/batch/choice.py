@@ -15,12 +15,12 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 @dataclass(frozen=True, kw_only=True)
 class WorkersChoice:
-    """Where many pieces of work are done."""
+    """Place of many pieces of work."""
 
     #: How many processes of this machine; 0 for this process alone, None for as many as it has
     #: cores and memory for.
     workers: int | None = None
-    scheduler: str | None = None  #: Address of a Dask scheduler that stands, or None.
+    scheduler: str | None = None  #: Address of a running Dask scheduler, or None.
     #: Files of the authority's certificate, the own certificate and its key, or None.
     tls: tuple[Path, Path, Path] | None = None
     #: Bytes that a worker of this machine may take before it is ended, None for its share.

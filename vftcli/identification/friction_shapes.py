@@ -123,7 +123,7 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One term of a friction shape at every sample: the friction law with its coefficient 1.
+    """One friction term at every sample: the law with its coefficient at 1.
 
     Args:
         term: Its key.

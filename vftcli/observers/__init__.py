@@ -1,4 +1,4 @@
-"""Disturbance observers: p and μ along a log in, one estimate of the external torque out."""
+"""Disturbance observers: p and μ of a log in, external torque out."""
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver

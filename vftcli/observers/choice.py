@@ -1,4 +1,4 @@
-"""What a user may choose of the observers: which run, with which gains, in which form."""
+"""A user's choice of observers: their names, gains and form."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -41,7 +41,7 @@ LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call f
 
 @dataclass(frozen=True, kw_only=True)
 class ObserverChoice:
-    """Which observers run, and what their gains are.
+    """Observers to run, and their gains.
 
     Raises:
         ParameterError: If there is no such observer, or none of those named could run online.
@@ -138,21 +138,21 @@ class ObserverChoice:
 
     @property
     def of_robot_file(self) -> bool:
-        """Whether the observers run with the gains of the robot's file, and none is changed."""
+        """Whether all observers run with unchanged gains of the robot's file."""
         changed = self.settings or self.gains_file is not None or self.match is not None
         return self.gains == PAPER_GAINS and not changed
 
     def beside_print(self) -> "ObserverChoice":
-        """The choice beside a printed table: without `best` where that is there by default."""
+        """The choice beside a printed table: without a default `best`."""
         return replace(self, names=PAPER) if self.names == DEFAULT else self
 
     def build(
         self, robot: Robot, step: float, shown: LogSpectra = NOT_SHOWN
     ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-        """Build the observers for one robot and sample time, with remarks on gains nobody gave.
+        """Observers for one robot and sample time, with remarks on unset gains.
 
         Args:
-            robot: The arm, whose file gives the gains that are not set here.
+            robot: The arm; its file gives the gains that are not set here.
             step: Sample time. [s]
             shown: What the complete log shows of noise and contact, nothing where its free part is
                 not known.

@@ -85,7 +85,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
 
 
 def check_grid(check: ContactCheck) -> Grid:
-    """The contacts of a log, and what told them."""
+    """The contacts of a log, and their evidence."""
     return Grid(
         title=f"{check.log}: what they would have detected",
         columns=(
@@ -104,7 +104,7 @@ def check_grid(check: ContactCheck) -> Grid:
 
 
 def verdict(contact: CheckedContact) -> str:
-    """What raised the alarm, or why there is none."""
+    """Cause of the alarm, or reason for none."""
     return contact.by or ("on already" if contact.was_on else "missed")
 
 
@@ -202,7 +202,7 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
 
 
 class Interface(NamedTuple):
-    """How one robot's interface is told thresholds."""
+    """Thresholds in one robot's interface."""
 
     joints: int | None  #: How many joint torques it takes, None for any number.
     write: Callable[[Thresholds], str]  #: Makes the text of it.
@@ -216,7 +216,7 @@ def calls(thresholds: Thresholds) -> dict[str, str]:
         for name, interface in INTERFACES.items()
         if interface.joints in (None, count)
     }
-    # An interface that needs what is not known here has nothing to be told.
+    # An interface that needs an unknown number gets no text.
     return {name: text for name, text in written.items() if text}
 
 
@@ -248,7 +248,7 @@ def doubt(thresholds: Thresholds) -> str:
 
 
 def libfranka_call(thresholds: Thresholds) -> str:
-    """`set_collision_behavior` of pylibfranka; the C++ call takes the same four lists."""
+    """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
     if not are_known(thresholds.axes):
         return ""
     lists = {
@@ -311,7 +311,7 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Name → how it is told thresholds.
+#: Name → its thresholds.
 INTERFACES = {
     "libfranka": Interface(7, libfranka_call),
     "franka_ros": Interface(7, franka_ros_parameters),

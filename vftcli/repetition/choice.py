@@ -1,4 +1,4 @@
-"""What a user may choose of free motion, read from the command line and checked once."""
+"""A user's choice of free motion, read from the command line, checked once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 @dataclass(frozen=True, kw_only=True)
 class FreeChoice:
-    """The motion that nobody touched, and how the two-cycle difference lays it under the log.
+    """Free motion, and its use in the two-cycle difference.
 
     With nothing chosen the free cycles of a repeated motion are found.
 
@@ -122,7 +122,7 @@ def cycle_numbers(text: str) -> tuple[int, ...]:
 
 
 def cutoff(text: str) -> float | str | None:
-    """Cutoff of ``--low-pass``: a number [Hz], None for "none", any other word as it is."""
+    """Cutoff of ``--low-pass``: a number [Hz], None for "none", else the word."""
     if text == "none":
         return None
     try:

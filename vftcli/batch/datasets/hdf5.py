@@ -44,7 +44,7 @@ class Hdf5Dataset:
             yield DataFile(path.relative_to(self.folder), path, numbers)
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has: those of the first data set beside its positions."""
+        """Number of an episode's frames: those of the first set beside positions."""
         import h5py
 
         path = self.folder / file.place
@@ -94,4 +94,4 @@ class Hdf5Dataset:
                         data.attrs["names"] = list(column.elements)
 
     def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Nothing: what there is to tell stands in the files."""
+        """Nothing: the files describe themselves."""

@@ -1,4 +1,4 @@
-"""What a user may choose of the files that are written of a log."""
+"""A user's choice of a log's files."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ FULL, LEVELS, NONE = "full", "levels", "none"
 
 @dataclass(frozen=True, kw_only=True)
 class OutputChoice:
-    """What is written of a log besides what always is."""
+    """Files of a log beside those always written."""
 
     extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
     #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.

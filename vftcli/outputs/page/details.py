@@ -160,7 +160,7 @@ def observer_row(analysis: Analysis, name: str) -> tuple[Entry, ...]:
 def joint_values(values: Array) -> str:
     """One number where all joints agree to three digits, else one line a run of equal joints."""
     texts = [significant(float(value)) for value in values]
-    # Compared as printed: what cannot be told apart on the page is one value.
+    # Compared as printed: values that look equal are one.
     runs = [
         (text, [j for j, _ in run]) for text, run in groupby(enumerate(texts, 1), itemgetter(1))
     ]
