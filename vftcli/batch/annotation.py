@@ -162,8 +162,8 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
     efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
     if not efforts:
         raise MissingSignalError(
-            f"{recording.name}: no joint torques or currents, so no forces can be estimated; ports of "
-            "DROID and Open X-Embodiment leave them out, DROID's raw release has them"
+            f"{recording.name}: no joint torques or currents, so no forces can be estimated; "
+            "ports of DROID and Open X-Embodiment leave them out, DROID's raw release has them"
         )
     for value in efforts if not anyway else ():
         same = np.flatnonzero((value == value[0]).all(axis=0)) + 1

@@ -41,7 +41,12 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     if not found.contacts:
         return ()
     forces = ("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]")
-    rest = ("log-likelihood ratio [nats]", "margin of the place [nats]", "vendor |F| [N]", "sensor |F| [N]")
+    rest = (
+        "log-likelihood ratio [nats]",
+        "margin of the place [nats]",
+        "vendor |F| [N]",
+        "sensor |F| [N]",
+    )
     wrenches = Grid(
         title="Wrench at the peak, base axes, the moment about the flange point",
         columns=(Column("#"), *words(*forces), *map(Column, rest)),
