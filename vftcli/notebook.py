@@ -132,8 +132,7 @@ def thresholds(
     Raises:
         VftError: If a log cannot be read, is meaningless with this robot, or all are too short.
     """
-    from vftcli.contacts.compared_signals import compared_signals
-    from vftcli.contacts.thresholds import find_thresholds
+    from vftcli.contacts.thresholds import compared_signals, find_thresholds
 
     logs = [free] if isinstance(free, Log) else list(free)
     if not logs:

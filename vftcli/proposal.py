@@ -26,7 +26,7 @@ MOST_ROBOTS = 5  #: Profiles that are named where none is settled.
 #: What estimates can be compared with, the most telling first, and what for.
 REFERENCES = {
     "sensor": "the log holds a wrench that was measured",
-    "two-cycle": "the motion is known without contact too, and the difference of the two is taken",
+    "two-cycle": "the free motion is known too: the reference is the difference of the two",
     "vendor": "the log holds an external torque of its controller: an estimate as well",
 }
 
@@ -102,7 +102,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
     if "dq" in source.derived:
         yield ProposedOption("the log has no velocities", "derive", "dq")
     if recording.payload_mass:
-        told = f"the controller was told of {recording.payload_mass:.3g} kg"
+        told = f"the controller assumes {recording.payload_mass:.3g} kg"
         yield ProposedOption(told, "payload", "log", taken=False)
 
 

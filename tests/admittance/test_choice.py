@@ -1,4 +1,4 @@
-"""ControlChoice and ReleaseChoice: what a replay is run with."""
+"""ControlChoice and the start of a release: what a replay is run with."""
 
 from pathlib import Path
 
@@ -7,9 +7,9 @@ import pytest
 
 from vftcli.admittance.choice import (
     ControlChoice,
-    ReleaseChoice,
     released_robot,
     split_settings,
+    start_pose,
 )
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
@@ -73,10 +73,8 @@ def test_settings_of_observers_are_told_from_the_admittance_s() -> None:
 
 
 def test_a_release_starts_where_it_is_told_or_where_the_file_says() -> None:
-    release = ReleaseChoice.parsed(release=["x=0.3", "rz=0.1"], start="0,1,2,3,4,5")
-    np.testing.assert_array_equal(release.deviation, [0.3, 0, 0, 0, 0, 0.1])
-    np.testing.assert_array_equal(release.pose(UR5), [0, 1, 2, 3, 4, 5])
-    assert ReleaseChoice.parsed(release=["x=0.3"]).pose(UR5).shape == (6,)
+    np.testing.assert_array_equal(start_pose(UR5, "0,1,2,3,4,5"), [0, 1, 2, 3, 4, 5])
+    np.testing.assert_array_equal(start_pose(UR5, None), UR5.admittance["start"])
 
 
 @pytest.mark.parametrize(

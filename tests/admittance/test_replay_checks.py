@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance import replay as checks
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import controllers
 from vftcli.admittance.metrics import Drag
-from vftcli.admittance.motion import AxisMotion
-from vftcli.admittance.parameters import from_table
+from vftcli.admittance.motion import AxisMotion, Phases
+from vftcli.admittance.parameters import Admittance, from_table
+from vftcli.admittance.replay import Lyapunov, Replay, drag_remarks, replay, trouble
 from vftcli.robots import load_robot
+from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import Wrench
 
 PARAMETERS = from_table(load_robot("ur5").admittance, "ur5", {})
 TWO = controllers(PARAMETERS)
+SLOW = replace(PARAMETERS, period=0.1)
 ROWS = 51
 
 
@@ -34,10 +36,35 @@ def path(reached: np.ndarray | None = None, speed: float = 0.5) -> JointPath:
 NONE = np.zeros(2, dtype=np.int64)
 
 
+def replayed(
+    made: AxisMotion | None = None,
+    way: JointPath | None = None,
+    *,
+    rises: np.ndarray = NONE,
+    parameters: Admittance = PARAMETERS,
+    **others: np.ndarray,
+) -> Replay:
+    """A replay without trouble, but for what is given."""
+    zero = np.zeros((ROWS - 1, 6))
+    energies = np.zeros((ROWS, 2, 6))
+    given = {"start": zero[0], "wrench": zero, **others}
+    return Replay(
+        robot=load_robot("ur5"),
+        parameters=parameters,
+        controllers=TWO,
+        verdicts=(),
+        phases=Phases(zero > 0.0, zero),
+        motion=made or motion(),
+        path=way or path(),
+        lyapunov=Lyapunov(corrected=energies, printed=energies, rises=rises),
+        rows=(),
+        **given,
+    )
+
+
 def test_nothing_is_said_of_a_replay_without_trouble() -> None:
-    assert checks.limits_met(TWO, motion(), path(), NONE) == ()
-    assert checks.implausible_travel(PARAMETERS, TWO, motion(), path()) == ()
-    assert checks.arm_moved(np.full((5, 6), 0.005)) == ()
+    assert not [*trouble(replayed())]
+    assert not [*trouble(replayed(logged=np.full((5, 6), 0.005)))]
 
 
 def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
@@ -49,10 +76,12 @@ def test_each_limit_is_told_with_its_number_and_its_controller() -> None:
     x[20:, 1, 0] = np.inf
     clipped[3:6, 0, 2] = clipped[5, 0, 3] = True
     reached[30:40, 1] = False
-    found = checks.limits_met(TWO, motion(x, clipped), path(reached, 1.5), np.array([0, 7]))
+    rises = np.array([0, 7])
+    found = [*trouble(replayed(motion(x, clipped), path(reached, 1.5), rises=rises))]
     assert "the first at 3.000 s" in " ".join(str(remark) for remark in found)
     told = {(r.code, r.where.about): dict(r.values) for r in found}
     first, second = (controller.name for controller in TWO)
+    assert told.pop(("travel-implausible-hard", ""))["travel_m"] > 1e300  # it escaped
     assert told == {
         ("speed-limit-acted", first): {"periods": 3},
         ("joint-too-fast", first): {"share": 1.5},
@@ -71,7 +100,7 @@ def test_travel_counts_where_poses_are_out_of_reach(mode: str, code: str) -> Non
     reached = np.ones((ROWS, 2), dtype=bool)
     reached[10, 1] = False
     parameters = replace(PARAMETERS, threshold_mode=mode)
-    (remark,) = checks.implausible_travel(parameters, TWO, motion(x), path(reached))
+    _, remark = trouble(replayed(motion(x), path(reached), parameters=parameters))
     assert remark.code == code
     assert remark.values["travel_m"] == pytest.approx(1.0)  # not the other controller's 9 m
 
@@ -80,11 +109,11 @@ def test_the_axis_nearest_to_its_threshold_is_named() -> None:
     wrench = np.zeros((10, 6))
     wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
     wrench[6] = np.nan
-    (remark,) = checks.nothing_dragged(wrench, PARAMETERS, dragged=False)
+    (remark,) = drag_remarks(replayed(wrench=wrench), [], wrench)
     assert remark.values["axis"] == "ry"
     assert remark.values["share"] == pytest.approx(0.75)
-    assert checks.nothing_dragged(wrench, PARAMETERS, dragged=True) == ()
-    assert checks.nothing_dragged(wrench[:0], PARAMETERS, dragged=False) == ()
+    assert not [*drag_remarks(replayed(wrench=wrench), [drag(4, 5)], wrench)]
+    assert not [*drag_remarks(replayed(wrench=wrench[:0]), [], wrench)]
 
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
@@ -93,7 +122,8 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
 
 def test_a_long_drag_of_an_arm_at_rest_is_told_once_an_axis() -> None:
     logged = np.zeros((100, 6))
-    found = checks.drags_at_rest([drag(0, 30), drag(40, 90), drag(10, 25, axis=0)], logged, 0.1)
+    drags = [drag(0, 30), drag(40, 90), drag(10, 25, axis=0)]
+    found = drag_remarks(replayed(parameters=SLOW), drags, logged)
     assert [(r.values["axis"], r.values["duration_s"]) for r in found] == [
         ("z", pytest.approx(5.0))
     ]
@@ -103,23 +133,31 @@ def test_a_moving_arm_is_dragged_as_it_should_be() -> None:
     t = np.arange(100) * 0.1
     there = np.zeros((100, 6))
     there[:, 0] = 0.3 * np.sin(2 * np.pi * t / 2.0)  # back where it was after every 2 s
-    assert len(checks.drags_at_rest([drag(0, 90)], there, 0.1)) == 1  # each sample meets itself
+    still = replayed(parameters=SLOW)
+    assert len([*drag_remarks(still, [drag(0, 90)], there)]) == 1  # each sample meets itself
     there[:, 0] = 0.1 * t
-    assert checks.drags_at_rest([drag(0, 90)], there, 0.1) == ()
+    assert not [*drag_remarks(still, [drag(0, 90)], there)]
 
 
 def test_unknown_samples_are_counted() -> None:
     masked = np.arange(10) < 3
     wrench = Wrench(
-        name="x", t=np.arange(10.0), values=np.zeros((10, 6)), frame="base", masked=masked
+        name="x", t=0.01 * np.arange(10.0), values=np.zeros((10, 6)), frame="base", masked=masked
     )
-    (remark,) = checks.unknown_force(wrench)
-    assert remark.values["samples"] == 3
-    assert checks.unknown_force(replace(wrench, masked=np.zeros(10, dtype=bool))) == ()
+    q = np.tile(load_robot("ur5").admittance["start"], (10, 1))
+
+    def counted(record: Wrench) -> list[object]:
+        found = replay(
+            record, q, load_robot("ur5"), PARAMETERS, TWO, source=fact("force-of-release")
+        )
+        return [r.values["samples"] for r in found.remarks if r.code == "force-unknown"]
+
+    assert counted(wrench) == [3]
+    assert counted(replace(wrench, masked=np.zeros(10, dtype=bool))) == []
 
 
 def test_a_log_that_moves_is_told_how_far() -> None:
     logged = np.zeros((5, 6))
     logged[3, :3], logged[4, 3:] = [0.03, 0.0, 0.04], 1.0
-    (remark,) = checks.arm_moved(logged)
+    (remark,) = trouble(replayed(logged=logged))
     assert remark.values["distance_m"] == pytest.approx(0.05)

@@ -44,9 +44,8 @@ from vftcli.reproduction.timing import (
     simd,
 )
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.names import EFFORTS, EXAMINED
 from vftcli.signals.recording import Recording

@@ -43,7 +43,7 @@ def pushed(free: Path) -> Path:
 def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run: Run) -> None:
     code, out, err = run("thresholds", free, *COLUMNS, "--rate", 60, "--check", pushed)
     assert code == 0, err
-    assert "any axis, 60 × an hour" in out
+    assert "contact 60 × an hour" in out
     assert "robot.set_collision_behavior(" in out
     assert "collision_config:" in out
     assert "pushed.npy: 1 alarm, the weakest at" in out
@@ -86,7 +86,7 @@ def test_a_simulated_log_is_checked_against_the_truth_beside_it(run: Run) -> Non
     words = ("--robot", "panda", "--rate", 60, "--anyway")
     code, out, err = run("thresholds", log, *words, "--check", log)
     assert code == 0, err
-    assert "of 3 contacts caught" in out
+    assert "of 3 contacts detected" in out
     assert "contacts are those of the reference file:panda_bearing.csv.truth.parquet" in err
     # It is no free log: J2 bears the load for half of it.
     assert "looks touched" in err

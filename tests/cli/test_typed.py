@@ -2,7 +2,7 @@
 
 import sys
 from dataclasses import MISSING, dataclass, fields
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import pytest
 import typer
@@ -32,7 +32,7 @@ EVERY = (
 
 @dataclass(frozen=True, kw_only=True)
 class SizeChoice(Choice):
-    GROUP: ClassVar[str] = "Sizes"
+    GROUP = "Sizes"
 
     word: Annotated[str, Option("--word", "W", "Which word.")]
     size: Annotated[int, Option("--size", "N", "How large.", least=1, shows_default=True)] = 3

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.contacts.caught import check_contacts
-from vftcli.contacts.compared_signals import ComparedSignals
-from vftcli.contacts.thresholds import SignalThreshold, Thresholds
+from vftcli.contacts.thresholds import ComparedSignals, SignalThreshold, Thresholds
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording

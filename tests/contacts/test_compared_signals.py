@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.contacts.compared_signals import compared_signals
+from vftcli.contacts.thresholds import compared_signals
 from vftcli.observers.paper import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot

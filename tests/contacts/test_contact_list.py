@@ -34,7 +34,6 @@ def test_the_hardest_is_the_one_with_the_largest_force() -> None:
     soft, hard = contact(peak_force=10.0), contact(number=2, peak_force=80.0)
     assert contact_list(soft, hard).hardest is hard
     assert contact_list().hardest is None
-    assert contact(peak_force=None).numbered(3).number == 3
 
 
 def test_a_force_within_its_band_is_the_hardest_only_among_its_like() -> None:

@@ -4,8 +4,6 @@ import numpy as np
 
 from vftcli.contacts.model_error import (
     UNKNOWN,
-    ErrorCourse,
-    ErrorNoise,
     error_course,
     error_model,
     innovations,
@@ -14,9 +12,10 @@ from vftcli.contacts.model_error import (
     without_reversals,
 )
 from vftcli.robots.disturbance import Blocks
-from vftcli.robots.friction import PUSHED_SHARE, STOP_SHARE
+from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 
 B = 0.024
 
@@ -34,10 +33,12 @@ def blocks(d: Array, velocity: Array, known: Mask | None = None) -> Blocks:
     )
 
 
-def noise(**changed: object) -> ErrorNoise:
-    """White noise of .1 N·m, an error of .5 N·m over .4 s, dry friction of 10 N·m; one joint."""
-    values = {"white": [0.01], "variance": [0.25], "time": [0.4], "dry": [10.0], "seen": [1.0]}
-    return ErrorNoise(**{k: np.array(v) for k, v in values.items()} | changed, free_seconds=4.0)
+def noise(joints: int = 1, *, seen: bool = True) -> TorqueNoise:
+    """White noise of .1 N·m, an error of .5 N·m over .4 s, dry friction of 10 N·m."""
+    values = {"white": 0.01, "variance": 0.25, "time": 0.4, "dry": 10.0}
+    values |= {"at_rest": (CREEP_SHARE * 10.0) ** 2, "pushed": (PUSHED_SHARE * 10.0) ** 2}
+    each = {key: np.full(joints, value) for key, value in values.items()}
+    return TorqueNoise(**each, seen=np.full(joints, seen), free_seconds=4.0)
 
 
 def drawn(count: int, rng: np.random.Generator) -> Array:
@@ -58,7 +59,7 @@ def test_what_was_drawn_is_learned() -> None:
     np.testing.assert_allclose(found.variance, 0.25, rtol=0.3)
     np.testing.assert_allclose(found.white, 0.01, rtol=0.15)
     np.testing.assert_allclose(found.time, 0.4, rtol=0.35)
-    assert found.seen[0] == 1.0
+    assert found.seen[0]
 
 
 def test_an_offset_is_an_error_too() -> None:
@@ -120,10 +121,7 @@ def test_a_joint_that_stops_draws_its_stiction() -> None:
 def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
     velocity = np.column_stack([np.zeros(20), np.full(20, 0.5)])
     log = blocks(np.zeros((20, 2)), velocity)
-    both = ErrorNoise(
-        white=np.full(2, 0.01), variance=np.full(2, 0.25), time=np.full(2, 0.4),
-        dry=np.full(2, 10.0), seen=np.ones(2), free_seconds=4.0,
-    )  # fmt: skip
+    both = noise(2)
     pushed = np.arange(20) >= 10
     strict, free = error_course(both, log), error_course(both, log, pushed)
     stationary = free.added[15] / (1.0 - free.decay[15] ** 2)
@@ -133,7 +131,7 @@ def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
 
 def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction() -> None:
     log = blocks(np.zeros((20, 1)), np.full((20, 1), 0.5))
-    course = error_course(noise(seen=np.zeros(1)), log)
+    course = error_course(noise(seen=False), log)
     stationary = course.added[10, 0] / (1.0 - course.decay[10, 0] ** 2)
     np.testing.assert_allclose(stationary, 0.25 + 4.0)
 
@@ -142,5 +140,3 @@ def test_a_gap_says_nothing() -> None:
     known = np.arange(20) != 7
     course = error_course(noise(), blocks(np.zeros((20, 1)), np.full((20, 1), 0.5), known))
     assert course.white[7, 0] == UNKNOWN
-    assert isinstance(course.part(slice(3, 9)), ErrorCourse)
-    assert len(course.part(slice(3, 9)).white) == 6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_model_error import B
 
-from vftcli.contacts.model_error import ErrorNoise, error_course
+from vftcli.contacts.model_error import error_course
 from vftcli.contacts.sizes import (
     START,
     learn_prior,
@@ -15,6 +15,7 @@ from vftcli.contacts.sizes import (
 )
 from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.disturbance import Blocks
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 
 
 def wrench(size: list[float], sd: float) -> WindowWrench:
@@ -74,9 +75,10 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         t=B * (np.arange(count) + 0.5), length=np.full(count, B), d=d,
         q=np.zeros_like(d), velocity=still, known=np.ones(count, dtype=bool),
     )  # fmt: skip
-    noise = ErrorNoise(
+    noise = TorqueNoise(
         white=np.full(6, 0.01), variance=np.full(6, 1e-4), time=np.full(6, 0.5),
-        dry=np.ones(6), seen=np.ones(6), free_seconds=4.0,
+        dry=np.ones(6), seen=np.ones(6, dtype=bool),
+        at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
     )  # fmt: skip
     log = BlockLog.of(blocks, error_course(noise, blocks))
     prior = learn_prior(log, jacobian, runs, START, rounds=2)

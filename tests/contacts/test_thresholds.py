@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.contacts.compared_signals import ComparedSignals
 from vftcli.contacts.thresholds import (
+    ComparedSignals,
     Thresholds,
     counted_alarms,
     find_thresholds,

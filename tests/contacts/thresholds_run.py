@@ -18,9 +18,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.contacts.compared_signals import ComparedSignals, compared_signals
 from vftcli.contacts.tail import BLOCK, SETTLING
-from vftcli.contacts.thresholds import CountedAlarms, counted_alarms, find_thresholds
+from vftcli.contacts.thresholds import (
+    ComparedSignals,
+    CountedAlarms,
+    compared_signals,
+    counted_alarms,
+    find_thresholds,
+)
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run

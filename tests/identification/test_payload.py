@@ -62,8 +62,8 @@ def test_the_load_is_moved_to_flange_axes():
 @pytest.mark.parametrize(
     ("mass", "sd", "com", "words"),
     [
-        (-0.1, 0.01, 0.0, "no load can be told"),
-        (1.0, 0.51, 0.0, "no load can be told: mass 1 ± 0.51 kg"),
+        (-0.1, 0.01, 0.0, "no load found"),
+        (1.0, 0.51, 0.0, "no load found: mass 1 ± 0.51 kg"),
         (1.0, 0.49, 1.2, "m from the flange"),
     ],
 )
@@ -220,7 +220,7 @@ def test_what_settles_at_the_edges_of_a_rest_does_not_count():
 
 def test_the_limits_of_a_load_themselves():
     """No mass is no load; one known to half, or as far away as a load may be, just is."""
-    with pytest.raises(IdentificationError, match="no load can be told: mass 0"):
+    with pytest.raises(IdentificationError, match="no load found: mass 0"):
         load(0.0, [0, 0, 0], (0.0, 0.1, 0.1, 0.1))
     # the Panda's flange lies along z of its last link and is not turned against it
     far = PANDA.chain.flange_translation + np.array([REACH, 0.0, 0.0])

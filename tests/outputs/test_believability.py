@@ -60,8 +60,8 @@ def test_an_arm_that_leaves_most_of_the_torque_is_bad(without_reference: Analysi
     made = examined(without_reference, misfit=1.66)
     (ground,) = of(made, "robot, gravity")
     assert ground.standing == "bad"
-    assert "(does not fit: 166.0 % unexplained)" in facts(made)
-    assert "(fits 0.1 %)" in facts(examined(without_reference))
+    assert "(does not fit: model error 166.0 %)" in facts(made)
+    assert "(model error 0.1 %)" in facts(examined(without_reference))
 
 
 def test_without_a_match_the_arm_is_not_checked(without_reference: Analysis) -> None:
@@ -144,7 +144,7 @@ def test_a_joint_at_rest_hides_its_dry_friction(without_reference: Analysis, as_
     assert resting(made.recording).tolist() == [False] * 4 + [True, False]
     (ground,) = of(made, "joints at rest")
     dry = dry_friction(load_robot("ur5").friction, 6)[4]
-    assert ground.sentence == f"friction hides up to {dry:.2g} N·m on J5"
+    assert ground.sentence == f"J5: pushes below {dry:.2g} N·m do not show"
     still = as_if(without_reference, replace(recording, dq=np.zeros_like(dq)))
     assert len(of(still, "the arm is still")) == 1
 

@@ -175,9 +175,9 @@ def test_the_tables_name_every_signal_and_log() -> None:
 
 def test_the_line_on_a_check_counts_and_sizes() -> None:
     line = check_line(check())
-    assert "2 of 3 contacts caught" in line
+    assert "2 of 3 contacts detected" in line
     assert "100 ms after they begin (median), at most 150 ms" in line
-    assert "weakest caught 20.0 N" in line
+    assert "weakest detected 20.0 N" in line
     assert "hardest missed 12.0 N" in line
     assert "2 false in 0.500 h" in line
     assert check_line(check(None)) == "pushed.csv: 3 alarms, the weakest at 20.0 N"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.readers.collection import LogCollection, LogEntry
+from vftcli.readers.library import LogCollection, LogEntry
 from vftcli.readers.reader import ReadChoice
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"

@@ -256,6 +256,14 @@ def test_format_skips_recognition(tmp_path: Path) -> None:
     assert read(path, format="table", columns=columns).target_q is None
 
 
+@pytest.mark.parametrize("name", ["table", "headerless", "ur-csv", "bagpy", "ros2-echo"])
+def test_what_is_no_text_is_refused_by_each_format_of_text(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "x"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(LogError, match="not a table of text"):
+        read(path, format=name)
+
+
 def test_one_sample_is_a_recording(tmp_path: Path) -> None:
     assert read(write(tmp_path / "x", table(rows(1)))).samples == 1
 

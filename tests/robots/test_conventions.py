@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.robots.conventions import CONVENTIONS, Kinematics
+from vftcli.robots.conventions import Kinematics, kinematics
 from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_angles
 
 TABLE = [
@@ -45,7 +45,7 @@ def same(found: Pose, expected: Pose) -> None:
 
 def test_standard_dh_turns_first_and_moves_the_inertials_out() -> None:
     """T_j = Rz(q+θ) Tz(d) Tx(a) Rx(α), the textbook's distal table."""
-    found = CONVENTIONS["standard-dh"].kinematics(TABLE, DOCUMENT)
+    found = kinematics("standard-dh", TABLE, DOCUMENT)
     pose = IDENTITY
     for j, angle in zip(TABLE, ANGLES, strict=True):
         pose = pose @ Pose(rotation_about("z", angle + j["theta"]), np.zeros(3)) @ along(j["d"])
@@ -57,7 +57,7 @@ def test_standard_dh_turns_first_and_moves_the_inertials_out() -> None:
 
 def test_modified_dh_moves_first() -> None:
     """T_j = Rx(α) Tx(a) Rz(q+θ) Tz(d), Craig's proximal table."""
-    found = CONVENTIONS["modified-dh"].kinematics(TABLE, DOCUMENT)
+    found = kinematics("modified-dh", TABLE, DOCUMENT)
     pose = IDENTITY
     for j, angle in zip(TABLE, ANGLES, strict=True):
         pose = pose @ across(j["a"], j["alpha"])
@@ -68,10 +68,10 @@ def test_modified_dh_moves_first() -> None:
 
 @pytest.mark.parametrize("name", ["standard-dh", "modified-dh"])
 def test_xyz_rpy_states_any_other_s_placements(name: str) -> None:
-    given = CONVENTIONS[name].kinematics(TABLE, {})
+    given = kinematics(name, TABLE, {})
     joints = [
         {"xyz": p.translation.tolist(), "rpy": list(rpy_angles(p.rotation))}
         for p in given.placements
     ]
     end = {"ee_xyz": given.tip.translation, "ee_rpy": rpy_angles(given.tip.rotation)}
-    same(flange(CONVENTIONS["xyz-rpy"].kinematics(joints, end), ANGLES), flange(given, ANGLES))
+    same(flange(kinematics("xyz-rpy", joints, end), ANGLES), flange(given, ANGLES))

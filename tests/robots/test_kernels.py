@@ -11,7 +11,7 @@ import pytest
 from vftcli.robots import PROFILES, Payload, Robot, kernels, load_robot
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import felt_bodies, momentum_chunks, momentum_terms
-from vftcli.robots.literal import literal_momentum_terms
+from vftcli.robots.terms import literal_momentum_terms
 
 TILTED = np.array([3.1, -4.2, -8.3])  # a base on a wall bracket, |g| = 9.81 to 1 %
 LOAD = Payload(mass=2.0, com=np.array([0.02, 0.03, 0.08]), inertia=np.diag([0.01, 0.02, 0.015]))

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vftcli.robots.presliding import play
+from vftcli.robots.running_friction import play
 
 
 def looped(q, length, centre=None):

@@ -9,8 +9,7 @@ import pytest
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
-from vftcli.robots.presliding import play
-from vftcli.robots.running_friction import RunningFriction
+from vftcli.robots.running_friction import RunningFriction, play
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.recording import Recording
 

@@ -9,7 +9,7 @@ from made_urdfs import arm, link, robot, written
 from vftcli.doctor.examination import Examiner
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
-from vftcli.robots.winding import unwound
+from vftcli.robots.pairing import unwound
 from vftcli.signals.recording import Recording
 
 

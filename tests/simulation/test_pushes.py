@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.contacts import (
-    STYLES,
+from vftcli.simulation.contacts import STYLES, Place, Segments, draw_walk, started
+from vftcli.simulation.scenario import (
     HandSpec,
     LoadSpec,
-    Place,
     ProfileSpec,
     PushesSpec,
+    RandomWalkSpec,
     StopSpec,
+    WrenchSpec,
 )
-from vftcli.simulation.touch import RandomWalkSpec, draw_walk
 
 HERE = Place(np.eye(3), np.array([0.4, 0.1, 0.3]), np.zeros(3), np.zeros(3))
 
@@ -26,7 +26,8 @@ def rng() -> np.random.Generator:
 
 
 def test_profile_rises_holds_and_falls() -> None:
-    contact = ProfileSpec(name="p", spans=((1.0, 3.0),), force=(0, 0, 10.0)).start(rng(), 5.0)
+    spec = ProfileSpec(name="p", spans=((1.0, 3.0),), force=(0, 0, 10.0))
+    contact = started(spec, rng(), 5.0)
     sizes = [contact.wrench(t, HERE)[2] for t in (0.5, 1.1, 2.0, 2.9, 3.5)]
     np.testing.assert_allclose(sizes, [0.0, 5.0, 10.0, 5.0, 0.0], atol=1e-12)
 
@@ -34,13 +35,15 @@ def test_profile_rises_holds_and_falls() -> None:
 def test_profile_in_link_axes_turns_with_the_link() -> None:
     spec = ProfileSpec(name="p", spans=((0.0, 2.0),), force=(4.0, 0, 0), axes="link")
     turned = HERE._replace(rotation=np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]))
-    np.testing.assert_allclose(spec.start(rng(), 2.0).wrench(1.0, turned)[:3], [0, 4, 0])
+    np.testing.assert_allclose(started(spec, rng(), 2.0).wrench(1.0, turned)[:3], [0, 4, 0])
 
 
 @pytest.mark.parametrize("style", STYLES)
 def test_pushes_stay_inside_what_they_are_drawn_from(style: str) -> None:
     limits = STYLES[style]
-    pushes = PushesSpec(name="h", style=style, begin=1.0).start(rng(), 200.0).pushes
+    contact = started(PushesSpec(name="h", style=style, begin=1.0), rng(), 200.0)
+    assert isinstance(contact, Segments)
+    pushes = contact.pushes
     assert len(pushes) > 50
     assert pushes[0].start >= 1.0
     assert pushes[-1].stop <= 200.0
@@ -55,7 +58,7 @@ def test_hand_pulls_to_where_it_goes_and_lets_go() -> None:
     spec = HandSpec(
         name="h", spans=((1.0, 2.0),), moves=((0.1, 0, 0),), stiffness=200.0, reach=0.2, release=0.0
     )
-    hand = spec.start(rng(), 3.0)
+    hand = started(spec, rng(), 3.0)
     assert not hand.active(0.5)
     np.testing.assert_allclose(hand.wrench(1.0, HERE), 0.0, atol=1e-12)
     np.testing.assert_allclose(hand.wrench(1.5, HERE)[:3], [20.0, 0, 0])
@@ -70,21 +73,21 @@ def test_hand_twists_about_its_turn() -> None:
     spec = HandSpec(
         name="h", spans=((0.0, 1.0),), turns=((0, 0, 0.5),), twist_stiffness=10.0, reach=0.1
     )
-    hand = spec.start(rng(), 1.0)
+    hand = started(spec, rng(), 1.0)
     hand.wrench(0.0, HERE)
     np.testing.assert_allclose(hand.wrench(0.5, HERE)[3:], [0, 0, 5.0], atol=1e-12)
 
 
 def test_load_pulls_straight_down() -> None:
-    load = LoadSpec(name="l", weight=9.2, spans=((0.0, 4.0),)).start(rng(), 4.0)
+    load = started(LoadSpec(name="l", weight=9.2, spans=((0.0, 4.0),)), rng(), 4.0)
     np.testing.assert_allclose(load.wrench(2.0, HERE), [0, 0, -9.2, 0, 0, 0])
 
 
 def test_stop_pushes_and_never_pulls() -> None:
     stop = StopSpec(name="s", through=(0, 0, 0.31), stiffness=1000.0, damping=100.0)
-    wall = stop.start(rng(), 1.0)
+    wall = started(stop, rng(), 1.0)
     np.testing.assert_allclose(wall.wrench(0.0, HERE)[:3], [0, 0, 10.0])
-    longer = replace(stop, normal=(0.0, 0.0, 3.0)).start(rng(), 1.0)
+    longer = started(replace(stop, normal=(0.0, 0.0, 3.0)), rng(), 1.0)
     np.testing.assert_allclose(longer.wrench(0.0, HERE), wall.wrench(0.0, HERE))
     leaving = HERE._replace(velocity=np.array([0.0, 0, 1.0]))
     np.testing.assert_array_equal(wall.wrench(0.0, leaving), 0.0)
@@ -109,6 +112,6 @@ def test_random_walk_gains_its_intensity() -> None:
         (ProfileSpec(name="p", spans=(), axes="tool"), "there is base, link"),
     ],
 )
-def test_impossible_contacts_are_refused(spec: object, words: str) -> None:
+def test_impossible_contacts_are_refused(spec: WrenchSpec, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        spec.start(rng(), 1.0)  # type: ignore[attr-defined]
+        started(spec, rng(), 1.0)

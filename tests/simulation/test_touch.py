@@ -9,10 +9,10 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario, simulate
-from vftcli.simulation.contacts import ProfileSpec
+from vftcli.simulation.contacts import Touching, cross
 from vftcli.simulation.experiment import at_other_point
+from vftcli.simulation.scenario import ProfileSpec, RandomWalkSpec
 from vftcli.simulation.sensing import first_order_low_pass
-from vftcli.simulation.touch import RandomWalkSpec, Touching, cross
 
 ROBOT = load_robot("ur5")
 FORCE, MOMENT, POINT = (3.0, -4.0, 12.0), (0.5, 0.2, -0.3), (0.02, 0.05, 0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.terms import DynamicsTerms
-from vftcli.virtual_sensor.mean_disturbance import HALF, mean_disturbance
+from vftcli.virtual_sensor.sensing import HALF, mean_disturbance
 
 
 def terms_of(t: np.ndarray, tau: np.ndarray, mu: np.ndarray) -> DynamicsTerms:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.null_space import MARGIN, contact_elsewhere
+from vftcli.virtual_sensor.sensor_reading import MARGIN, contact_elsewhere
 
 
 def wrench(null_space: np.ndarray | None) -> Wrench:

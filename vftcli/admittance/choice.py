@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
     from vftcli.signals.arrays import Array
 
-WITHOUT_LOG = "Without a log"  #: Heading of what needs none.
 FROM_DAMPING = "from-B"  #: The word for a damping ratio ξ that is that of the drag phase.
 
 
@@ -29,18 +28,11 @@ def listed(text: str, option: str) -> tuple[float, ...]:
     return numbers
 
 
-def deviation_of(words: Sequence[str]) -> "Array":
-    """The deviation of ``AXIS=VALUE`` words. (6,) [m, rad]"""
-    from vftcli.admittance.parameters import release_deviation
-
-    return release_deviation(words)
-
-
 @dataclass(frozen=True, kw_only=True)
 class ControlChoice(Choice):
     """Which controllers are compared, and with which parameters."""
 
-    GROUP: ClassVar[str] = "The controller"
+    GROUP = "The controller"
 
     #: One variable controller for each; the parameters' own α if empty.
     alphas: Annotated[
@@ -145,51 +137,17 @@ def split_settings(assignments: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, [text for text in assignments if text not in own]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReleaseChoice(Choice):
-    """A release from rest."""
+def start_pose(robot: "Robot", text: str | None) -> "Array":
+    """Joint positions of a release's target pose: ``--start``, else the robot file's. (n,) [rad]"""
+    import numpy as np
 
-    GROUP: ClassVar[str] = WITHOUT_LOG
-
-    #: From the target pose. (6,) [m, rad]
-    deviation: Annotated[
-        "Array",
-        Option(
-            "--release",
-            "AXIS=VALUE",
-            "Replay a release from rest: x=0.3 [m], rz=0.5 [rad].",
-            deviation_of,
-            several=True,
-        ),
-    ]
-    #: Joint positions of the target pose, None for the robot file's. [rad]
-    start: Annotated[
-        tuple[float, ...] | None,
-        Option(
-            "--start",
-            "Q1,Q2,…",
-            "Start pose of a release [rad]; default the profile's.",
-            lambda text: listed(text, "--start"),
-            seldom=True,
-        ),
-    ] = None
-    #: How long to watch, None for as long as it takes. [s]
-    duration: Annotated[
-        float | None,
-        Option("--duration", "S", "Length of a release; default until it is over.", seldom=True),
-    ] = None
-
-    def pose(self, robot: "Robot") -> "Array":
-        """Joint positions of the target pose: as chosen, else the robot file's. (n,) [rad]"""
-        import numpy as np
-
-        start = self.start or robot.admittance.get("start")
-        if start is None:
-            raise ParameterError(
-                f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"
-                f"q{robot.joints} [rad]"
-            )
-        return np.array(start, dtype=np.float64)
+    start = robot.admittance.get("start") if text is None else listed(text, "--start")
+    if start is None:
+        raise ParameterError(
+            f"{robot.name} has no admittance.start; give the start pose with --start q1,…,"
+            f"q{robot.joints} [rad]"
+        )
+    return np.array(start, dtype=np.float64)
 
 
 def released_robot(choice: RobotChoice) -> "Robot":

@@ -1,6 +1,6 @@
 """Replay: one force record, or one release, through several controllers, and what came of it."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -63,7 +63,7 @@ class Replay:
     logged: Array | None = None
     lyapunov: Lyapunov  #: Energies along the run.
     rows: tuple[dict[str, Any], ...]  #: The comparison, one row a controller, axis and drag.
-    remarks: tuple[Remark, ...]  #: What a reader should know.
+    remarks: tuple[Remark, ...] = ()  #: What a reader should know.
 
 
 def replay(
@@ -102,19 +102,11 @@ def replay(
         solver, start, parameters, controllers, verdicts, motion, split, drags, force
     )
     logged = deviation_of(solver, start, q)
-    return replace(
-        found,
-        source=source,
-        logged=logged,
-        remarks=(
-            *unknown_force(wrench),
-            *complaints,
-            *nothing_dragged(force, parameters, bool(drags)),
-            *drags_at_rest(drags, logged, parameters.period),
-            *found.remarks,
-            *arm_moved(logged),
-        ),
-    )
+    found = replace(found, source=source, logged=logged)
+    unknown = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
+    missing = (caution("force-unknown", samples=unknown),) if unknown else ()
+    said = (*missing, *complaints, *drag_remarks(found, drags, logged), *trouble(found))
+    return replace(found, remarks=said)
 
 
 def replay_release(
@@ -143,7 +135,7 @@ def replay_release(
     still = Phases(np.zeros_like(force, dtype=bool), force)
     drags = releases_of(x, len(motion.t))
     found = judge_motion(solver, q, parameters, controllers, verdicts, motion, still, drags, force)
-    return replace(found, remarks=(*complaints, *found.remarks))
+    return replace(found, remarks=(*complaints, *trouble(found)))
 
 
 def judge_motion(
@@ -157,12 +149,10 @@ def judge_motion(
     drags: Sequence[Drag],
     force: Array,
 ) -> Replay:
-    """Joints along a motion from a pose (n,) [rad], its energies, figures and limits.
+    """Joints along a motion from a pose (n,) [rad], its energies and its figures.
 
     The force (T, 6) [N, N·m] is NaN where it is unknown.
     """
-    path = follow(solver, start, motion.x, parameters.period)
-    lyapunov = lyapunov_along(controllers, motion, split)
     return Replay(
         robot=solver.robot,
         parameters=parameters,
@@ -172,13 +162,9 @@ def judge_motion(
         wrench=force,
         phases=split,
         motion=motion,
-        path=path,
-        lyapunov=lyapunov,
+        path=follow(solver, start, motion.x, parameters.period),
+        lyapunov=lyapunov_along(controllers, motion, split),
         rows=tuple(rows_of(controllers, motion, drags, np.nan_to_num(force))),
-        remarks=(
-            *limits_met(controllers, motion, path, lyapunov.rises),
-            *implausible_travel(parameters, controllers, motion, path),
-        ),
     )
 
 
@@ -247,35 +233,17 @@ def count_rises(W: Array, recovering: Mask) -> int:
     return rises
 
 
-def unknown_force(wrench: Wrench) -> tuple[Remark, ...]:
-    """Say so if some samples of the wrench are not known, so that they count as no force."""
-    count = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
-    return (caution("force-unknown", samples=count),) if count else ()
-
-
-def nothing_dragged(
-    wrench: Array,
-    parameters: Admittance,
-    dragged: bool,
-) -> tuple[Remark, ...]:
-    """Say so if a force (T, 6) [N, N·m] never passed a threshold, and which axis came nearest."""
-    if dragged or not len(wrench):
-        return ()
-    largest = np.max(np.abs(np.nan_to_num(wrench)), axis=0)
-    share = largest / np.maximum(parameters.threshold, 1e-12)
-    k = int(np.argmax(share))
-    threshold = float(parameters.threshold[k])
-    return (caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=threshold),)
-
-
-def drags_at_rest(
-    drags: Sequence[Drag],
-    logged: Array,
-    period: float,
-) -> tuple[Remark, ...]:
-    """The longest drag of each axis in which the log's flange rests. (T, 6) [m, rad], [s]"""
+def drag_remarks(found: Replay, drags: Sequence[Drag], logged: Array) -> Iterator[Remark]:
+    """The axis nearest to its threshold where none was dragged; drags in which the log rests."""
+    if not drags and len(found.wrench):
+        largest = np.max(np.abs(np.nan_to_num(found.wrench)), axis=0)
+        threshold = found.parameters.threshold
+        share = largest / np.maximum(threshold, 1e-12)
+        k = int(np.argmax(share))
+        least = float(threshold[k])
+        yield caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=least)
     longest: dict[str, int] = {}
-    long, near = round(RESTING[0] / period), RESTING[1]
+    long, near = round(RESTING[0] / found.parameters.period), RESTING[1]
     for drag in drags:
         part = logged[drag.begin : drag.release, :3]
         if len(part) <= long:
@@ -286,58 +254,37 @@ def drags_at_rest(
         if np.any(apart < near) and (held < near or np.median(apart) < near):
             axis = AXES[drag.axis]
             longest[axis] = max(longest.get(axis, 0), len(part))
-    return tuple(
-        caution("drag-at-rest", axis=axis, duration_s=count * period)
-        for axis, count in longest.items()
-    )
+    for axis, count in longest.items():
+        yield caution("drag-at-rest", axis=axis, duration_s=count * found.parameters.period)
 
 
-def limits_met(
-    controllers: Sequence[Controller],
-    motion: AxisMotion,
-    path: JointPath,
-    rises: Counts,
-) -> tuple[Remark, ...]:
-    """What went wrong or was limited, controller by controller."""
-    found = []
-    for n, controller in enumerate(controllers):
-        where = Where(controller.name)
-        if motion.escaped[n]:
-            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
-            found.append(warning("motion-escaped", where, time_s=float(motion.t[k])))
-        if acted := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
-            found.append(fact("speed-limit-acted", where, periods=acted))
-        if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = float(motion.t[int(np.argmin(path.reached[:, n]))])
-            rows = {"lost": lost, "poses": len(motion.t)}
-            found.append(caution("poses-out-of-reach", where, **rows, first_s=first))
-        if path.speed[n] > 1.0:
-            found.append(caution("joint-too-fast", where, share=float(path.speed[n])))
-        if rises[n]:
-            found.append(warning("energy-rises", where, steps=int(rises[n])))
-    return tuple(found)
-
-
-def implausible_travel(
-    parameters: Admittance,
-    controllers: Sequence[Controller],
-    motion: AxisMotion,
-    path: JointPath,
-) -> tuple[Remark, ...]:
-    """Say so if the travel is none that the arm could make, and what to do under a hard threshold.
+def trouble(found: Replay) -> Iterator[Remark]:
+    """What went wrong or was limited, controller by controller; travel that no arm could make.
 
     Where every pose is reached the travel is plausible, however long.
     """
-    lost = [n for n in range(len(controllers)) if not np.all(path.reached[:, n])]
-    if not lost:
-        return ()
-    travel = np.nan_to_num(np.linalg.norm(motion.x[:, lost, :3], axis=2), nan=np.inf)
-    hard = parameters.threshold_mode == "hard"
-    code = "travel-implausible-hard" if hard else "travel-implausible"
-    return (caution(code, travel_m=float(travel.max())),)
-
-
-def arm_moved(logged: Array) -> tuple[Remark, ...]:
-    """Say so if the log's arm moved while the replay holds it at its first pose. (T, 6) [m, rad]"""
-    far = float(np.linalg.norm(logged[:, :3], axis=1).max())
-    return (fact("log-arm-moved", distance_m=far),) if far >= STILL else ()
+    motion, path, travel = found.motion, found.path, []
+    for n, controller in enumerate(found.controllers):
+        where = Where(controller.name)
+        if motion.escaped[n]:
+            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
+            yield warning("motion-escaped", where, time_s=float(motion.t[k]))
+        if acted := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
+            yield fact("speed-limit-acted", where, periods=acted)
+        if lost := int(np.count_nonzero(~path.reached[:, n])):
+            first = float(motion.t[int(np.argmin(path.reached[:, n]))])
+            rows = {"lost": lost, "poses": len(motion.t)}
+            yield caution("poses-out-of-reach", where, **rows, first_s=first)
+            way = np.linalg.norm(motion.x[:, n, :3], axis=1)
+            travel.append(float(np.nan_to_num(way, nan=np.inf).max()))
+        if path.speed[n] > 1.0:
+            yield caution("joint-too-fast", where, share=float(path.speed[n]))
+        if rises := int(found.lyapunov.rises[n]):
+            yield warning("energy-rises", where, steps=rises)
+    if travel:
+        hard = "-hard" if found.parameters.threshold_mode == "hard" else ""
+        yield caution(f"travel-implausible{hard}", travel_m=max(travel))
+    if found.logged is not None:
+        far = float(np.linalg.norm(found.logged[:, :3], axis=1).max())
+        if far >= STILL:
+            yield fact("log-arm-moved", distance_m=far)

@@ -66,7 +66,7 @@ def annotate(
 ) -> dict[str, Any]:
     """Write a copy of a dataset with the forces of every frame.
 
-    Frames of which nothing can be told stop the run, or with `allow_missing` are filled with zeros
+    Frames without an estimate stop the run, or with `allow_missing` are filled with zeros
     and marked; `force` is whether an earlier copy may be replaced.
 
     Returns:
@@ -112,7 +112,7 @@ def annotate(
 
 
 def started(workers: WorkersChoice, dataset: Dataset) -> WorkersChoice:
-    """Where the episodes are done: here where nothing is asked and there are few."""
+    """Place of the episodes' work: here by default if they are few."""
     some = islice(dataset.files(), FEW + 1)
     few = sum(len(file.episodes) for file in some) <= FEW
     return HERE if few and workers == WorkersChoice() else workers
@@ -157,7 +157,7 @@ class Plan:
 
 
 class Made(NamedTuple):
-    """What was told of the episodes."""
+    """Results of the episodes."""
 
     episodes: list[dict[str, Any]]  #: A record each.
     robot: dict[str, Any] | None  #: The robot of the first that could be done.
@@ -165,7 +165,7 @@ class Made(NamedTuple):
 
 
 def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
-    """What a task returned."""
+    """Result of a task."""
     if outcome.failure is None:
         return outcome.value
     place = outcome.task.file.place
@@ -177,7 +177,7 @@ def gathered(
     allow_missing: bool,
     progress: Callable[[str, float, float], None],
 ) -> Made:
-    """All that is told of the episodes, in the order of their files."""
+    """Results of the episodes, in the order of their files."""
     episodes: list[dict[str, Any]] = []
     robot = observer = None
     for outcome in outcomes:
@@ -198,14 +198,14 @@ REMEDY = "--allow-missing writes 0 there, and a column that says so"
 def refuse_missing(record: Mapping[str, Any]) -> None:
     """Refuse an episode of which frames are missing."""
     if record["status"] == "missing":
-        # Of DROID every file has the same name.
+        # All files of DROID have one name.
         reason = record["reason"].removeprefix(Path(record["file"]).name).rstrip(".")
         place = record["file"] if reason != record["reason"].rstrip(".") else ""
         raise LogError(f"{place}{reason}. {REMEDY}")
     if record["status"] == "part":
         name, count = next(iter(record["missing_frames"].items()))
         why = (
-            "in these poses it cannot be told; --solver smoother has a wrench in every pose"
+            "these poses hide it; --solver smoother has a wrench in every pose"
             if name == "wrench"
             else "a value of the log is no number there"
         )
@@ -257,7 +257,7 @@ def write_file(
 def filled(
     number: int, rows: Mapping[str, Any], columns: list[ForceColumn], suffix: str, frames: int
 ) -> dict[str, Single]:
-    """An episode's columns with 0 where nothing is told, and the columns that say where that is."""
+    """An episode's columns with 0 for no value, and columns that mark these."""
     found: dict[str, Single] = {}
     for column in columns:
         name = column.name.removesuffix(suffix)
@@ -279,7 +279,7 @@ def record_of_copy(
     made: Made,
     sources: Mapping[str, str],
 ) -> dict[str, Any]:
-    """What ``meta/vftcli.json`` holds."""
+    """Content of ``meta/vftcli.json``."""
     return {
         "command": command,
         "versions": versions(),

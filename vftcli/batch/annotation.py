@@ -36,7 +36,7 @@ SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 @dataclass(frozen=True, kw_only=True)
 class ForceChoice:
-    """What is asked of every episode."""
+    """Request for every episode."""
 
     read: ReadChoice = field(default_factory=ReadChoice)  #: How an episode is read.
     robot: RobotChoice = field(default_factory=RobotChoice)  #: Which arm made it.
@@ -68,7 +68,7 @@ class ForceChoice:
 
     @property
     def is_online(self) -> bool:
-        """Whether torques and wrench could be told while the episode goes on, if dq is logged."""
+        """Whether torques and wrench need no later samples, if dq is logged."""
         wrench = self.wrench
         back = wrench is not None and (
             wrench.smooths(self.observer) or bool(wrench.zero.spans) or wrench.zero.start
@@ -77,15 +77,15 @@ class ForceChoice:
 
     @property
     def suffix(self) -> str:
-        """What the names of the columns end with: the arm, of a dataset of two."""
+        """Suffix of the columns' names: the arm, of a dataset of two."""
         return f"_{self.read.arm}" if self.read.arm is not None else ""
 
     def key(self, robot_file: str) -> str:
-        """What the columns depend on beside the episode: this, the robot file and the program."""
+        """Sources of the columns beside the episode: this, robot file, program."""
         return f"{self!r} {robot_file} {VERSION}"
 
     def analysis(self, number: int, library: Library, examiner: Examiner) -> AnalysisChoice:
-        """The same as what is asked of a log."""
+        """The analysis of an episode as of a single log."""
         return AnalysisChoice(
             read=replace(self.read, episode=number),
             robot=self.robot,
@@ -108,7 +108,7 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]
     """Estimate the forces of some episodes and put them into a file, unless they are there.
 
     Returns:
-        What is told of them: ``episodes``, a record each; ``robot`` and ``observer``, those of the
+        Their results: ``episodes``, a record each; ``robot`` and ``observer``, those of the
         first that could be done, or None.
     """
     if task.rows.is_file():
@@ -162,8 +162,8 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
     efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
     if not efforts:
         raise MissingSignalError(
-            f"{recording.name}: no joint torques or currents, so no forces can be told; ports of "
-            "DROID and Open X-Embodiment leave them out, DROID's raw release has them"
+            f"{recording.name}: no joint torques or currents, so no forces can be estimated; "
+            "ports of DROID and Open X-Embodiment leave them out, DROID's raw release has them"
         )
     for value in efforts if not anyway else ():
         same = np.flatnonzero((value == value[0]).all(axis=0)) + 1
@@ -177,7 +177,7 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
 
 
 def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
-    """The columns of an episode by name, a row a frame, NaN where nothing can be told."""
+    """An episode's columns by name, a row a frame, NaN without an estimate."""
     estimate, t = analysis.estimates[0], analysis.t
     found: dict[str, Array] = {"external_torque": estimate.tau}
     if choice.sd:
@@ -205,7 +205,7 @@ def by_row(values: Array, samples: Indices | None) -> Single:
 
 
 def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> dict[str, Any]:
-    """What is told of an episode that could be done."""
+    """Record of a finished episode."""
     recording, observer = analysis.recording, analysis.observers[0]
     missing = {name: int(np.isnan(v).any(axis=1).sum()) for name, v in columns.items()}
     some = {name: count for name, count in missing.items() if count}
@@ -238,7 +238,7 @@ def force_columns(
         "version": f"vftcli {VERSION}",
     }
     joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}
-    flag = {"units": "1", "frame": "none", "sign": "1 where told, 0 where filled with 0", **made}
+    flag = {"units": "1", "frame": "none", "sign": "1 where known, 0 where filled with 0", **made}
     found = [("external_torque", tuple(names), joint)]
     if choice.sd:
         found.append(("external_torque_sd", tuple(names), {**joint, "sign": "not negative"}))

@@ -17,7 +17,7 @@ EXTRA = "pip install 'vftcli[cluster]'"  #: How Dask comes in.
 
 @dataclass(frozen=True, kw_only=True)
 class WorkersChoice(Choice):
-    """Where many pieces of work are done."""
+    """Place of many pieces of work."""
 
     #: How many processes of this machine; 0 for this process alone, None for as many as it has
     #: cores and memory for.
@@ -32,7 +32,7 @@ class WorkersChoice(Choice):
             most=4096,
         ),
     ] = None
-    #: Address of a Dask scheduler that stands, or None.
+    #: Address of a running Dask scheduler, or None.
     scheduler: Annotated[
         str | None,
         Option(

@@ -1,4 +1,4 @@
-"""Pieces of work done here or on a Dask cluster, each told as soon as it ended.
+"""Pieces of work here or on a Dask cluster, each reported at its end.
 
 What is done is the caller's: a function of one task, at the top of a module, that writes its result
 itself (a temporary file, then a rename) before it returns. Results that only live in the engine are
@@ -60,7 +60,7 @@ CONFIG: Mapping[str, object] = {
 
 #: Packages that make the numbers, or write them.
 PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
-HEAD = 4096  #: Bytes of a file by which workers are asked whether they see the same. [B]
+HEAD = 4096  #: Bytes by which workers compare their files with ours. [B]
 
 
 def dask_setup(_worker: object) -> None:
@@ -77,7 +77,7 @@ def run_tasks(
 ) -> Iterator[Outcome[Task]]:
     """Do some work on every task and tell how each ended, in the order in which they end.
 
-    An error of the work is an outcome like any other. A task whose worker dies is done again, three
+    An error of the work is an outcome like any other. If its worker dies a task runs again, three
     times in all. Closing the iterator ends what has not begun.
     """
     if choice.in_process:
@@ -95,11 +95,11 @@ def run_tasks(
 def connected(
     choice: WorkersChoice, seen: Sequence[str], tell: Callable[[str], None]
 ) -> Iterator["Client"]:
-    """Start a cluster on this machine for a block, or connect to the one that stands."""
+    """A new cluster on this machine for a block, or a running one."""
     import dask.config
     import distributed  # noqa: F401 - its settings, which are changed here for a block
 
-    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # who dies is told in outcomes
+    logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # outcomes report who dies
     with dask.config.set(dict(CONFIG)):
         if choice.scheduler is None:
             with local(choice, tell) as client:
@@ -142,7 +142,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
 
 @contextmanager
 def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
-    """The cluster whose scheduler has this address, with one worker at least."""
+    """The cluster of the scheduler at this address, with a worker at least."""
     from distributed import Client
     from distributed.security import Security
 
@@ -176,7 +176,7 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
 
 
 def check_versions(client: "Client") -> None:
-    """See that every worker makes the numbers with the same code as this process would."""
+    """Check that every worker computes with this process's code."""
     here = packages_here()
     for address, there in client.run(packages_here, on_error="return").items():
         if not isinstance(there, dict):
@@ -207,7 +207,7 @@ def packages_here() -> dict[str, str | None]:
 
 
 def check_sight(client: "Client", seen: Sequence[str]) -> None:
-    """See that every worker sees the same files as this process."""
+    """Check that every worker sees this process's files."""
     here = heads_of(seen)
     for address, there in client.run(heads_of, seen, on_error="return").items():
         for path, head in here.items():
@@ -218,7 +218,7 @@ def check_sight(client: "Client", seen: Sequence[str]) -> None:
 
 
 def heads_of(paths: Sequence[str]) -> dict[str, str]:
-    """What is at each path: the digest of a file's size and first bytes, "folder", or "nothing"."""
+    """State of each path: digest of size and first bytes, "folder", or "nothing"."""
     found = {}
     for path in paths:
         found[path] = "folder" if os.path.isdir(path) else "nothing"  # noqa: PTH112
@@ -341,7 +341,7 @@ def first_done(futures: "list[Future[Any]]", workers: Workers) -> "list[Future[A
 
 
 def result_of(future: "Future[Any]") -> "list[Any] | Failure | None":
-    """What a group's tasks made, why they did not end, or None where that is not known yet."""
+    """Results of a group's tasks, their failures, or None if unknown yet."""
     from distributed.scheduler import KilledWorker
 
     if future.status not in {"finished", "error"}:

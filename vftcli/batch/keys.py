@@ -74,7 +74,7 @@ def with_files(value: Any, change: Callable[[Path], Path]) -> Any:  # noqa: ANN4
 
 
 def plain(value: Any) -> Any:  # noqa: ANN401
-    """Options as JSON holds them, the same in every process: sets in order, classes by name."""
+    """Options as JSON, equal in every process: sets in order, classes by name."""
     match value:
         case None | bool() | int() | float() | str():
             return value

@@ -1,4 +1,4 @@
-"""What a command asks of a log beside its options, alone and in a batch."""
+"""A command's request on a log beside its options, alone and in a batch."""
 
 from dataclasses import replace
 

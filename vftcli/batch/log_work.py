@@ -1,4 +1,4 @@
-"""The work on one log of a batch: what `--do` asks, written before the task is told done."""
+"""The work of `--do` on one log of a batch, written before it counts as done."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,7 +20,7 @@ COMMANDS = ("estimate", "compare", "report", "contacts")  #: What may be done wi
 
 @dataclass(frozen=True, kw_only=True)
 class LogJob:
-    """What is done with every log of a batch."""
+    """Work on every log of a batch."""
 
     do: str  #: One of `COMMANDS`.
     choice: AnalysisChoice  #: What is asked of each log.

@@ -13,7 +13,7 @@ Task = TypeVar("Task")
 
 #: What is done with each task; what it returns is small, and can be pickled.
 Work = Callable[[Task], Any]
-KILLED = "KilledWorker"  #: Error type of a task whose worker died each time.
+KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
 
 _stage: ContextVar[str] = ContextVar("stage", default="")
 
@@ -23,7 +23,7 @@ class EngineError(VftError):
 
 
 class Failure(NamedTuple):
-    """Why a task was not done."""
+    """Reason of a task's failure."""
 
     stage: str  #: What was being done, as the work called it with `begin`.
     type: str  #: Name of the error's class.
@@ -31,7 +31,7 @@ class Failure(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """What a task took, and where."""
+    """Cost and place of a task."""
 
     started: float  #: When it began, on the clock of where it ran. [s since 1970]
     seconds: float  #: Time from then to its end. [s]
@@ -40,16 +40,16 @@ class Effort(NamedTuple):
 
 
 class Outcome(NamedTuple, Generic[Task]):
-    """How a task ended."""
+    """End of a task."""
 
     task: Task  #: The task.
     value: Any = None  #: What the work returned, None if it failed.
     failure: Failure | None = None  #: Why it failed, or None.
-    effort: Effort | None = None  #: What it took; None of a task whose worker died.
+    effort: Effort | None = None  #: Its effort; None if its worker died.
 
 
 def begin(stage: str) -> None:
-    """Say what the work does now; a failure is told with it."""
+    """Name the work's stage; a failure is reported with it."""
     _stage.set(stage)
 
 
@@ -72,6 +72,6 @@ def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:
 
 
 def failure_of(error: BaseException) -> Failure:
-    """What an error says, on one line, at the stage that was begun last."""
+    """An error's text on one line, with the stage begun last."""
     words = " ".join(str(error).split()) or "no words"
     return Failure(_stage.get(), type(error).__name__, words)

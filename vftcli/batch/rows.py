@@ -1,4 +1,4 @@
-"""Rows of a batch: a log × observer × joint or axis, the same columns whatever was asked."""
+"""Rows of a batch: a log × observer × joint or axis, in fixed columns."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -12,7 +12,7 @@ from vftcli.outputs.believability import grounds, health
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import AXES
 
-#: Columns that are the same in every row of a log.
+#: Columns with one value a log.
 OF_LOG: dict[str, Any] = {
     "robot": pl.String,
     "samples": pl.Int64,
@@ -74,7 +74,7 @@ def rows_of(analysis: Analysis, key: str) -> pl.DataFrame:
 
 
 def log_facts(analysis: Analysis) -> dict[str, Any]:
-    """What is known of a log as a whole, by the names of `OF_LOG`."""
+    """Facts of a log as a whole, by the names of `OF_LOG`."""
     recording, found = analysis.recording, analysis.contacts
     worst = health(grounds(analysis))
     codes = [f.code for one in analysis.examinations[:1] for f in one.warnings]
@@ -101,7 +101,7 @@ def log_facts(analysis: Analysis) -> dict[str, Any]:
 
 
 def estimate_sizes(analysis: Analysis) -> Iterator[dict[str, Any]]:
-    """How large each estimate is, a row an observer and joint, then a row an observer and axis."""
+    """Size of each estimate, a row per observer and joint, then per axis."""
     for estimate in analysis.estimates:
         for joint, column in enumerate(estimate.tau.T, start=1):
             rms, most = size_of(column)

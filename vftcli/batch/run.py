@@ -18,21 +18,20 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
 from vftcli.outputs.page.pages import batch_lines, render_batch
-from vftcli.readers.collection import LogEntry
-from vftcli.readers.library import absolute, labelled
+from vftcli.readers.library import LogEntry, absolute, labelled
 
 if TYPE_CHECKING:
     import polars as pl
 
 SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
 TOGETHER = 64  #: At most so many.
-SHARES = 8  #: A worker gets at least so many groups, so that all end at about the same time.
+SHARES = 8  #: Least groups of a worker: all end at about one time.
 
 Tell = Callable[[str], None]
 
 
 class BatchCount(NamedTuple):
-    """How far a batch is."""
+    """Progress of a batch."""
 
     logs: int  #: How many logs there are.
     before: int = 0  #: How many of them an earlier run did.
@@ -42,7 +41,7 @@ class BatchCount(NamedTuple):
 
     @property
     def left(self) -> int:
-        """How many are still to be done."""
+        """Number of tasks left."""
         return self.logs - self.before - self.done - self.failed
 
 
@@ -55,8 +54,8 @@ class BatchRun:
     folder: BatchFolder  #: Where it is written.
     workers: WorkersChoice  #: Where it is done.
     command: str  #: The command line, for the records.
-    tell: Tell = field(repr=False)  #: Who is told in a sentence what is done.
-    #: Who is told after each log how many are done.
+    tell: Tell = field(repr=False)  #: Receives a sentence on each step.
+    #: Receives the number of finished logs after each.
     progress: Callable[[BatchCount], None] = field(repr=False)
 
     def __post_init__(self) -> None:
@@ -158,13 +157,13 @@ class BatchRun:
         if failure is None:
             self.done.add(task.key)
             return
-        for name in (f"{task.path}: ", f"{task.label}: "):  # it is told with the log's name
+        for name in (f"{task.path}: ", f"{task.label}: "):  # the report has the log's name
             failure = failure._replace(line=failure.line.removeprefix(name))
         for number in [n for n, key in self.keys.items() if key == task.key]:
             self.failures[number] = failure
 
     def count(self) -> BatchCount:
-        """How far it is."""
+        """Progress so far."""
         return BatchCount(
             logs=len(self.logs),
             before=self.before,
@@ -227,7 +226,7 @@ class BatchRun:
         return {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in finished}
 
     def record(self, count: BatchCount) -> dict[str, Any]:
-        """What `run.json` holds: all that depends on when and where a log was done."""
+        """Content of `run.json`: facts of the time and place of each log's work."""
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
         return {

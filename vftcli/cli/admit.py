@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vftcli.admittance.choice import WITHOUT_LOG, ControlChoice, ReleaseChoice
+from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
 from vftcli.signals.option import OUTPUT, WRITE, Option
@@ -22,10 +22,37 @@ if TYPE_CHECKING:
 
 #: Whose estimate is the force unless another is named: the paper drives its controller with it.
 OBSERVER = "kfo-fe"
+WITHOUT_LOG = "Without a log"  #: Heading of what needs none.
+
+
+class ReleaseOptions(opt.Bundle):
+    """A release from rest, without a log."""
+
+    GROUP = WITHOUT_LOG
+
+    release: Annotated[
+        list[str] | None,
+        Option("--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."),
+    ]
+    start: Annotated[
+        str | None,
+        Option(
+            "--start",
+            "Q1,Q2,…",
+            "Start pose of a release [rad]; default the profile's.",
+            seldom=True,
+        ),
+    ]
+    duration: Annotated[
+        float | None,
+        Option("--duration", "S", "Length of a release; default until it is over.", seldom=True),
+    ]
 
 
 class LoopOptions(opt.Bundle):
     """A controller in the loop of a simulation, without a log."""
+
+    GROUP = WITHOUT_LOG
 
     closed_loop: Annotated[
         str | None,
@@ -34,18 +61,13 @@ class LoopOptions(opt.Bundle):
             "SCENARIO",
             "Run a scenario against the controller. Its contacts are simulated, then the force "
             "that it acted on is replayed.",
-            group=WITHOUT_LOG,
         ),
     ]
-    seed: Annotated[int | None, opt.SEED._replace(seldom=True, group=WITHOUT_LOG)]
+    seed: Annotated[int | None, opt.SEED._replace(seldom=True)]
     torque: Annotated[
         str,
         Option(
-            "--torque",
-            "average|instant",
-            "What the closed loop's sensors report.",
-            seldom=True,
-            group=WITHOUT_LOG,
+            "--torque", "average|instant", "What the closed loop's sensors report.", seldom=True
         ),
     ] = "average"
 
@@ -53,15 +75,13 @@ class LoopOptions(opt.Bundle):
 class ForceOptions(opt.Bundle):
     """Which force drives the replay, if not an observer's."""
 
-    sensor: Annotated[bool, Option("--sensor", "", "Take the log's own wrench.", group="The force")]
+    GROUP = "The force"
+
+    sensor: Annotated[bool, Option("--sensor", "", "Take the log's own wrench.")]
     truth: Annotated[
         Path | None,
         Option(
-            "--truth",
-            "FILE",
-            "Take the wrench of a truth file, flange, base axes.",
-            seldom=True,
-            group="The force",
+            "--truth", "FILE", "Take the wrench of a truth file, flange, base axes.", seldom=True
         ),
     ]
 
@@ -77,7 +97,7 @@ class ShownOptions(opt.Bundle):
 @opt.command
 def admit(
     controllers: opt.Typed[ControlChoice],
-    release: opt.Typed[ReleaseChoice],
+    release: ReleaseOptions,
     loop: LoopOptions,
     source: ForceOptions,
     analysis: AnalysisOptions,
@@ -109,7 +129,7 @@ def admit(
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
 
-    asked = log is not None, bool(release.words["release"]), loop.closed_loop is not None
+    asked = log is not None, bool(release.release), loop.closed_loop is not None
     if sum(asked) != 1:
         raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
     check_installed("pinocchio", "vftcli admit")
@@ -168,22 +188,23 @@ def chosen(analysis: AnalysisOptions, log: Path | None = None) -> "AnalysisChoic
 
 
 def released(
-    release: opt.Typed[ReleaseChoice], analysis: AnalysisOptions, control: ControlChoice
+    release: ReleaseOptions, analysis: AnalysisOptions, control: ControlChoice
 ) -> "Replay":
     """A release from rest."""
-    from vftcli.admittance.choice import released_robot
+    from vftcli.admittance.choice import released_robot, start_pose
+    from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
 
-    choice = release.choice()
+    deviation = release_deviation(release.release or ())
     arm = released_robot(chosen(analysis).robot)
     settings = control.parameters(arm)
     return replay_release(
-        choice.deviation,
+        deviation,
         arm,
         settings,
         control.controllers(settings),
-        start=choice.pose(arm),
-        duration=choice.duration,
+        start=start_pose(arm, release.start),
+        duration=release.duration,
         force_unstable=control.force_unstable,
     )
 

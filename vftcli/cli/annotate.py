@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 class ColumnOptions(opt.Bundle):
     """Which columns are added."""
 
+    GROUP = WRITE
+
     sd: Annotated[
         bool,
-        Option(
-            "--sd", "", "Also the observer's own standard deviation of each torque.", group=WRITE
-        ),
+        Option("--sd", "", "Also the observer's own standard deviation of each torque."),
     ]
     contact: Annotated[
         bool,
@@ -32,7 +32,6 @@ class ColumnOptions(opt.Bundle):
             "",
             "Also 1 in a listed contact, else 0. The list sees the complete episode: a label, no "
             "causal input.",
-            group=WRITE,
         ),
     ]
     allow_missing: Annotated[
@@ -42,7 +41,6 @@ class ColumnOptions(opt.Bundle):
             "",
             "Write 0 where nothing can be told. Columns …_valid say where; without it, such a "
             "frame stops the run.",
-            group=WRITE,
         ),
     ]
 

@@ -50,8 +50,7 @@ def batch(
     from vftcli.cli.progress import STAGES
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
-    from vftcli.readers.collection import LogCollection
-    from vftcli.readers.library import Library, absolute
+    from vftcli.readers.library import Library, LogCollection, absolute
     from vftcli.signals.errors import LogError, ParameterError
     from vftcli.signals.progress import no_stage
 

@@ -21,10 +21,12 @@ MORE = "Intervals, lags and significance: --details"  #: What the tables on the 
 class TableOptions(opt.Bundle):
     """The form of the table; one at most."""
 
+    GROUP = OUTPUT
+
     json: opt.Json
-    csv: Annotated[bool, Option("--csv", "", "Print one row per observer and joint.", group=OUTPUT)]
-    markdown: Annotated[bool, Option("--markdown", "", "Print a Markdown table.", group=OUTPUT)]
-    latex: Annotated[bool, opt.LATEX._replace(group=OUTPUT)]
+    csv: Annotated[bool, Option("--csv", "", "Print one row per observer and joint.")]
+    markdown: Annotated[bool, Option("--markdown", "", "Print a Markdown table.")]
+    latex: Annotated[bool, opt.LATEX]
 
     @property
     def form(self) -> str:

@@ -19,9 +19,11 @@ if TYPE_CHECKING:
 class ListOptions(opt.Bundle):
     """The form of the list."""
 
+    GROUP = OUTPUT
+
     json: opt.Json
-    csv: Annotated[bool, Option("--csv", "", "Print one row per contact.", group=OUTPUT)]
-    all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.", group=OUTPUT)]
+    csv: Annotated[bool, Option("--csv", "", "Print one row per contact.")]
+    all: Annotated[bool, Option("--all", "", "Every row, not only the 20 hardest.")]
 
 
 @opt.command

@@ -115,7 +115,9 @@ class Needed(Typed[C]):
 
 
 class Bundle:
-    """Options that several commands share, each an attribute."""
+    """Options that belong together, each an attribute."""
+
+    GROUP = ""  #: Heading of those that have none of their own.
 
     def __init__(self, **values: Any) -> None:  # noqa: ANN401 - options are of every kind
         vars(self).update(values)
@@ -132,15 +134,12 @@ class MadeOptions(Bundle):
 class TalkOptions(Bundle):
     """How much a command says; heard before it runs."""
 
-    details: Annotated[bool, Option("-v/--details", "", "Everything that is known.", group=OUTPUT)]
+    GROUP = OUTPUT
+
+    details: Annotated[bool, Option("-v/--details", "", "Everything that is known.")]
     quiet: Annotated[
         bool,
-        Option(
-            "-q/--quiet",
-            "",
-            "Errors only, and the table or JSON that is asked for.",
-            group=OUTPUT,
-        ),
+        Option("-q/--quiet", "", "Errors only, and the table or JSON that is asked for."),
     ]
 
 
@@ -180,10 +179,14 @@ class Part(NamedTuple):
     made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.
 
 
-def members(prefix: str, kinds: Mapping[str, tuple[Any, object]]) -> Part:
+def members(prefix: str, kinds: Mapping[str, tuple[Any, object]], group: str = "") -> Part:
     """Arguments by name, each of a kind and with a default, as one that makes them all."""
     parts = {name: taken_apart(prefix + name, *what) for name, what in kinds.items()}
-    flat = [one for part in parts.values() for one in part.parameters]
+    flat = [
+        (parameter, option._replace(group=option.group or group))
+        for part in parts.values()
+        for parameter, option in part.parameters
+    ]
     return Part(flat, lambda values: {name: part.made(values) for name, part in parts.items()})
 
 
@@ -191,13 +194,15 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     """One argument of a command as parameters: itself, or every option of what it is."""
     if isinstance(kind, type) and issubclass(kind, Bundle):
         each = inspect.get_annotations(kind).items()
-        part = members(f"{name}_", {own: (k, getattr(kind, own, EMPTY)) for own, k in each})
+        found = {own: (what, getattr(kind, own, EMPTY)) for own, what in each}
+        part = members(f"{name}_", found, kind.GROUP)
         return Part(part.parameters, lambda values: kind(**part.made(values)))
     if (typed := get_origin(kind)) in {Typed, Needed}:
         (choice,) = get_args(kind)
         fields = choice.options().items()
         needed = typed is Needed
-        part = members(f"{name}_", {w: typed_as(choice, *f, needed=needed) for w, f in fields})
+        found = {word: typed_as(choice, *field, needed=needed) for word, field in fields}
+        part = members(f"{name}_", found, choice.GROUP)
         return Part(part.parameters, lambda values: typed(choice, part.made(values)))
     if typed is not Annotated:  # typer's own context
         plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
@@ -229,8 +234,8 @@ def typed_as(
     what: Any = list[one] if option.several else one if option.metavar else bool  # type: ignore[valid-type]
     if not (needed and default is EMPTY) and option.metavar:
         what = what | None
-    grouped = option._replace(group=choice.GROUP, reads=None)
-    return Annotated[what, grouped], default if option.shows_default else EMPTY
+    plain = option._replace(reads=None)
+    return Annotated[what, plain], default if option.shows_default else EMPTY
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:

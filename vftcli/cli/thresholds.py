@@ -50,8 +50,7 @@ def contact_thresholds(
     """
     from vftcli.cli.console import say, say_json, say_recording, say_robots
     from vftcli.contacts.caught import check_contacts
-    from vftcli.contacts.compared_signals import check_alike, compared_signals
-    from vftcli.contacts.thresholds import find_thresholds, left_out
+    from vftcli.contacts.thresholds import check_alike, compared_signals, find_thresholds, left_out
     from vftcli.notebook import modelled, touched
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.compared_signals import ComparedSignals
 from vftcli.contacts.tail import SETTLING, events
-from vftcli.contacts.thresholds import Thresholds, worst_of
+from vftcli.contacts.thresholds import ComparedSignals, Thresholds, worst_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
@@ -36,11 +35,11 @@ class ContactCheck:
     log: str  #: The log.
     #: What says where the contacts are, None where nothing does: then the alarms themselves stand
     #: for them.
-    reference: str | None
+    reference: str | None = None
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     #: Alarms that touch no contact, None where nothing says where they are.
-    false_alarms: int | None
-    untouched_h: float  #: Time without contact, NaN likewise. [h]
+    false_alarms: int | None = None
+    untouched_h: float = float("nan")  #: Time without contact, NaN likewise. [h]
     remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
 
     @property
@@ -88,13 +87,10 @@ def check_contacts(
     own = [(n, one) for n, x in zip(names, level.T, strict=False) for one in events(t, x)]
     own.sort(key=lambda alarm: alarm[1].start)
     if reference is None:
-        told = [checked(alarm, peak_of(signals.force, t, alarm), own) for alarm in alarms]
+        told = [checked(alarm, t, signals.force, own) for alarm in alarms]
         return ContactCheck(
             log=signals.recording.name,
-            reference=None,
             contacts=tuple(contact._replace(delay=float("nan")) for contact in told),
-            false_alarms=None,
-            untouched_h=float("nan"),
             remarks=(caution("check-without-truth"),),
         )
     floor = 0.0 if reference.floor is None else np.nan_to_num(reference.floor)
@@ -105,7 +101,7 @@ def check_contacts(
     return ContactCheck(
         log=signals.recording.name,
         reference=reference.name,
-        contacts=tuple(checked(c, peak_of(size, t, c), own) for c in true),
+        contacts=tuple(checked(c, t, size, own) for c in true),
         false_alarms=match_contacts(alarms, true, duration).false_alarms,
         untouched_h=(duration - touched) / 3600.0,
         remarks=(fact("check-against-reference", reference=reference.name), *reference.remarks),
@@ -113,9 +109,21 @@ def check_contacts(
 
 
 def checked(
-    contact: ContactInterval, peak: float, alarms: Sequence[tuple[str, ContactInterval]]
+    contact: ContactInterval,
+    t: Array,
+    size: Array,
+    alarms: Sequence[tuple[str, ContactInterval]],
 ) -> CheckedContact:
-    """A contact of a peak force [N] with who raises the first alarm, in their order, within it."""
+    """A contact with its peak force, and who raises the first alarm within it.
+
+    Args:
+        contact: From and to. [s]
+        t: Time. (T,) [s]
+        size: Size of the force, NaN where it is not known. (T, …) [N]
+        alarms: Who raises them and when, in the order of time.
+    """
+    there = size[(t >= contact.start) & (t <= contact.stop)]
+    peak = float(np.fmax.reduce(there[np.isfinite(there)], initial=np.nan))
     begun = [
         (max(alarm.start - contact.start, 0.0), by)
         for by, alarm in alarms
@@ -124,9 +132,3 @@ def checked(
     delay, by = begun[0] if begun else (float("nan"), "")
     was_on = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
     return CheckedContact(*contact, peak, delay, by, was_on)
-
-
-def peak_of(size: Array, t: Array, span: ContactInterval) -> float:
-    """The largest known value (T, …) within a contact, NaN if none is known."""
-    there = size[(t >= span.start) & (t <= span.stop)]
-    return float(np.fmax.reduce(there[np.isfinite(there)], initial=np.nan))

@@ -145,10 +145,6 @@ class Contact(Shown):
                 row[key] = value
         return row
 
-    def numbered(self, number: int) -> "Contact":
-        """The same with another number."""
-        return replace(self, number=number)
-
     @property
     def size_known(self) -> bool:
         """Whether its force is larger than its band, and does not hang on an unknown place."""

@@ -13,12 +13,11 @@ from vftcli.contacts.contact_list import (
     Unexplained,
 )
 from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
-from vftcli.contacts.loads import is_load, load_row
+from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
 from vftcli.contacts.model_error import UNKNOWN, error_course
 from vftcli.contacts.places import places
 from vftcli.contacts.rows import NORMAL, SHORT, Measurer
 from vftcli.contacts.search import Found, search
-from vftcli.contacts.stops import follows_stop
 from vftcli.contacts.untouched import (
     BLOCK,
     SETTLED,
@@ -35,7 +34,7 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.disturbance import disturbance_blocks
 from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.intervals import covered
 from vftcli.signals.recording import Recording
@@ -61,8 +60,7 @@ def list_contacts(
     motion: FreeMotion, bias: WholeLogBias | None = None, *, referenced: bool = False
 ) -> ContactList:
     """What touched the arm along a log."""
-    check_finite(motion.log)
-    check_length(motion.log.recording)
+    check_log(motion.log)
     seconds = block_length(motion.log.t)
     free = untouched_motion(motion, seconds)
     if free is None:
@@ -76,18 +74,14 @@ def list_contacts(
     return made if has_wrench(motion.log) else without_forces(made)
 
 
-def check_finite(run: Run) -> None:
-    """Raise unless momentum and torque are known at every sample."""
-    known: Mask = np.asarray(np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1))
+def check_log(run: Run) -> None:
+    """Raise unless a log is known at every sample, long enough and fast enough."""
+    recording, known = run.recording, np.all(np.isfinite(run.terms.p + run.terms.mu), axis=1)
     if not known.all():
         raise ParameterError(
             f"{run.name}: {np.count_nonzero(~known)} of its {len(known)} samples are not "
             "finite; leave them out with --interval"
         )
-
-
-def check_length(recording: Recording) -> None:
-    """Raise unless a log is longer than its observer takes to settle, and fast enough."""
     if recording.median_step * SLOWEST > 1:
         raise ParameterError(
             f"{recording.name} has {1 / recording.median_step:.2g} samples a second; below "
@@ -111,20 +105,22 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     """The list by the two-state filter, evidence, and the gated smoother."""
     run, named = free.log, free.basis == "free motion"
     found = search(run, free.noise, free.level, seconds)
-    own = [k for k, span in enumerate(found.runs) if in_free_part(run, found, span, free)]
-    false = sum(1 for k in own if found.best[k] > LEAST_EVIDENCE)
-    least = LEAST_EVIDENCE
-    if own:
-        least = max(least, FALSE_MARGIN * float(found.best[own].max()))
-    found = found.kept([k for k, span in enumerate(found.runs) if not at_end(found, span)])
+    t = found.log.blocks.t
+    middle = [float(np.mean(t[slice(*span)])) for span in found.runs]
+    own = np.flatnonzero(free.own[np.searchsorted(run.t, middle)])
+    false = int(np.count_nonzero(found.best[own] > LEAST_EVIDENCE))
+    least = max(LEAST_EVIDENCE, FALSE_MARGIN * float(found.best[own].max(initial=-np.inf)))
+    ends = t[0] + AT_ENDS, t[-1] - AT_ENDS
+    found = found.kept(
+        [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= ends[0] and t[a] <= ends[1]]
+    )
     at_rest = np.array([rests_around(run.recording, found, span) for span in found.runs], bool)
-    asked = np.where(at_rest | named, least, LEAST_IN_MOTION)
-    passed = found.best > asked
+    passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
     if not named:
         passed |= at_rest & np.array(found.beyond, dtype=bool)
     seen = [k for k in range(len(found.runs)) if passed[k] or found.best[k] > LEAST_EVIDENCE]
     halted = {k for k in seen if is_stop(run, found, k, seconds)}
-    stops = [float(found.log.blocks.t[found.runs[k][0]]) for k in sorted(halted) if passed[k]]
+    stops = [float(t[found.runs[k][0]]) for k in sorted(halted) if passed[k]]
     kept = [k for k in seen if passed[k] and k not in halted]
     measurer = Measurer.of(run, found.kept(kept), free)
     rows = measured_rows(free, measurer)
@@ -133,8 +129,10 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
         measurer = Measurer.of(run, measurer.found.joined(groups), free)
         rows = measured_rows(free, measurer)
     others = [k for k in seen if not passed[k] and k not in halted]
-    weak = measured_rows(free, measurer.beside(found.kept(others), free)) if others else []
-    weak += [row for row in rows if not row.is_told]
+    weak = [row for row in rows if not row.is_told]
+    if others:
+        beside = Measurer.of(run, found.kept(others), free, measurer)
+        weak = [*measured_rows(free, replace(beside, bent=measurer.bent)), *weak]
     told = [replace(row, inferred=not proven) for row in rows if row.is_told]
     smallest = measurer.test.smallest_force
     if not np.isfinite(smallest) and not named and has_wrench(run):
@@ -191,15 +189,10 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 def measured_rows(free: Untouched, measurer: Measurer) -> list[Contact]:
     """The rows of all that a measurer holds, those of short contacts from finer blocks."""
     found, rows = measurer.found, dict(enumerate(measurer.rows()))
-    if brief := [k for k, span in enumerate(found.runs) if lasts(found, span) < SHORT]:
+    length = found.log.blocks.length
+    if brief := [k for k, span in enumerate(found.runs) if length[slice(*span)].sum() < SHORT]:
         rows |= fine_rows(free, brief, measurer)
     return [rows[k] for k in sorted(rows)]
-
-
-def at_end(found: Found, span: BlockSpan) -> bool:
-    """Whether a candidate lies wholly within `AT_ENDS` of either end of the log."""
-    t = found.log.blocks.t
-    return bool(t[span[1] - 1] < t[0] + AT_ENDS or t[span[0]] > t[-1] - AT_ENDS)
 
 
 def rests_around(recording: Recording, found: Found, span: BlockSpan) -> bool:
@@ -212,12 +205,7 @@ def rests_around(recording: Recording, found: Found, span: BlockSpan) -> bool:
 
 def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:
     """The rows with their numbers, from 1."""
-    return tuple(row.numbered(k) for k, row in enumerate(rows, start=1))
-
-
-def lasts(found: Found, span: BlockSpan) -> float:
-    """How long a contact lasts. [s]"""
-    return float(found.log.blocks.length[slice(*span)].sum())
+    return tuple(replace(row, number=k) for k, row in enumerate(rows, start=1))
 
 
 def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict[int, Contact]:
@@ -249,12 +237,6 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
     return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(sites), strict=True))
 
 
-def in_free_part(run: Run, found: Found, span: tuple[int, int], free: Untouched) -> bool:
-    """Whether a candidate lies in the log's own free part."""
-    middle = float(np.mean(found.log.blocks.t[slice(*span)]))
-    return bool(free.own[np.searchsorted(run.t, middle)])
-
-
 def is_stop(run: Run, found: Found, number: int, seconds: float) -> bool:
     """Whether a candidate follows an abrupt stop of the arm."""
     first, last = found.runs[number]
@@ -279,7 +261,7 @@ def limits(run: Run, free: Untouched, stops: tuple[float, ...], smallest: float)
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     if free.basis != "free motion":
         return found
-    unseen = [j + 1 for j in np.flatnonzero(free.noise.seen < 0.5).tolist()]
+    unseen = [j + 1 for j in np.flatnonzero(~free.noise.seen).tolist()]
     if len(unseen) == run.robot.joints:
         # At rest the free part shows no friction of motion: the share of F_c that is added does.
         dry = UNSEEN_SHARE * free.noise.dry
@@ -334,27 +316,29 @@ def largest_torque(run: Run) -> Unexplained:
 
 def without_forces(made: ContactList) -> ContactList:
     """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
+    bare = [
+        [
+            replace(
+                row,
+                peak_force=None,
+                peak_band=None,
+                place_band=None,
+                wrench=None,
+                wrench_sd=None,
+                mean_force=None,
+                impulse=None,
+                anywhere=None,
+                course=None,
+                vendor_force=None,
+            )
+            for row in rows
+        ]
+        for rows in (made.contacts, made.candidates)
+    ]
     return replace(
         made,
-        contacts=tuple(bare(contact) for contact in made.contacts),
-        candidates=tuple(bare(contact) for contact in made.candidates),
+        contacts=tuple(bare[0]),
+        candidates=tuple(bare[1]),
         smallest_force=None,
         remarks=(*made.remarks, caution("no-wrench-of-few-joints")),
-    )
-
-
-def bare(contact: Contact) -> Contact:
-    """A row without newtons."""
-    return replace(
-        contact,
-        peak_force=None,
-        peak_band=None,
-        place_band=None,
-        wrench=None,
-        wrench_sd=None,
-        mean_force=None,
-        impulse=None,
-        anywhere=None,
-        course=None,
-        vendor_force=None,
     )

@@ -7,24 +7,21 @@ misses of the tails inflates it, and a joint that comes to rest draws its sticti
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.robots.disturbance import TIE, Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
-from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
 from vftcli.virtual_sensor.smoother.noise import (
     LEAST_NOISE,
-    PUSHED_TIME,
-    REST_TIME,
     SEEN,
-    UNSEEN_SHARE,
-    UNSEEN_TIME,
+    TorqueNoise,
     fit_joints,
     long_stretches,
     steps,
@@ -51,21 +48,6 @@ SPIKES_MOVING, SPIKES_RESTING, SPIKE_REACH = 0.01, 1e-5, 0.3
 UNKNOWN = 1e9  #: Variance of the white noise of a block that says nothing. [(N·m)²]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ErrorNoise:
-    """What motion that nobody touched shows of each joint."""
-
-    white: Array  #: R. (n,) [(N·m)²]
-    variance: Array  #: s². (n,) [(N·m)²]
-    time: Array  #: T. (n,) [s]
-    dry: Array  #: F_c. (n,) [N·m]
-    seen: Array  #: Whether the free part moved the joint: 1 or 0. (n,)
-    free_seconds: float  #: Length of the free part. [s]
-
-    def __post_init__(self) -> None:
-        seal(self, "white", "variance", "time", "dry", "seen")
-
-
 class ErrorCourse(NamedTuple):
     """How b goes from block to block, and the white noise upon it."""
 
@@ -74,12 +56,8 @@ class ErrorCourse(NamedTuple):
     white: Array  #: R, `UNKNOWN` where the block's disturbance is. (K, n) [(N·m)²]
     spikes: Array  #: How often an innovation is a spike. (K, n)
 
-    def part(self, chosen: slice) -> "ErrorCourse":
-        """Some of the blocks."""
-        return ErrorCourse(*(field[chosen] for field in self))
 
-
-def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
+def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
     """The noise of a free part, None where no stretch of it is long enough.
 
     Args:
@@ -93,19 +71,21 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> ErrorNoise | None:
     share = moving.mean(axis=0)
     bridged = [without_reversals(piece, share > MOVES) for piece in pieces]
     white, variance, time = fit_joints(bridged)
-    found = ErrorNoise(
+    found = TorqueNoise(
         white=white,
         variance=variance,
         time=time,
         dry=dry,
-        seen=(share >= SEEN).astype(float),
+        seen=share >= SEEN,
+        at_rest=(CREEP_SHARE * dry) ** 2,
+        pushed=(PUSHED_SHARE * dry) ** 2,
         free_seconds=float(sum(piece.length.sum() for piece in pieces)),
     )
     factor = inflation(found, pieces)
     return replace(found, white=white * factor, variance=variance * factor)
 
 
-def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoise | None:
+def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueNoise | None:
     """The noise of a log without known free motion, None where it has too few known blocks.
 
     Args:
@@ -136,12 +116,14 @@ def infer_noise(log: Blocks, dry: Array, learned: ErrorNoise | None) -> ErrorNoi
         white, variance = np.maximum(white, learned.white), np.maximum(learned.variance, least**2)
         floored = variance > learned.variance
         time = np.where(floored, np.maximum(learned.time, LEAST_TIME), learned.time)
-    return ErrorNoise(
+    return TorqueNoise(
         white=white,
         variance=variance,
         time=time,
         dry=dry,
-        seen=np.ones(len(dry)),
+        seen=np.ones(len(dry), dtype=bool),
+        at_rest=(CREEP_SHARE * dry) ** 2,
+        pushed=(PUSHED_SHARE * dry) ** 2,
         free_seconds=0.0 if learned is None else learned.free_seconds,
     )
 
@@ -156,7 +138,7 @@ def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
     return piece._replace(d=d)
 
 
-def inflation(noise: ErrorNoise, pieces: Sequence[Blocks]) -> Array:
+def inflation(noise: TorqueNoise, pieces: Sequence[Blocks]) -> Array:
     """What the tails of the innovations ask for beyond the spectrum, at least 1. (n,)"""
     squares = []
     for piece in pieces:
@@ -212,7 +194,7 @@ def spiked_white(d: Array, course: ErrorCourse) -> Array:
     return course.white + np.where(spiked, (SPIKE - 1.0) * spreads, 0.0)
 
 
-def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) -> ErrorCourse:
+def error_course(noise: TorqueNoise, blocks: Blocks, pushed: Mask | None = None) -> ErrorCourse:
     """How b goes along a log.
 
     Args:
@@ -221,20 +203,11 @@ def error_course(noise: ErrorNoise, blocks: Blocks, pushed: Mask | None = None) 
         pushed: Blocks in which a contact may re-settle the stiction of joints at rest; None for
             none. (K,)
     """
-    step = steps(blocks)
     rests, length = blocks.rests, float(np.median(blocks.length))
     moved = moved_before(~rests, max(round(RECENT / length), 1))
-    unseen = noise.seen < 0.5
-    in_motion = noise.variance + unseen * (UNSEEN_SHARE * noise.dry) ** 2
-    motion_time = np.where(unseen, np.maximum(noise.time, UNSEEN_TIME), noise.time)
-    variance = np.where(rests, noise.variance + (CREEP_SHARE * noise.dry) ** 2, in_motion)
-    time = np.where(rests, np.maximum(noise.time, REST_TIME), motion_time)
+    variance, time = noise.course(blocks, pushed)
     time = np.where(~rests & (moved < 1.0), np.minimum(time, START_TIME), time)
-    if pushed is not None:
-        held = rests & pushed[:, None]
-        variance = np.where(held, noise.variance + (PUSHED_SHARE * noise.dry) ** 2, variance)
-        time = np.where(held, PUSHED_TIME, time)
-    decay = np.exp(-step[:, None] / time)
+    decay = np.exp(-steps(blocks)[:, None] / time)
     added = variance * (1.0 - decay**2)
     stops = rests & ~np.vstack([np.ones((1, rests.shape[1]), bool), rests[:-1]]) & (moved > 0.5)
     decay[stops] = STOP_DECAY

@@ -1,7 +1,7 @@
 """From what was found to the rows of the list: peak, band, place, torques, and what others say."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -94,11 +94,6 @@ class Measurer:
             bent=bent,
         )
 
-    def beside(self, found: Found, free: Untouched) -> "Measurer":
-        """A measurer of other candidates of the same log."""
-        other = Measurer.of(self.run, found, free, self)
-        return replace(other, bent=self.bent)
-
     @cached_property
     def priors(self) -> list[WrenchPrior]:
         """How the wrench of every contact may move: one that is short moves faster."""
@@ -124,7 +119,9 @@ class Measurer:
         sites = [site._replace(jacobian=J) for site in (self.sites if sites is None else sites)]
         moved = [i for i, site in enumerate(sites) if not site.on_wrist]
         points = [priors[i]._replace(moment=POINT_MOMENT) for i in moved]
-        jacobians = [self.point_jacobian(sites[i].fits[0]) for i in moved]
+        chain, q = self.run.robot.loaded_chain, self.log.blocks.q
+        fits = [sites[i].fits[0] for i in moved]
+        jacobians = [link_jacobian(chain, q, fit.link, fit.share) for fit in fits]
         if moved:
             some = self.found.kept(moved)
             again = smooth_contacts(self.log, jacobians, some.runs, points)
@@ -132,10 +129,6 @@ class Measurer:
                 courses[i] = course
                 sites[i] = sites[i]._replace(jacobian=jacobian)
         return tuple(self.row(i, courses[i], sites[i]) for i in range(len(runs)))
-
-    def point_jacobian(self, fit: PointFit) -> Array:
-        """J of a fitted point along the log. (K, 6, n)"""
-        return link_jacobian(self.run.robot.loaded_chain, self.log.blocks.q, fit.link, fit.share)
 
     def site(self, number: int, course: WindowWrench) -> "Site":
         """Where a contact is, from the torque that is left of the disturbance."""

@@ -7,15 +7,16 @@ import numpy as np
 
 from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
 from vftcli.contacts.evidence import evidence
-from vftcli.contacts.model_error import UNKNOWN, ErrorNoise, error_course, spiked_white
+from vftcli.contacts.model_error import UNKNOWN, error_course, spiked_white
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
 from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array
 from vftcli.signals.intervals import runs_of
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
@@ -57,7 +58,7 @@ class Found(NamedTuple):
         )
 
 
-def search(run: Run, noise: ErrorNoise, level: Array, seconds: float) -> Found:
+def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Found:
     """Look for contacts along a log.
 
     Args:
@@ -72,8 +73,13 @@ def search(run: Run, noise: ErrorNoise, level: Array, seconds: float) -> Found:
     ahead, back = error_course(noise, blocks), error_course(noise, turned_round(blocks))
     taken = filtered_contacts(blocks, (ahead, back), J)
     beyond = beyond_threshold(run, level, blocks)
-    for piece in lasting_beside(blocks, taken, beyond):
-        taken[piece] = True
+    struck = taken.copy()
+    # The filter takes a load that hangs on for many seconds for an error of the model, and sees
+    # only what strikes it in the meantime: before, between and behind that the torque goes on.
+    for start, stop in beyond:
+        within, t = struck[start:stop], blocks.t[start:stop]
+        for a, b in runs_of(~within) if within.any() else ():
+            taken[start + a : start + b] |= t[b - 1] - t[a] > LASTING
     apart = [r for r in beyond if not taken[max(r[0] - 1, 0) : r[1] + 1].any()]
     runs = sorted([*runs_of(taken), *apart])
     for start, stop in runs:
@@ -102,22 +108,6 @@ def turned_round(blocks: Blocks) -> Blocks:
         velocity=-blocks.velocity[::-1],
         known=blocks.known[::-1],
     )
-
-
-def lasting_beside(blocks: Blocks, taken: Mask, beyond: Sequence[BlockSpan]) -> list[slice]:
-    """Where a torque beyond the threshold goes on, before, between or behind blocks that are taken.
-
-    The two-state filter takes a load that hangs on for many seconds for an error of the model, and
-    sees only what strikes it in the meantime.
-    """
-    found = []
-    for start, stop in beyond:
-        within = taken[start:stop]
-        pieces = runs_of(~within) if within.any() else []
-        for first, last in pieces:
-            if blocks.t[start + last - 1] - blocks.t[start + first] > LASTING:
-                found.append(slice(start + first, start + last))
-    return found
 
 
 def beyond_threshold(run: Run, level: Array, blocks: Blocks) -> list[BlockSpan]:

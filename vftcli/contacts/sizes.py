@@ -98,8 +98,7 @@ def learn_prior(
         nats = likelihoods(log, lanes).reshape(len(priors), len(runs)).sum(axis=1)
         time = TIMES[int(np.argmax(nats))]
         timed = [prior._replace(time=time)] * len(runs)
-        tried = contact_lanes(log, each, runs, timed, NEAR)
-        courses = smooth_lanes(log, tried)
+        courses = smooth_lanes(log, contact_lanes(log, each, runs, timed, NEAR))
         inside = [course.within(run) for course, run in zip(courses, runs, strict=True)]
         values = np.concatenate([course.values for course in inside])
         covariance = np.concatenate([course.covariance for course in inside])

@@ -6,7 +6,6 @@ number more to learn from few maxima, and its rare levels came out too low.
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -58,13 +57,6 @@ def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
     return tuple(ContactInterval(float(t[part[0]]), float(t[part[-1]])) for part in parts)
 
 
-class Threshold(NamedTuple):
-    """A level, and how well it is known."""
-
-    value: float  #: The level. [the signal's unit]
-    interval: tuple[float, float]  #: 95 % of it: where a level of this rate may lie.
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tail:
     """The exponential tail of one signal of one log."""
@@ -95,8 +87,10 @@ class Tail:
         """λ: how often the signal passes `start`. [1/h]"""
         return self.count / self.hours
 
-    def threshold(self, rate: float) -> Threshold:
-        """The level that is passed at a rate: u + e ln(λ/rate), of e its 95 %, (1 ± 1.96/√k) e.
+    def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
+        """The level that is passed at a rate, u + e ln(λ/rate), and the ends of its 95 %.
+
+        They are those of e, (1 ± 1.96/√k) e: where a level of this rate may lie.
 
         Its lower end is u at the least. What happens more often than λ is no matter of the tail:
         of m times in all it is the m-th largest maximum, of m its 95 %, m ± 1.96 √m.
@@ -108,7 +102,7 @@ class Tail:
             step = self.excess * float(np.log(self.rate / rate))
             spread = NORMAL / np.sqrt(self.count) * step
             value = self.start + step
-            return Threshold(value, (max(float(value - spread), self.start), float(value + spread)))
+            return value, (max(float(value - spread), self.start), float(value + spread))
         due = rate * self.hours
         if due > 0.5 * len(self.maxima):
             most = 0.5 * 3600.0 / BLOCK
@@ -119,7 +113,7 @@ class Tail:
         ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
         places = np.clip(np.rint(ranks).astype(np.intp), 1, len(self.maxima)) - 1
         value, low, high = (float(x) for x in self.maxima[places])
-        return Threshold(value, (low, high))
+        return value, (low, high)
 
 
 def tail_of(maxima: Array) -> Tail | None:

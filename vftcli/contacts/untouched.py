@@ -10,7 +10,6 @@ from vftcli.contacts.candidates import threshold_contacts
 from vftcli.contacts.model_error import (
     DRY_SHARE,
     LEAST_ERROR,
-    ErrorNoise,
     error_course,
     infer_noise,
     learn_noise,
@@ -38,6 +37,7 @@ from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
 from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
@@ -61,7 +61,7 @@ class Untouched:
     """Motion that nobody touched, as a list of contacts needs it."""
 
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
-    noise: ErrorNoise  #: Noise and model error.
+    noise: TorqueNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
     own: Mask  #: RunSamples of the log itself that are known to be free. (T,)
     #: The log, less a load that the free part carries; less the model error of the whole log where
@@ -157,7 +157,7 @@ def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched |
 
 def inferred(
     log: Run, free: Sequence[RunSamples], seconds: float
-) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
+) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
     """Noise that is inferred, and its free pieces in blocks of a length [s]; None without any."""
     whole = disturbance_blocks(log.terms, log.q, seconds)
     learned = noise_of(free, seconds) if free else None
@@ -167,7 +167,7 @@ def inferred(
 
 def noise_of(
     pieces: Sequence[RunSamples], seconds: float
-) -> tuple[ErrorNoise, tuple[Blocks, ...]] | None:
+) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
     """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short."""
     blocks = tuple(
         disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside) for piece in pieces

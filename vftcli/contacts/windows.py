@@ -89,10 +89,8 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
         if lane.prior is None:
             continue
         jacobian[:count, i] = lane.jacobian[span]
-        inside = lane.gate[span]
-        stays = lane.prior.decay(inside, log.step[span])
-        decay[:count, i, :6] = stays[:, None]
-        added[:count, i, :6] = np.where(inside, 1.0 - stays**2, 0.0)[:, None] * lane.prior.variance
+        course = lane.prior.course(lane.gate[span], log.step[span])
+        decay[:count, i, :6], added[:count, i, :6] = course
     return LinearModel(d, beside_errors(jacobian), white, decay, added)
 
 

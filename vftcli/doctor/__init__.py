@@ -1,4 +1,4 @@
-"""The log doctor: what is wrong with a log, how one sees it, what it does, what to do."""
+"""The log doctor: faults of a log, their evidence, effects and remedies."""
 
 from vftcli.doctor.examination import Examination, Examiner, examine
 from vftcli.doctor.findings import FindingWords, finding_record, in_words

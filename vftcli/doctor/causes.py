@@ -1,10 +1,10 @@
-"""The cause of a log that its arm does not explain: each is tried, the best one wins.
+"""The cause of a log that its arm does not explain: the best of all tries.
 
-All faults look alike in one number. So each cause puts the log right in its own way, the log is
-fitted again, and only a cause that leaves much less than the log and every other cause is named.
+In one number all faults look alike. So each cause corrects the log in its own way and the log
+is fitted again. Only a cause that leaves much less than the log and all others is named.
 
 Drivers publish currents, torques, or torques less gravity under one name, some with the sign
-turned. A reading's rest is relative to the column as logged: relative to the reading
+reversed. A reading's rest is relative to the column as logged: relative to the reading
 a slow arm's currents would pass for torques without gravity.
 """
 
@@ -22,57 +22,57 @@ from vftcli.robots.drive import effort_name
 from vftcli.robots.friction import steady_torque
 from vftcli.signals.recording import Recording
 
-#: Range of gravity's torque below which a log does not tell what its effort is. [N·m]
+#: Least range of gravity's torque that shows the kind of an effort. [N·m]
 #:
 #: All 105 readings of logs with 24 N·m and more were right, 3 of 10 below wrong.
 RANGE = 10.0
-EXPLAINED = 0.6  #: Share of the misfit that a cause may leave.
-SLIGHT = 0.75  #: That of an offset, which lowers the misfit less than a turned sign.
-OPEN = 0.45  #: Misfit that no cause may leave; no gravity beside a hand leaves .37.
-GOOD = 0.03  #: Below this misfit the costly swap of all signals of two joints is not tried.
-AMBIGUOUS = 1.25  #: A cause that explains less by a smaller factor is named beside the best.
-CLEAR = 1.5  #: Ratio of misfits by which another reading wins over the second best.
-#: Ratio of misfits by which another reading wins although the stated one fits.
+EXPLAINED = 0.6  #: Most of the misfit that a cause leaves.
+SLIGHT = 0.75  #: That of an offset: it lowers the misfit less than a sign.
+OPEN = 0.45  #: Largest misfit that a cause leaves; no gravity beside a hand leaves .37.
+GOOD = 0.03  #: Below this misfit the costly swap of two joints is not tried.
+AMBIGUOUS = 1.25  #: A second cause nearer than this ratio of misfits is named too.
+CLEAR = 1.5  #: Ratio of misfits by which another reading beats the second best.
+#: Ratio of misfits by which another reading beats the stated one that fits.
 #:
 #: Torques without gravity read as currents leave only 16 % open on a UR5, read right 1.5 %.
 OVERWHELMING = 5.0
-#: Misfits below which an effort is what its name says, and a base as the robot file says.
+#: Misfits below which an effort is as named, and a base as in the robot file.
 #:
-#: Read as something else it leaves 16 % and more on real logs; a tilt of 10° leaves 8 %.
+#: A wrong name leaves 16 % and more on real logs; a tilt of 10° leaves 8 %.
 READ_RIGHT, UPRIGHT = 0.1, 0.05
-SUSPECT = 0.35  #: Misfit of a joint from which its sign and its place are tried.
-#: Share of one joint's misfit that turning it, and of two joints' that exchanging them may leave.
+SUSPECT = 0.35  #: Least misfit of a joint to try its sign and place.
+#: Most of the misfit after one joint's sign change, and after two joints' exchange.
 TURNED, SWAPPED = 0.5, 0.7
-FEW = 60  #: Windows by which every pair of joints is tried: each pair needs the model anew.
-CARRIES = 0.25  #: Gravity's share of a joint's effort from which gravity tells its place.
-OFFSET = 0.1  #: Offset from which a joint's effort counts as shifted, relative to the effort.
-#: Windows that a joint moves, each way and both, in which an offset is no stiction.
+FEW = 60  #: Windows for every pair of joints: each pair evaluates the model again.
+CARRIES = 0.25  #: Least share of gravity in an effort that shows the joint's place.
+OFFSET = 0.1  #: Least offset of a joint's effort, relative to the effort.
+#: Windows of a joint's motion, each way and both, for an offset beyond stiction.
 FORTH_AND_BACK, BOTH = 8, 30
-#: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its weight then,
-#: relative to the robot file's.
+#: Angle between the fitted "up" and the robot file's of a tilted base [rad], and its weight
+#: then, relative to the robot file's.
 TILTED, WEIGHT = np.deg2rad(10.0), (0.6, 1.7)
-#: Deviation of a drive's factor from 1 that is named, of all joints (sound logs stay within .06)
+#: Least deviation of a drive's factor from 1, of all joints (sound logs stay within .06)
 #: and of one, which a load moves too.
 OFF, ALONE = 0.08, 0.1
-OTHERS = 0.05  #: By which the factors of the other joints may be off for one to be the cause.
-LEAST, MOST = 0.6, 1.7  #: Factors beyond these are of another unit or of another arm.
-SURE = 4.0  #: Standard deviations that an offset, a factor or missing friction has to be.
-KNOWN = 0.05  #: Standard deviation of a factor that the motion determines.
-CLEARER = 1.5  #: Ratio of misfits by which a factor wins over a load that weighs something.
+OTHERS = 0.05  #: Largest error of the other joints' factors beside one wrong one.
+LEAST, MOST = 0.6, 1.7  #: Factors beyond these: another unit or arm.
+SURE = 4.0  #: Least standard deviations of an offset, a factor or missing friction.
+KNOWN = 0.05  #: Largest standard deviation of a factor from motion.
+CLEARER = 1.5  #: Ratio of misfits by which a factor beats a load.
 #: Misfit that a model of the arm leaves of another's; measured efforts leave 1.3 % and more.
 MODELLED = 0.02
-#: Share of the friction of the robot file that no arm falls below, and joints that judge it.
+#: Least share of the robot file's friction in any arm, and joints that judge it.
 RUBS, WITHOUT = 0.1, 3
 
 
 class Reading(NamedTuple):
-    """An effort that is not what it is called."""
+    """An effort that differs from its name."""
 
-    kind: str  #: The kind it is, one of `vftcli.signals.names.EFFORTS`; "" for what it is called.
+    kind: str  #: Its kind, of `vftcli.signals.names.EFFORTS`; "" for the named one.
     factor: float = 1.0  #: Factor on its values.
 
 
-#: Finding that an effort is something else → what puts it right.
+#: Finding on a misnamed effort → its correction.
 CORRECTIONS = {
     "effort-sign": Reading("", -1.0),
     "current-as-torque": Reading("torque"),
@@ -83,7 +83,7 @@ CORRECTIONS = {
     "torque-with-gravity": Reading("torque"),
     "torque-without-gravity": Reading("torque_without_gravity"),
 }
-#: Name of an effort → what it may be, first what its name says.
+#: Name of an effort → its possible kinds, the named first.
 MAY_BE = {
     "current": (
         "", "current-as-torque", "milliamperes", "effort-sign", "current-as-turned-torque",
@@ -100,36 +100,36 @@ MAY_BE = {
 
 
 class Cause(NamedTuple):
-    """A fault that a log may have."""
+    """A possible fault of a log."""
 
-    code: str  #: The finding it would be; "" of the log as its names say.
-    case: Case  #: The log with it put right.
-    joints: tuple[int, ...] = ()  #: The joints it is about, from zero; () for all or none.
-    values: Mapping[str, Any] = {}  #: Its own numbers in the finding.
+    code: str  #: Its finding; "" of the log as named.
+    case: Case  #: The log after its correction.
+    joints: tuple[int, ...] = ()  #: Its joints, from zero; () for all or none.
+    values: Mapping[str, Any] = {}  #: Its numbers in the finding.
 
     @property
     def misfit(self) -> float:
-        """Share of the effort left unexplained once it is put right."""
+        """Share of the effort that its correction leaves."""
         return self.case.misfit
 
 
 class Diagnosis(NamedTuple):
-    """The cause that explains a log, and what was compared."""
+    """The cause that explains a log, and its rivals."""
 
     case: Case  #: The log as its names say.
-    cause: Cause | None = None  #: The best one, None where nothing explains more.
-    rival: Cause | None = None  #: A second cause that explains nearly as much.
-    #: Another reading that leaves less than what the effort's name says, where no cause is named.
+    cause: Cause | None = None  #: The best one, None if none explains more.
+    rival: Cause | None = None  #: A second cause, nearly as good.
+    #: A reading that leaves less than the named one, if no cause is named.
     unclear: Cause | None = None
 
     @property
     def healed(self) -> Case:
-        """The log with its cause put right."""
+        """The log with its cause corrected."""
         return self.case if self.cause is None else self.cause.case
 
 
 def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Diagnosis | None:
-    """The one cause that explains a log by an arm; None without an effort to judge."""
+    """The cause of a log's misfit with its arm; None without an effort to judge."""
     may_be = list(readings(recording, robot, windows_of(recording, robot), ignored))
     if not may_be:
         return None
@@ -144,7 +144,7 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
         found += swapped(case)
     diagnosis = chosen(case, found)
     if tells and diagnosis.cause is None and case.misfit > READ_RIGHT:
-        # Gravity that is counted twice may look like a load: none is subtracted here.
+        # Gravity counted twice may look like a load: none is subtracted.
         least = min(may_be, key=lambda other: other.case.bare.size / other.case.size)
         return diagnosis._replace(unclear=least if least.code else None)
     return diagnosis
@@ -153,14 +153,14 @@ def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
 def case_of(
     recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
 ) -> Case | None:
-    """The log with its effort as its name says, None without any."""
+    """The log with its effort as named, None without any."""
     return next((named.case for named in readings(recording, robot, windows, ignored)), None)
 
 
 def readings(
     recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
 ) -> Iterator[Cause]:
-    """Readings of an effort, first the one of its name."""
+    """Readings of an effort, the named one first."""
     name = effort_name(recording, robot)
     value, constant = getattr(recording, name), robot.torque_constant
     if value is None or (name == "current" and constant is None):
@@ -170,10 +170,10 @@ def readings(
     if not np.any(mean) or not np.all(np.isfinite(mean)):
         return
     gravity, unit = windows.gravity[:, :, 2], np.ones(mean.shape[1])
-    # What is left over is relative to the whole torque, of which gravity is the most.
+    # The rest is relative to the whole torque, mostly gravity.
     whole = size_of(mean + gravity) if name == "torque_without_gravity" else 0.0
     for code in MAY_BE[name]:
-        # Nothing puts currents without gravity right.
+        # Nothing corrects currents without gravity.
         none = Reading("current_without_gravity" if code else "")
         reading = CORRECTIONS.get(code, none)
         kind = reading.kind or name
@@ -190,11 +190,11 @@ def readings(
 
 
 def read_otherwise(may_be: Sequence[Cause]) -> Iterator[Cause]:
-    """The effort read as something else than its name says."""
+    """The effort read as another kind."""
     named, *others = may_be
     best, *rest = sorted(others, key=lambda cause: cause.misfit)
     second = min(cause.misfit for cause in (named, *rest))
-    # Gravity that is counted twice may look like a load, so none is subtracted here.
+    # Gravity counted twice may look like a load: none is subtracted.
     right = named.case.bare.size < READ_RIGHT * named.case.size
     if second > (OVERWHELMING if right else CLEAR) * best.misfit:
         yield best
@@ -205,7 +205,7 @@ def tilted(case: Case) -> Iterator[Cause]:
     windows = case.windows
     if case.misfit < UPRIGHT:
         return
-    # No load beside gravity, for the two trade.
+    # No load beside gravity: they trade.
     fit = solve(case.given - windows.inertial, terms(windows.gravity).beside(windows.friction))
     up, weight = fit.values[:3], float(np.linalg.norm(fit.values[:3]))
     angle = float(np.arctan2(np.linalg.norm(up[:2]), up[2]))
@@ -220,7 +220,7 @@ def tilted(case: Case) -> Iterator[Cause]:
 
 
 def turned_or_swapped(case: Case) -> Iterator[Cause]:
-    """Single joints with a turned effort, and two joints with exchanged efforts."""
+    """Single joints with a reversed effort, pairs with exchanged efforts."""
     moving = np.ptp(case.windows.q, axis=(0, 1)) > TRAVEL
     suspects = np.flatnonzero((case.by_joint > SUSPECT) & moving).tolist()
     if not suspects:
@@ -239,7 +239,7 @@ def turned_or_swapped(case: Case) -> Iterator[Cause]:
 
 
 def rest_of(case: Case, i: int, j: int, sign: float = 1.0) -> float:
-    """Rest of joint i's effort times a sign beside joint j's model. [N·m]"""
+    """Rest of joint i's signed effort beside joint j's model. [N·m]"""
     given = sign * case.given[:, [i]] / case.constant[i] * case.constant[j]
     friction = np.moveaxis(case.windows.motion[:, :, [j]], 0, 2)
     return solve(given - case.needed[:, [j]], terms(friction, positive=True)).size
@@ -249,7 +249,7 @@ def shifted(case: Case) -> Iterator[Cause]:
     """A constant on one joint's effort."""
     rests = [np.mean(fit.rest[fit.kept], axis=0) for fit in (case.bare, case.loaded)]
     ways = case.windows.ways
-    # Without enough motion to and fro an offset may be stiction.
+    # With little motion to and fro an offset may be stiction.
     moves = (ways.min(axis=0) >= FORTH_AND_BACK) & (ways.sum(axis=0) >= BOTH)
     tried = np.max(np.abs(rests), axis=0) / case.effort_sizes > OFFSET / 2
     by = case.windows.load.beside(case.windows.friction)
@@ -265,18 +265,18 @@ def shifted(case: Case) -> Iterator[Cause]:
 
 
 def scaled(case: Case) -> Iterator[Cause]:
-    """An effort that has a factor: of all joints, or of a single one.
+    """An effort with a factor: of all joints, or of one.
 
-    A wrong drive constant scales gravity and inertia alike; friction has any size beside it.
+    A wrong drive constant scales gravity and inertia; friction has any size beside it.
     """
     n = len(case.constant)
     fit = solve(case.given, terms(case.needed[:, :, None]).beside(case.windows.friction))
     factor, sd = float(fit.values[0]), float(fit.sd[0])
-    # No load lightens an arm; one that weighs something explains a factor above 1 as well.
+    # No load lightens an arm; a heavy one explains a factor above 1 too.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
     sure = abs(factor - 1) > OFF + SURE * sd and LEAST < factor < MOST
     if sure and worth * fit.size <= case.loaded.size:
-        # What is left stays relative to the effort as it was logged.
+        # The rest is relative to the effort as logged.
         healed = replace(case, given=case.given / factor, size=case.size / factor)
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
     each = case.needed[:, :, None] * np.eye(n)
@@ -293,11 +293,11 @@ def scaled(case: Case) -> Iterator[Cause]:
 
 
 def swapped(case: Case) -> Iterator[Cause]:
-    """Two joints with all signals exchanged: each pair asks the model anew."""
+    """Two joints with all signals exchanged: each pair evaluates the model."""
     far = case.by_joint > SUSPECT
     gravity = np.sqrt(np.mean(case.gravity**2, axis=0))
     if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
-        return  # gravity asks nothing of any joint that is far from the model
+        return  # gravity loads none of the joints with a large misfit
     few = spread(len(case.given), FEW)
     for i, j in combinations(np.flatnonzero(far).tolist(), 2):
         given = case.exchanged(i, j).given[few]
@@ -305,12 +305,12 @@ def swapped(case: Case) -> Iterator[Cause]:
         yield Cause("joint-order", replace(case, windows=windows, given=given), (i, j))
 
 
-#: The causes that are tried where gravity varies, each by the cases in which it is put right.
+#: Causes to try where gravity varies, each by its corrected cases.
 TRIALS = (tilted, turned_or_swapped, shifted, scaled)
 
 
 def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
-    """The cause that leaves least, if it leaves little, and the next."""
+    """The cause that leaves least, if that is little, and the next."""
 
     def explains(cause: Cause) -> bool:
         limit = SLIGHT if cause.code == "effort-offset" else EXPLAINED
@@ -322,17 +322,17 @@ def chosen(case: Case, found: Sequence[Cause]) -> Diagnosis:
         return Diagnosis(case)
     best = found[0]
     if best.code == "joint-sign" and 2 * len(best.joints) > len(case.constant):
-        # Of most joints it is the sign of all: joints that rub or carry nothing do not show it.
+        # Of most joints it is the sign of all: joints that rub or carry nothing hide it.
         all_turned = (c for c in found if c.code == "effort-sign")
         best = next((c for c in all_turned if c.misfit < AMBIGUOUS * best.misfit), best)
-    # The sign of all says that of single joints too.
+    # The sign of all covers that of single joints.
     implied = {best.code, "joint-sign" if best.code == "effort-sign" else ""}
     near = (c for c in found if c.misfit < AMBIGUOUS * best.misfit and c.code not in implied)
     return Diagnosis(case, best, next(near, None))
 
 
 def is_plain(case: Case, cause: Cause) -> bool:
-    """Whether a cause of single joints explains these, however little the rest changes."""
+    """Whether a single-joint cause explains these, however little the rest changes."""
     if cause.code not in {"joint-sign", "effort-order"} or cause.misfit > case.misfit:
         return False
     after, before = (x.bare.by_joint[list(cause.joints)] for x in (cause.case, case))
@@ -340,9 +340,9 @@ def is_plain(case: Case, cause: Cause) -> bool:
 
 
 def is_modelled(case: Case, robot: Robot) -> bool:
-    """Whether an effort is what a model asks for: the arm's own friction is not in it.
+    """Whether an effort comes from a model, without the arm's own friction.
 
-    A simulation without friction is not judged by another model of its arm.
+    Another model of its arm does not judge a simulation without friction.
     """
     n = len(case.constant)
     if len(robot.friction) != n:
@@ -353,7 +353,7 @@ def is_modelled(case: Case, robot: Robot) -> bool:
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)
     if moving.sum() < WITHOUT:
         return False
-    # A joint that tells nothing has what is needed in the place of its effort.
+    # A joint without information has the model's torque as its effort.
     tells = np.abs(case.given - case.needed).max(axis=0) > 1e-9 * case.size
     static = solve((case.given - case.gravity) * tells, case.windows.friction)
     for fit in (case.bare, static):

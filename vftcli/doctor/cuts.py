@@ -1,7 +1,7 @@
-"""Samples that no arm can have made: they are cut out of a log like a gap in its clock.
+"""Samples that no arm makes, cut out of a log like a gap in its clock.
 
-Each rule looks at single samples or spans, and its limits are the arm's own. Where two
-recordings meet the gap is made so long that no filter runs across.
+Each rule looks at single samples or spans, within the arm's limits. Where two
+recordings meet the gap is so long that no filter runs across.
 """
 
 from collections.abc import Iterator
@@ -23,31 +23,31 @@ from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.rest import REST
 from vftcli.signals.source import Cut
 
-#: Times its largest torque that no drive gives: the slack is that of drive constants. [1]
+#: Multiple of its largest torque that no drive gives: drive constants are uncertain. [1]
 BEYOND = 1.5
-#: Share of the joint's largest torque, and robust deviations of the noise, by which a bad sample
-#: differs from its neighbours. [1, -]
+#: Share of the joint's largest torque, and robust deviations of noise, between a bad sample
+#: and its neighbours. [1, -]
 AWAY, FAR = 0.5, 25.0
-FAST = 0.25  #: `AWAY` for velocities: share of the joint's largest speed. [1]
-#: Such samples come at most so many in a row, within so long; more may be a blow. [-, s]
+FAST = 0.25  #: `AWAY` for velocities, by the joint's largest speed. [1]
+#: Most such samples in a row, and their time; more may be a blow. [-, s]
 FEW, BRIEF = 3, 0.03
-#: Bend of a joint's speed across such samples that shows a blow: the arm felt it. [rad/s]
+#: Bend of a joint's speed across such samples that shows a blow. [rad/s]
 BLOW = 0.05
-#: Share of a joint's largest torque from which its effort does not jump to exactly 0. [1]
+#: Share of a joint's largest torque from which no effort jumps to exactly 0. [1]
 ZERO = 0.05
-SLIPPED = 5e-3  #: Change of position beyond what the velocities say that is a jump. [rad]
-#: A jump by whole turns, up to so many, within this much: a count began anew. [rad, -, rad]
+SLIPPED = 5e-3  #: Least jump of position beyond the velocities. [rad]
+#: A jump by whole turns, at most so many, within this: a new count. [rad, -, rad]
 TURN, TURNS, NEAR = 2 * np.pi, 3, 0.1
-#: A stamp may be off by so much: a sample that a recorder lost or held back is no jump. [s]
+#: Error of a stamp: a lost or late sample is no jump. [s]
 LATE = 0.01
-APART = 0.25  #: Time that is cut on both sides of where two recordings meet. [s]
-#: Time for which repeated rows are no late packets, and ratio to the usual repeats. [s, -]
+APART = 0.25  #: Time cut on both sides where two recordings meet. [s]
+#: Least time of repeated rows beyond late packets, and ratio to usual repeats. [s, -]
 FROZEN, UNUSUAL = 0.25, 10
-#: Share of gravity's torque that drives carry on brakes at most, and without at least. [1]
+#: Most of gravity's torque that drives carry on brakes, and least without brakes. [1]
 LET_GO, HELD = 0.2, 0.5
-#: Windows in which that is weighed, and gravity's torque from which on it can be. [s, N·m]
+#: Windows of that test, and its least gravity torque. [s, N·m]
 WEIGHED, HEAVY = 0.5, 10.0
-#: Share of a log from which on bad samples, and bad spans, are what the log is like. [1]
+#: Share of a log from which bad samples, and bad spans, are normal for it. [1]
 SHARE, MOST = 0.05, 0.5
 
 
@@ -56,13 +56,13 @@ class Bad(NamedTuple):
 
     code: str  #: The finding.
     samples: Mask  #: The samples, joint by joint. (T, n)
-    #: By how much, in the unit of the finding's words; None where it has none. (T, n)
+    #: By how much, in the unit of the finding's words; None without one. (T, n)
     sizes: Array | None = None
-    most: float = SHARE  #: Share of the log that may be cut for it. [1]
+    most: float = SHARE  #: Most of the log to cut for it. [1]
 
 
 def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
-    """The recording less what no arm can have made, or the log itself."""
+    """The recording less impossible samples, or the log itself."""
     if recording.joints != robot.joints or recording.dq is None or recording.samples < 20:
         return recording
     log = without_turns(recording)
@@ -77,7 +77,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
 
 
 def cut_findings(recording: Recording) -> Iterator[Remark]:
-    """One warning a rule on its cuts of a log, with their place and the largest."""
+    """One warning a rule on its cuts, with their place and the largest."""
     cuts = recording.source.cuts
     for code in dict.fromkeys(cut.code for cut in cuts):
         some = [cut for cut in cuts if cut.code == code]
@@ -96,7 +96,7 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
 
 
 def cuts_of(t: Array, bad: Bad, samples: Mask) -> Iterator[Cut]:
-    """The spans that a rule cuts out: some of its samples. (T, n)"""
+    """The spans of a rule's cut: some of its samples. (T, n)"""
     for start, stop in runs_of(np.asarray(samples.any(axis=1))):
         here = samples[start:stop]
         first, last = float(t[start]), float(t[stop - 1])
@@ -130,7 +130,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
 
 
 def isolated(x: Array, away: Array, step: float) -> Mask:
-    """Samples far from the median of the nine around them, a few in a row at most. (T, n)
+    """Samples far from the median of nine around, a few in a row. (T, n)
 
     Args:
         x: A signal. (T, n)
@@ -140,7 +140,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
     found = np.zeros(x.shape, dtype=bool)
     for j, column in enumerate(x.T):
         change = np.abs(np.diff(column))
-        # Only beside a step of half the distance can a sample be so far away.
+        # A far sample needs a step of half the distance.
         steps = np.flatnonzero(change > 0.5 * away[j])
         if not steps.size:
             continue
@@ -157,7 +157,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
 
 
 def blows(dq: Array, rows: Mask) -> Mask:
-    """Samples across which a joint's speed bends as if something hit the arm. (T,)"""
+    """Samples across which a joint's speed bends as in a blow. (T,)"""
     found = np.zeros(len(dq), dtype=bool)
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
@@ -168,7 +168,7 @@ def blows(dq: Array, rows: Mask) -> Mask:
 
 
 def zero_bursts(torque: Array, least: Array) -> Mask:
-    """Efforts that are exactly 0 between two that are not small. (T, n)
+    """Efforts of exactly 0 between two that are not small. (T, n)
 
     Of one joint three samples in a row, of all joints at once any.
     """
@@ -184,7 +184,7 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
 
 
 def frozen_rows(recording: Recording) -> Mask:
-    """Rows that repeat the row before in all that is measured while the arm moves. (T,)"""
+    """Rows of a moving arm that repeat all measured values. (T,)"""
     t, dq = recording.t, recording.require("dq")
     same = np.zeros(recording.samples - 1, dtype=bool)
     same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
@@ -197,14 +197,14 @@ def frozen_rows(recording: Recording) -> Mask:
 
 
 def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
-    """Changes of position beyond what the velocities say, and which of them are jumps.
+    """Changes of position beyond the velocities, and the jumps among them.
 
     The sample before each (K,), sizes (K, n) [rad] and jumps (K, n); steps of time may be off.
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step
     large, noise = np.zeros(len(steps), dtype=bool), np.zeros(recording.joints)
-    for j in range(recording.joints):  # a long log has no room for all joints at once
+    for j in range(recording.joints):  # all joints of a long log need too much room
         change = np.diff(q[:, j])
         fastest = np.max(np.abs(dq[:, j])) * GAP_STEPS * usual
         if np.max(np.abs(change)) + fastest > SLIPPED:
@@ -221,7 +221,7 @@ def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
 
 
 def without_turns(recording: Recording) -> Recording:
-    """The recording, positions that jump by whole turns unwrapped, which is said."""
+    """The recording with whole turns unwrapped, and a remark on them."""
     steps, sizes, jumps = slips_of(recording)
     turns = np.round(sizes / TURN)
     whole = jumps & (np.abs(sizes - TURN * turns) < NEAR)
@@ -238,7 +238,7 @@ def without_turns(recording: Recording) -> Recording:
 
 
 def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
-    """Rows with a position outside the motion, and the time around where recordings meet."""
+    """Rows off the motion, and the time around where recordings meet."""
     steps, slips, jumps = slips_of(recording)
     real = jumps.any(axis=1) & ~(frozen[steps] | frozen[steps + 1])
     steps, slips, jumps = steps[real], slips[real], jumps[real]
@@ -255,7 +255,7 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
         slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
         slack += np.abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
         if last - first > 1 and np.all((np.abs(over) < slack)[joints]):
-            span, into = slice(first + 1, last), rows  # the motion goes on behind a few bad rows
+            span, into = slice(first + 1, last), rows  # the motion continues after a few bad rows
         else:
             span, into = slice(*np.searchsorted(t, [t[first] - APART, t[last] + APART])), meets
         into[span, joints], sizes[span, joints] = True, size[joints]
@@ -264,7 +264,7 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
 
 
 def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
-    """Spans in which the arm rests and its drives do not carry it."""
+    """Spans of rest in which the drives do not carry the arm."""
     length = max(2, round(WEIGHED / recording.median_step))
     first = np.arange(0, recording.samples - length, length)
     if first.size < 3:
@@ -280,7 +280,7 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     free = heavy & (speed < REST) & (np.abs(share) < LET_GO)
     if not free.any() or np.count_nonzero(heavy & (share > HELD)) <= np.count_nonzero(free):
         return
-    # The drives let go and take hold again somewhere in the windows beside.
+    # The drives release and grip again somewhere in the windows beside.
     spans = [(start, start + length) for start in first[free].tolist()]
     off = covered(spans, recording.samples, length)
     yield Bad("brakes", np.repeat(off[:, None], recording.joints, axis=1), None, MOST)

@@ -1,4 +1,4 @@
-"""The examination of a log: all findings, whether its arm explains it, what is refused."""
+"""The examination of a log: findings, fit to its arm, and refusals."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
@@ -17,9 +17,8 @@ from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.drive import effort_name
-from vftcli.robots.pairing import paired
+from vftcli.robots.pairing import paired, unwound
 from vftcli.robots.robot import Robot
-from vftcli.robots.winding import unwound
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
@@ -45,7 +44,7 @@ ASSUMPTIONS = frozenset({"no-temperature", "temperature-gaps"})
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Examination(Shown):
-    """What the doctor found."""
+    """Findings of the doctor."""
 
     recording: Recording  #: The log.
     findings: tuple[Remark, ...]  #: Warnings before notes.
@@ -172,7 +171,7 @@ class Examiner:
         self._robots: dict[tuple[str, RobotChoice, float | None, bool], Robot] = {}
 
     def robot(self, recording: Recording, choice: RobotChoice) -> Robot:
-        """The robot that is chosen, that the log says, or that its maker's own model tells.
+        """The robot by choice, by the log, or by its maker's own model.
 
         Raises:
             RobotError: If none of these names one; with what each profile leaves unexplained.
@@ -200,7 +199,7 @@ class Examiner:
         *,
         in_stretches: bool = False,
     ) -> Recording:
-        """A log in its robot's joints, its effort read as the model explains it best if it is open.
+        """A log in its robot's joints; an open effort is read by the model's best fit.
 
         Joints go by name, endless ones are unwound, samples that no arm can have made are cut out.
 
@@ -265,7 +264,7 @@ def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
 
 
 def refuse(name: str, findings: Iterable[Remark]) -> None:
-    """Raise an error that says the first of some findings with its remedy, if there is one."""
+    """Raise an error on the first of some findings with its remedy, if any."""
     found = [in_words(finding) for finding in findings]
     if not found:
         return

@@ -1,4 +1,4 @@
-"""Findings: the doctor's remarks, each with its evidence, its consequence and its remedy."""
+"""Findings: the doctor's remarks with evidence, consequence and remedy."""
 
 from collections.abc import Iterable
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ from vftcli.signals.remarks import Remark, Where, as_record, filled, sentence, w
 
 
 class FindingWords(NamedTuple):
-    """What a finding says."""
+    """Text of a finding."""
 
     name: str  #: Short name; variants of one finding share it.
     severity: str  #: A note informs; a warning can make results wrong and fails ``--strict``.

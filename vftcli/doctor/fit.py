@@ -1,4 +1,4 @@
-"""The robot that a log is from, and the findings where it does not explain the log.
+"""The robot of a log, and findings where it does not explain the log.
 
 Every profile's dynamics are held against the torques of the log.
 
@@ -26,7 +26,7 @@ from vftcli.signals.names import EFFORTS
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
-CLOSE = 1.3  #: Profiles whose misfits differ by less than this factor are not distinguished.
+CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #: Misfit up to which a profile fits: the maker's own model, and a measured effort.
 #:
 #: Real logs fit their own arm to .1–1.1 % by the first and to 1.3–12 % by the second.
@@ -88,7 +88,7 @@ def profiles() -> dict[str, Robot]:
 
 
 def guess_robot(recording: Recording) -> tuple[RobotMatch | None, tuple[RobotMatch, ...]]:
-    """The profile that a log is from where the maker's own model settles it, and all fits.
+    """Profile of a log if the maker's own model settles it, and all fits.
 
     A measured effort settles nothing: friction and loads leave too much open.
     """
@@ -128,7 +128,7 @@ def is_judgeable(recording: Recording) -> bool:
 
 
 def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
-    """A robot's fit to the most telling torque of the log, None without any or of other joints.
+    """Robot's fit to the log's best torque; None without any or of other joints.
 
     Args:
         recording: The log.
@@ -156,7 +156,7 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
 
 
 def maker_case(recording: Recording, windows: Windows) -> tuple[str, Case | None]:
-    """The maker's own model of the arm as a log holds it, and its evidence; None where it does not.
+    """The maker's model of the arm in a log, and its evidence; None without one.
 
     A rigid-body model has no friction; torque less the residual has that before the sensor.
     """
@@ -177,7 +177,7 @@ def maker_case(recording: Recording, windows: Windows) -> tuple[str, Case | None
 def arm_findings(
     recording: Recording, robot: Robot | None, known: Iterable[Remark] = ()
 ) -> ArmFindings:
-    """Hold a log against its arm, or against the profiles where nobody says which it is."""
+    """Compare a log with its arm, or with all profiles if nobody names one."""
     known = tuple(known)
     if MISTIMED & {finding.code for finding in known} and recording.dq is not None:
         # From the positions, so that the velocity hides nothing else.

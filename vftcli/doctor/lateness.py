@@ -1,12 +1,12 @@
-"""An effort that is logged later than the motion: the lag at which a model explains it best.
+"""An effort later than the motion: the lag at which a model fits best.
 
-Over short windows weighed by Hann's weights φ the torque that the robot's model needs is linear in
-a few numbers a joint: the model's own torque, dry and viscous friction, and rotor inertia,
+In short windows with Hann's weights φ the torque of the robot's model is linear in a few
+numbers a joint: the model's own torque, dry and viscous friction, and rotor inertia,
 
     ∫φ τ(t + lag) = c₁ ∫(−φ' p − φ (Cᵀq̇ − g)) + c₂ ∫φ tanh(q̇/ε) + c₃ ∫φ q̇ − c₄ ∫φ' q̇.
 
-The differences of neighbouring windows are fitted at every lag, joint by joint: they leave out what
-changes slowly, as a load does. Turns of the motion show the lag.
+Differences of neighbouring windows are fitted at every lag, joint by joint: slow changes,
+such as a load's, drop out. Turns of the motion show the lag.
 """
 
 from collections.abc import Iterator
@@ -25,39 +25,39 @@ from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.rest import MOVES
 from vftcli.signals.series import median_step
 
-WINDOW = 0.15  #: Length of a window; each begins in the middle of the one before. [s]
-#: Windows that are looked at, at most, in blocks of neighbours; and how many a joint needs: 4.5 s
-#: of its motion, of which no push is the most.
+WINDOW = 0.15  #: Length of a window; the next begins in its middle. [s]
+#: Most windows, in blocks of neighbours; and a joint's least: 4.5 s of motion, mostly without
+#: a push.
 WINDOWS, BLOCK, LEAST = 320, 16, 60
-INSIDE = 12  #: Instants of a window at which the model is computed.
-EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01  #: Lags that are tried, and how far apart they are. [s]
-SLOW = 0.01  #: Speed at which dry friction has its direction. [rad/s]
-KEPT = 0.8  #: Share of the differences that a fit is judged by: the rest may be contact.
-#: Growths of a lag that are tried, from one end of what is looked at to the other. [s]
+INSIDE = 12  #: Instants of the model in a window.
+EARLIEST, LATEST, STEP = -0.1, 0.25, 0.01  #: Lags to try, and their step. [s]
+SLOW = 0.01  #: Speed from which dry friction has a direction. [rad/s]
+KEPT = 0.8  #: Share of the differences that judge a fit: the rest may be contact.
+#: Growths of a lag to try, over the part of the log. [s]
 DRIFTS = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4)
-COARSE = 3  #: One in so many lags tells whether any growth is worth a closer look.
-LONG = 60.0  #: Part of a long log that is looked at: a clock .5 % off loses 300 ms in it. [s]
-#: Ratio of rests by which a lag that grows beats a steady one; 1.00 on sound logs.
+COARSE = 3  #: One lag in so many shows whether a growth is worth a closer look.
+LONG = 60.0  #: Part of a long log in use: a clock .5 % off loses 300 ms in it. [s]
+#: Ratio of rests by which a growing lag beats a steady one; 1.00 on sound logs.
 STEADY = 1.1
-LEAST_RATE = 30.0  #: Sample rate below which no lag of that size shows. [Hz]
+LEAST_RATE = 30.0  #: Least sample rate that shows such a lag. [Hz]
 #: Lag that is named: friction behind a turn looks like 20 ms, simulations like 30. [s]
 LATE = 0.035
-BETTER = 1.45  #: Ratio of rests by which a lag beats none, in the mean over joints.
-#: Share and number of the joints with a best lag nearer to it than this share of it; half of
-#: the arm's have to tell one.
+BETTER = 1.45  #: Ratio of rests by which a lag beats none, mean over joints.
+#: Share and number of joints with a best lag within this share of it; half of the arm's must
+#: show one.
 AGREE, ENOUGH, NEAR = 0.65, 3, 0.35
-#: Findings that the logged velocity is another motion's.
+#: Findings on velocities of another motion.
 MISTIMED = frozenset(
     {"time-unit", "clock-rate", "velocity-unit", "velocity-sign", "velocity-mismatch"}
     | {"velocity-of-another-kind", "velocity-order", "velocity-lag", "velocity-filtered"}
     | {"velocity-held", "stuck-velocity"}
 )
-#: Findings with which no effort can be called late.
+#: Findings that exclude a late effort.
 LAGLESS = MISTIMED | {"stuck-position", "stuck-effort"}
 
 
 def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """An effort that is logged later than the motion, or earlier, or by a clock of its own."""
+    """An effort later or earlier than the motion, or on its own clock."""
     late = lateness_of(recording, robot)
     if late is None:
         return
@@ -84,27 +84,27 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
 
 
 def agreed(own: Array, best: float, step: float) -> Mask:
-    """Joints near to the best of all by steps of the trial; none if they are few. (K,)"""
+    """Joints with a lag near the best of all; none if they are few. (K,)"""
     near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
     return np.asarray(near & (near.sum() >= ENOUGH) & (np.mean(near) >= AGREE))
 
 
 class Lateness(NamedTuple):
-    """Pairs of neighbouring windows of a log, with what explains the change between them."""
+    """Pairs of neighbouring windows, with the terms of their difference."""
 
-    lags: Array  #: Lags that are tried. (L,) [s]
+    lags: Array  #: Lags to try. (L,) [s]
     step: float  #: Sample time. [s]
     starts: Indices  #: First samples of the two windows of each pair. (2, W)
-    when: Array  #: When each pair is, from the log's first moment. (W,) [s]
-    model: Array  #: Parts of the change of a joint's torque. (W, n, 4)
+    when: Array  #: Time of each pair from the log's start. (W,) [s]
+    model: Array  #: Parts of a joint's change of torque. (W, n, 4)
     moves: Mask  #: Pairs in which a joint moves. (W, n)
-    effort: Array  #: Means of the effort over the window that begins at each sample. (T', n)
+    effort: Array  #: Mean effort in the window from each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
-        """Rest of each joint's effort beside the model at every lag; NaN at rest. (n, L)
+        """Rest of each joint's effort at every lag; NaN at rest. (n, L)
 
         Args:
-            rate: By how much the lag grows, from these lags at the log's first moment. [s/s]
+            rate: Growth of the lag, from these lags at the log's start. [s/s]
         """
         tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(int)
         rows = np.clip(self.starts[:, None] + tried, 0, len(self.effort) - 1)
@@ -116,7 +116,7 @@ class Lateness(NamedTuple):
         return rest
 
     def drift(self, known: Indices) -> Remark | None:
-        """The finding that the effort's lag grows along the log, None if it does not."""
+        """The finding that the effort's lag grows, None if it does not."""
         span = float(self.when[-1])
         coarse = self._replace(lags=self.lags[::COARSE])
         tried = (0.0, -DRIFTS[1], DRIFTS[1])
@@ -147,7 +147,7 @@ class Lateness(NamedTuple):
 
 
 def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
-    """Windows of a log that show how late its effort is, None where none do."""
+    """Windows that show an effort's lag, None if none do."""
     effort = effort_of(recording)
     if effort is None or recording.dq is None or recording.samples < LEAST:
         return None
@@ -188,9 +188,9 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
 
 
 def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
-    """First samples of windows that lie on an even clock at every lag. (W,)
+    """First samples of windows on an even clock at every lag. (W,)
 
-    The clock is t (T,) [s]; lags go from one number of samples, negative, to another.
+    The clock is t (T,) [s]; lags are in samples, the first negative.
     """
     starts = np.arange(-earliest, len(t) - length - latest, max(1, length // 2))
     starts = starts[spread(len(starts), WINDOWS, BLOCK)]
@@ -201,10 +201,10 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
 
 
 def rest_of(model: Array, effort: Array) -> Array:
-    """Rest of an effort beside a model at every lag, rms over its better samples. (L,)
+    """Rest of an effort at every lag, rms over its better samples. (L,)
 
     Args:
-        model: What the effort is made of. (W, 4)
+        model: Parts of the effort. (W, 4)
         effort: The effort at every lag. (W, L)
     """
     size = np.sqrt(np.mean(model**2, axis=0))
@@ -213,7 +213,7 @@ def rest_of(model: Array, effort: Array) -> Array:
     for _ in range(2):
         solution = np.linalg.lstsq(columns[keep], effort[keep], rcond=1e-8)[0]
         rest = (effort - columns @ solution) ** 2
-        # A sample that no lag explains is contact; one that some lag explains is what tells it.
+        # Contact fits no lag; a sample that fits one lag shows it.
         least = rest.min(axis=1)
         keep = least <= np.quantile(least, KEPT)
     return np.asarray(np.sqrt(rest[keep].mean(axis=0)))

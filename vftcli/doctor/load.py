@@ -41,7 +41,7 @@ RATIO = 0.05
 
 
 def drive_constants(recording: Recording) -> Array:
-    """The controller's own torque per current, target_torque over target_current. (n,) [N·m/A]
+    """Controller's torque per current, target_torque/target_current. (n,) [N·m/A]
 
     Of resting samples, as friction is fed forward in motion; NaN where they carry too little.
     """
@@ -97,7 +97,7 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
 
 
 def load_change(case: Case) -> Remark | None:
-    """The finding that a load is picked up or set down along the log, None without one."""
+    """The finding on a load picked up or set down along the log, or None."""
     count = len(case.given)
     if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
         return None

@@ -1,4 +1,4 @@
-"""Findings about clock and signals: rate, jitter, gaps, missing signals, units and signs."""
+"""Findings on clock and signals: rate, jitter, gaps, missing ones, units, signs."""
 
 from collections.abc import Iterator
 
@@ -160,7 +160,7 @@ def odd_units(recording: Recording) -> Iterator[Remark]:
 
 
 def interpolated(recording: Recording) -> Iterator[Remark]:
-    """Positions and effort that run straight between the few samples that were measured."""
+    """Positions and effort interpolated between few measured samples."""
     if (effort := effort_of(recording)) is None:
         return
     middle = slice(max(0, (recording.samples - SOME) // 2), (recording.samples + SOME) // 2)
@@ -186,7 +186,7 @@ def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
 
 
 def work_shares(recording: Recording, effort: Array) -> Array:
-    """Net work of each joint's effort over its gross work; NaN where it hardly moved. (n,)
+    """Net over gross work of each joint's effort; NaN with little motion. (n,)
 
     Friction makes the drives put energy in; what gravity and inertia take they give back.
     """

@@ -1,4 +1,4 @@
-"""Findings about signals that stand still, are zero, reach a limit or move in coarse steps.
+"""Findings on signals that hold, are zero, reach a limit or move coarsely.
 
 A signal is stuck where it repeats itself to the last bit for half a second while the joint's other
 signals show that it has to change.
@@ -40,7 +40,7 @@ STUCK = {
 
 
 def stuck_findings(recording: Recording) -> Iterator[Remark]:
-    """Joints that never move, and signals that stand still, are zero, clipped or coarse."""
+    """Joints without motion, and signals that hold, are zero, clipped or coarse."""
     t, travel = recording.t, travel_of(recording)
     still = np.flatnonzero(travel < HELD)
     if still.size == recording.joints:
@@ -107,7 +107,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
 
 
 def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:
-    """Where one joint's signal repeats itself for long while its others do not, as above."""
+    """Long repeats of one joint's signal while its others change, as above."""
     t, value = recording.t, getattr(recording, name)
     same = value[1:] == value[:-1]
     names = [n for n in ("q", "dq", *EFFORTS) if n != name]
@@ -142,7 +142,7 @@ def is_bent(t: Array, speed: Array) -> bool:
 
 
 def is_extreme(value: Array, rows: slice) -> bool:
-    """Whether a stretch is at the extreme of an effort that varies: that is saturation.
+    """Whether a stretch is at the extreme of a varying effort: saturation.
 
     One that is long and the only time at its value is none: the effort came to stand there.
     """
@@ -216,7 +216,7 @@ def is_clipped(value: Array, position: Array, least: int = 10) -> bool:
         extreme = up.max()
         at = up == extreme
         count = np.count_nonzero(at)
-        # A drive saturates far from zero; one that often reads the same small value rests.
+        # A drive saturates far from zero; one that often repeats a small value rests.
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
         # The rounded top of a smooth effort of coarse resolution is wide on the next level too.

@@ -7,8 +7,8 @@ import numpy as np
 
 from vftcli.doctor.findings import on_joints
 from vftcli.robots import Robot
-from vftcli.robots.friction import steady_torque
-from vftcli.robots.temperature import friction_factor, measured_temperature
+from vftcli.robots.friction import friction_factor, steady_torque
+from vftcli.robots.running_friction import measured_temperature
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact, warning
@@ -25,7 +25,7 @@ NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
 
 
 def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]:
-    """Whether the log's joints are as warm as those of the model, and whether the log says."""
+    """Whether the log's joints are as warm as the model's, and the log says so."""
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)
@@ -50,7 +50,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
-    """Joints far from the temperature of their model, their friction without a law there.
+    """Joints far from their model's temperature, without a friction law there.
 
     Args:
         recording: The log.

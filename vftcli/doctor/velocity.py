@@ -1,8 +1,8 @@
-"""Findings from the logged velocity beside the change of position: unit, clock, order, lateness.
+"""Findings on logged velocity beside position: unit, clock, order, lateness.
 
-Over short windows the logged velocity is fitted as q̇(t) ≈ a·v(t) − a·τ·v̇(t), where v is the
-derivative of the position: a is its gain and τ the time by which it runs behind. Both sides are
-weighed with a Hann window φ, and ∫φ v̇ dt = −∫φ' v dt: no resampling, no amplified noise.
+Short windows fit the logged velocity as q̇(t) ≈ a·v(t) − a·τ·v̇(t): v is the derivative of
+the position, a the gain, τ the delay. Both sides get Hann's weights φ; by
+∫φ v̇ dt = −∫φ' v dt nothing is resampled and no noise amplified.
 """
 
 from collections.abc import Iterator
@@ -19,73 +19,73 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.rest import MOVES
 
-#: Length of a window: short beside motion, long beside the noise of single samples and an arm's
+#: Length of a window: short beside motion, long beside noise of single samples and an arm's
 #: vibration. [s]
 WINDOW = 0.2
-#: Steps of a window of a slow log, and of a fast one, which is thinned.
+#: Steps of a window of a slow log, and of a fast one after thinning.
 LEAST_STEPS, MOST_STEPS = 8, 40
-#: Sample times beyond which the clock's unit may be another one than was read [s], and the
-#: steps of a window then.
+#: Sample times beyond which the clock's unit is in doubt [s], and a window's
+#: steps then.
 USUAL, UNUSUAL_STEPS = (2e-4, 0.05), 50
-#: Windows looked at, at most; of a short log; and how many tell anything.
+#: Most windows; those of a short log; least windows with motion.
 WINDOWS, WANTED, LEAST = 600, 12, 8
-#: Windows that a joint's motion has to be spread over, and its turns: one or two tell no error.
+#: Least windows of a joint's motion, least turns: one or two show no error.
 SPREAD, TURNS = 5.0, 3.0
-#: Share of the turns of a position that the logged velocity has to show to tell its lag by them.
+#: Least share of the position's turns in the velocity, for its lag.
 TELLING = 0.1
-#: Deviation of the gain from 1 that is named; sound logs, real and simulated, stay within 0.004.
+#: Deviation of the gain from 1 that is named; sound logs stay within 0.004.
 GAIN = 0.02
-SURE = 4.0  #: Standard errors by which a deviation has to exceed its limit as well.
-#: Lag that is named, or a sample time where that is longer: a robot's own velocity filter takes
-#: 2–3 ms, a host's stamps up to 6. [s]
+SURE = 4.0  #: Standard errors, too, that a deviation must exceed.
+#: Lag that is named, or a longer sample time: a robot's velocity filter needs 2–3 ms, a
+#: host's stamps up to 6. [s]
 LATE = 0.008
-#: Ratio of open shares by which another joint's position wins over the joint's own with a lag, and
-#: how far the gain of the joint's own may be off for that to count.
+#: Ratio of open shares at which another joint's position beats the own with a lag, and the
+#: largest gain error of the own for this.
 ANOTHER, ALIKE = 0.25, 0.3
-OPEN = 0.1  #: Share of a velocity that its own position may leave open for its gain to count.
-DAMPED_MOST = 0.15  #: Gain below which a velocity is no late one but of another size.
-#: Loss of a velocity's square by a filter that can be seen: sound logs lose up to 0.0065.
+OPEN = 0.1  #: Largest open share of a velocity for its gain to count.
+DAMPED_MOST = 0.15  #: Below this gain a velocity is not late: its size differs.
+#: Least visible loss of a velocity's square by a filter; sound logs lose up to 0.0065.
 DAMPED = 0.01
-WIDE = 0.15  #: Deviation from a factor between units by which it still is that factor.
-#: Degrees in a radian; by which a factor still is that: gears of 50 and 51 are common.
+WIDE = 0.15  #: Tolerance of a factor between units.
+#: Degrees in a radian, and tolerance: gears of 50 and 51 are common.
 DEGREES, CLOSE = 180 / np.pi, 0.06
-#: Gain, or its inverse, from which a velocity is another quantity, no filter or clock.
+#: Gain, or its inverse, of another quantity: no filter, no clock.
 BEYOND = 1.5
-#: Gain from which a gear, and no clock, makes the velocities too large: arms have 30 to 160.
+#: Gain of a gear, not of a clock: arms have 30 to 160.
 GEARED = 10.0
-#: Gain → the unit of the stamps; milliseconds read as seconds make the derivative a thousand times
+#: Gain → unit of the stamps; milliseconds read as seconds make the derivative a thousand times
 #: too small.
 UNITS = {1e3: "ms", 1e6: "us", 1e9: "ns", 1e-3: "s", 1e-6: "s", 1e-9: "s"}
-#: Share of the moving steps in which a velocity repeats itself, from which it is held: one in two
-#: are those of half the rate, and sound logs repeat up to a third.
+#: Share of moving steps with a repeated velocity that is held: half the rate repeats one in two,
+#: sound logs up to a third.
 HELD = 0.55
-TINY = 1e-300  #: Least divisor: what it divides is 0 too.
-STEPS, BLOCK = 8000, 500  #: Steps that are looked at, at most, in blocks.
-CRUISE = 0.2  #: A velocity that repeats itself for longer may be a constant one. [s]
+TINY = 1e-300  #: Least divisor; the dividend is 0 too.
+STEPS, BLOCK = 8000, 500  #: Most steps, in blocks.
+CRUISE = 0.2  #: Longer repeats may be a constant velocity. [s]
 
 
 class VelocityFit(NamedTuple):
-    """The logged velocities as gain and lag of the positions' derivative; NaN where at rest."""
+    """Gain and lag of logged velocities against positions; NaN at rest."""
 
-    gain: Array  #: Logged velocity over the derivative of the position, a. (n,)
+    gain: Array  #: Logged velocity over the derivative, a. (n,)
     lag: Array  #: Delay of the logged velocity, τ. (n,) [s]
     gain_error: Array  #: Standard error of the gain. (n,)
     lag_error: Array  #: Standard error of the lag. (n,) [s]
-    open: Array  #: Share of the logged velocity that the fit leaves open, by its square. (n,)
-    amplitude: Array  #: Size of the logged velocity over that of the derivative. (n,)
-    rate: Array  #: Typical rate of change of the motion, rms v̇ over rms v. (n,) [1/s]
-    #: Every logged velocity over every position's derivative: row i by column j. (n, n)
+    open: Array  #: Open share of the velocity's square. (n,)
+    amplitude: Array  #: Size of the velocity over the derivative's. (n,)
+    rate: Array  #: Rate of the motion, rms v̇ over rms v. (n,) [1/s]
+    #: Every velocity over every position's derivative: row i by column j. (n, n)
     factor: Array
-    share: Array  #: Share of the velocity left open then, by its square. (n, n)
+    share: Array  #: Open share of its square then. (n, n)
 
     @property
     def known(self) -> Mask:
-        """Joints that moved enough to be judged. (n,)"""
+        """Joints with enough motion. (n,)"""
         return np.isfinite(self.gain)
 
 
 def velocity_fit(recording: Recording) -> VelocityFit | None:
-    """Fit of the logged velocities by the positions; None of a short log or without any."""
+    """Fit of velocities by positions; None for a short log or none logged."""
     if recording.dq is None or recording.samples <= LEAST * LEAST_STEPS:
         return None
     means = weighed_means(recording)
@@ -107,14 +107,14 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
     """The first seven fields of `VelocityFit` for one joint. (7,)
 
     Args:
-        v: The derivative of the position. (W,) [rad/s]
-        logged: The logged velocity. (W,) [rad/s]
+        v: Derivative of the position. (W,) [rad/s]
+        logged: Logged velocity. (W,) [rad/s]
         w: −v̇ by the position. (W,) [rad/s²]
-        logged_w: −q̈ by the logged velocity. (W,) [rad/s²]
+        logged_w: −q̈ by the velocity. (W,) [rad/s²]
     """
     size, total = v @ v, logged @ logged
     rest, turn, tool = (x - v * (v @ x) / size for x in (logged, w, logged_w))
-    # Noise of the positions would hide a lag; that of the logged velocities is another one.
+    # Positions' noise would hide a lag; velocities' noise is independent.
     if (tool @ turn) ** 2 < TELLING * (tool @ tool) * (turn @ turn):
         tool = turn
     common = tool @ turn
@@ -123,13 +123,13 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
     left = logged - gain * v - delay * w
 
     def error(x: Array) -> float:
-        """Standard error of x·left, where the fast windows may be the worse ones as well."""
+        """Standard error of x·left; fast windows may be worse."""
         each = x * left
         return float(np.sqrt(np.maximum(left @ left * (x @ x) / (len(v) - 2), each @ each)))
 
-    # What v and v̇ have in common, in a short log, both may explain.
+    # In a short log v and v̇ may explain one part twice.
     apart = max(float(turn @ turn / (w @ w or 1.0)), 1e-6)
-    # One hard stop tells no lag, however little it leaves open.
+    # One hard stop shows no lag.
     tells = common * gain and spread_of(turn) > TURNS
     return np.array(
         [
@@ -145,15 +145,15 @@ def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
 
 
 def spread_of(v: Array) -> Array:
-    """Over how many windows a motion is spread, (Σv²)²/Σv⁴, column by column."""
+    """Number of windows with the motion, (Σv²)²/Σv⁴, per column."""
     return np.asarray(np.sum(v**2, axis=0) ** 2 / np.maximum(np.sum(v**4, axis=0), TINY))
 
 
 def weighed_means(recording: Recording) -> Array:
-    """Means by Hann's weights over windows spread over the log. (4, W, n)
+    """Hann-weighted means over windows spread over the log. (4, W, n)
 
-    Of the derivative v of the position, of the logged velocity [rad/s], then −v̇ by the one and by
-    the other [rad/s²]. Windows across a gap or of tiny steps are left out.
+    Of the position's derivative v, the logged velocity [rad/s], then −v̇ by the first and the
+    second [rad/s²]. Windows across a gap or of tiny steps are left out.
     """
     t, dq, step = recording.t, recording.require("dq"), recording.median_step
     length = round(WINDOW / step) if USUAL[0] < step < USUAL[1] else UNUSUAL_STEPS
@@ -174,7 +174,7 @@ def weighed_means(recording: Recording) -> Array:
 
 
 def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """Findings on the logged velocity, the likeliest cause alone where one explains all."""
+    """Findings on the velocity; a single cause if one explains all."""
     if fit is None:
         return
     if (common := common_cause(fit)) is not None:
@@ -192,17 +192,17 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
 
 
 def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Remark]:
-    """Joints with a velocity that runs behind, or is of another size, each by itself.
+    """Findings on joints with a late velocity or another size.
 
     Args:
         fit: The fit.
-        judged: The joints that nothing else explains. (n,)
-        limit: Lag from which one is late. [s]
+        judged: Joints without another cause. (n,)
+        limit: Least lag of a late one. [s]
     """
     gain, sure = fit.gain, SURE * fit.gain_error
     late = judged & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (gain > DAMPED_MOST)
     if late.any():
-        # Of the square of a motion of rate ω a first-order filter of time constant τ leaves
+        # Of a squared motion of rate ω a first-order filter of time constant τ leaves
         # 1/(1 + ω²τ²), a delay all.
         share = median(fit.rate[late] * fit.lag[late]) ** 2
         lost = median(1 - fit.amplitude[late] ** 2)
@@ -224,7 +224,7 @@ def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Re
 
 
 def quantity_of(fit: VelocityFit, joint: int) -> str:
-    """Quantity in the place of a joint's velocity in rad/s, by its gain."""
+    """Quantity logged as a joint's velocity, by its gain."""
     gain = fit.gain[joint]
     if abs(gain) * BEYOND < 1 and fit.share[joint, joint] > OPEN > fit.open[joint]:
         return "the joint's acceleration"
@@ -234,7 +234,7 @@ def quantity_of(fit: VelocityFit, joint: int) -> str:
 
 
 def common_cause(fit: VelocityFit | None) -> Remark | None:
-    """The fault of all velocities alike: the clock's unit or rate, or degrees; else None."""
+    """The fault of all velocities: clock's unit or rate, or degrees; else None."""
     factor = common_factor(fit) if fit is not None else None
     if factor is None:
         return None
@@ -250,7 +250,7 @@ def common_cause(fit: VelocityFit | None) -> Remark | None:
 
 
 def common_factor(fit: VelocityFit) -> float | None:
-    """The gain that all joints share; None where they differ or a velocity is another motion's."""
+    """The gain of all joints; None if they differ or follow another motion."""
     known = fit.known & (fit.open < OPEN)
     if 2 * known.sum() <= fit.known.sum():
         return None
@@ -258,34 +258,34 @@ def common_factor(fit: VelocityFit) -> float | None:
     middle = median(gains)
     if not np.all(np.abs(gains - middle) < GAIN * abs(middle) / 2 + SURE * errors):
         return None
-    # What a lag takes from the gain, as a delay or as a filter, is no factor of the clock.
+    # A lag lowers the gain, as delay or filter: no clock's factor.
     lost = np.max((fit.rate * fit.lag)[known] ** 2) + SURE * median(errors)
     return 1.0 if abs(middle - 1) < lost else middle
 
 
 def in_degrees(factor: float) -> bool:
-    """Whether a gain is that of degrees beside radians, one way or the other."""
+    """Whether a gain is degrees over radians, or its inverse."""
     return any(abs(factor / unit - 1) < CLOSE for unit in (DEGREES, 1 / DEGREES))
 
 
 def exchanged(fit: VelocityFit) -> list[int]:
-    """Joints with the velocity of another joint's position, and those others."""
+    """Joints with another joint's velocity, and those others."""
     close = np.abs(fit.gain - 1) < ALIKE
     own = np.where(close, fit.open, 1.0)
     fits = np.where(np.abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
     fits[:, ~fit.known] = 1.0
     np.fill_diagonal(fits, 1.0)
     others = np.flatnonzero(fits.min(axis=1) < np.minimum(ANOTHER * own, OPEN))
-    # A joint at rest has no velocity to be recognised by where it was written instead.
+    # A joint at rest has no velocity to recognise elsewhere.
     written = np.argmin(fits[others], axis=1)
     found = np.union1d(others, written[~close[written]]).tolist()
     return found if len(found) > 1 else []
 
 
 def held_shares(recording: Recording) -> dict[int, float]:
-    """Joints with a velocity that stays for some samples and then jumps while they move on.
+    """Joints with a velocity that holds, then jumps, while they move.
 
-    Each with the share of its moving steps in which its velocity repeats itself, for short. [%]
+    Each with the share of moving steps of a velocity held for short. [%]
     """
     t, q, dq = recording.t, recording.q, recording.require("dq")
     first = spread(recording.samples - 1, STEPS, BLOCK)

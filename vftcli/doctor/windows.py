@@ -1,4 +1,4 @@
-"""The torque that a robot's model needs over short windows of a log, and least squares over them.
+"""Model torque over short windows of a log, and least squares over them.
 
 Over a window of 0.3 s the mean of ṗ − Cᵀq̇ is the torque of inertia, since ṗ = Cᵀq̇ − g + τ, and no
 acceleration has to be differentiated. Gravity is kept apart, as a matrix times the direction that
@@ -203,7 +203,7 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
 
 
 def spread(count: int, most: int, block: int = 1) -> Indices:
-    """Numbers of at most so many things, evenly spread in blocks of neighbours. (≤ most,)"""
+    """At most so many numbers, evenly spread in blocks of neighbours. (≤ most,)"""
     if count <= most:
         return np.arange(count)
     first = np.linspace(0, count - block, most // block).astype(int)
@@ -225,7 +225,7 @@ def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
 
 
 def gravity_by_up(chain: Chain, q: Array) -> Array:
-    """Torque that holds the arm in poses q (N, n) [rad], by the components of "up". (N, n, 3) [N·m]
+    """Holding torque at poses q (N, n) [rad] by components of "up". (N, n, 3) [N·m]
 
     It is linear in "up", the third axis of which is the chain's own, −gravity.
     """

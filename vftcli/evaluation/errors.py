@@ -269,7 +269,7 @@ class PoolMember(NamedTuple):
 
     robot: str  #: The arm's name.
     estimates: Sequence[ExternalTorque]  #: One an observer.
-    reference: ExternalTorque  #: On the same clock.
+    reference: ExternalTorque  #: On the estimate's clock.
 
 
 def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:

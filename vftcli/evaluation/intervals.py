@@ -1,4 +1,4 @@
-"""Confidence intervals of an RMSE of errors that follow one another: moving-block bootstrap.
+"""Confidence intervals of an RMSE of correlated errors: block bootstrap.
 
 Paired, it also tells whether one observer is better than another, or was lucky.
 """
@@ -16,7 +16,7 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
 REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
-SEED = 20250811  #: Seed of every bootstrap: the same log gives the same interval.
+SEED = 20250811  #: Seed of every bootstrap: a log has one interval.
 #: Most blocks in a repetition: more change nothing but the time it takes.
 MOST_BLOCKS = 300
 #: Fewest blocks in a repetition, however long errors remember.
@@ -37,7 +37,7 @@ SIGNIFICANCE: dict[str, type[pl.DataType]] = {
     "high_Nm": pl.Float64,
     "p": pl.Float64,
 }
-SAME = 1e-9  #: RMSEs that differ by less than this share are the same number twice.
+SAME = 1e-9  #: RMSEs closer than this share are one number.
 
 
 class Resampled(NamedTuple):
@@ -48,7 +48,7 @@ class Resampled(NamedTuple):
 
 
 def resample(squares: Array, length: int) -> Resampled:
-    """Mean squares of moving-block bootstrap repetitions; all columns share the same blocks.
+    """Mean squares of moving-block bootstrap repetitions; all columns share blocks.
 
     Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
     series closed to a ring, so that every sample counts alike (Politis and Romano's circular
@@ -70,7 +70,7 @@ def resample(squares: Array, length: int) -> Resampled:
 
 
 def block_lengths(squares: Array) -> NDArray[np.intp]:
-    """Length of the blocks for each column: `MEMORY` times its correlation time. (m,) [samples]"""
+    """Block length per column: `MEMORY` correlation times. (m,) [samples]"""
     samples = len(squares)
     longest = max(1, samples // LEAST_BLOCKS)
     shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
@@ -79,7 +79,7 @@ def block_lengths(squares: Array) -> NDArray[np.intp]:
 
 
 def correlation_time(x: Array) -> Array:
-    """Integral of each column's autocorrelation up to its first value below 0.05. (m,) [samples]
+    """Autocorrelation's integral up to its first value below 0.05. (m,) [samples]
 
     1 for white noise. Lags: `FIRST_LAGS`, then fourfold until every column has fallen or half of
     the log is reached.
@@ -153,7 +153,7 @@ def paired_significance(
 def p_value(first: Array, second: Array) -> float:
     """Two-sided p that two mean squares differ by chance, from paired draws.
 
-    At least one over the number of draws; 1 where both are the same number.
+    At least one over the number of draws; 1 where both numbers are equal.
     """
     size = max(float(np.mean(np.abs(first))), float(np.mean(np.abs(second))), 1e-300)
     if np.max(np.abs(first - second)) <= SAME * size:

@@ -39,7 +39,7 @@ class Judgement(NamedTuple):
 def with_measured_gap(
     remarks: Sequence[Remark], errors: pl.DataFrame, tunings: Mapping[str, Tuning]
 ) -> tuple[Remark, ...]:
-    """Remarks in which what the paper's gains cost is measured, where both sides of it ran."""
+    """Remarks on the measured cost of the paper's gains, where both sides ran."""
     means = joint_means(errors).errors
     delays = {name: tunings[name].delay for name in PAPER if name in means}
     if not delays or BEST not in means:
@@ -64,7 +64,7 @@ def judge(
         estimates: The observers' torques.
         sensed: Their wrenches, or None.
         choice: Which reference.
-        told: What is known of the log's contacts, None for nothing.
+        told: Known contacts of the log, None for none.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.

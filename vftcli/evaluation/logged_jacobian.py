@@ -46,7 +46,7 @@ class JacobianJudgement:
 def judge_jacobian(
     log: JacobianLog, asked: WrenchChoice | None, reference: str | None
 ) -> JacobianJudgement:
-    """Solve the vendor's torques for a wrench and, if asked, compare it with the sensor's."""
+    """Wrench of the vendor's torques, compared with the sensor's if asked."""
     zero = asked.zero if asked is not None else ZeroChoice()
     if asked is not None and asked != WrenchChoice(zero=ZeroChoice(spans=zero.spans)):
         raise ParameterError(
@@ -87,7 +87,7 @@ def judge_jacobian(
 
 
 def sensor_of(log: JacobianLog, ours: Wrench, zero: ZeroChoice) -> tuple[Compared, Remark]:
-    """The sensor's wrench in the Jacobian's axes, their order and signs fitted, and as torques."""
+    """Sensor's wrench in the Jacobian's axes, order and signs fitted; torques."""
     if log.wrench is None:
         raise MissingSignalError(
             f"{log.name}: the log has no wrench of a sensor to compare with. Name its columns with "

@@ -111,7 +111,7 @@ class Comparison:
         return [fact("print-one-filter", where, printed_Nm=float(printed.max()))]
 
     def kalman_delay(self) -> list[Remark]:
-        """The noise convention sets the Kalman filters' bandwidth, and with it the ranking."""
+        """The noise convention decides the Kalman bandwidth, and the ranking."""
         tuning = self.tunings.get("kfo-fe")
         if tuning is None or "kfo-fe" not in self.names:
             return []

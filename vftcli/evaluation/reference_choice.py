@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.option import COMPARE, Choice, Option
@@ -19,7 +19,7 @@ class ReferenceChoice(Choice):
         ReferenceTorqueError: If there is no such reference.
     """
 
-    GROUP: ClassVar[str] = COMPARE
+    GROUP = COMPARE
 
     #: One of `NAMES`, or ``file:PATH``.
     name: Annotated[

@@ -1,4 +1,4 @@
-"""ReferenceLoad: torque that estimates are judged by, and what makes it."""
+"""ReferenceLoad: reference torques and their sources."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -57,7 +57,7 @@ class ShownContact(NamedTuple):
 
 
 def touches(run: Run) -> tuple[ShownContact, ...]:
-    """The contacts that a log shows, in the order of time; what it does not show may still be.
+    """Contacts seen in a log, in order of time; unseen ones may exist.
 
     The torque that the model leaves open is low-passed and compared with its own quiet level:
     friction that is missed spreads over a log, a contact sticks out.
@@ -85,7 +85,7 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
 
 
 def touched_remarks(run: Run) -> tuple[Remark, ...]:
-    """A warning where a log that is to be free shows contact, with the longest span without.
+    """A warning on contact in a supposedly free log, with its longest free span.
 
     It may be friction as well: who says that nobody touched the arm is believed.
     """
@@ -133,7 +133,7 @@ def zero_reference(log: Run) -> ReferenceLoad:
 
 
 def vendor_reference(recording: Recording) -> ReferenceLoad:
-    """The vendor's own estimate in the log, torque on the robot; its error is not known."""
+    """The vendor's estimate in the log, torque on the robot, of unknown error."""
     tau = recording.require("tau_ext")
     remarks = (caution("reference-vendor"),)
     return ReferenceLoad(
@@ -171,7 +171,7 @@ def file_reference(
     about the flange point unless ``wrench[FRAME]=…`` in the columns says otherwise.
     """
     table = read_reference(path, columns)
-    # The recording counts from its first sample, a reference file from the same zero as the log.
+    # The recording counts from its first sample, a reference file from the log's zero.
     t = table.t - recording.source.t0
     name = f"file:{path.name}"
     wrench = None

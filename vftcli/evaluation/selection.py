@@ -1,4 +1,4 @@
-"""The paper's guidelines for choosing an observer (Sec. IV-A), as facts computed on a log."""
+"""The paper's guidelines for an observer (Sec. IV-A), as facts of a log."""
 
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -72,7 +72,7 @@ def facts(
 
 
 def step_response(observer: Observer, step: float, joints: int) -> Array:
-    """Time until the estimate of a unit step reaches 90 %, NaN if it never does. (n,) [s]
+    """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]
 
     The step begins after the first sample; its momentum is the integral of it.
     """
@@ -84,7 +84,7 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
 
 
 def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:
-    """The paper's three guidelines with the observers that are best by each on this log."""
+    """The paper's three guidelines with the best observers on this log."""
     return (
         Advice(
             "collision detection",

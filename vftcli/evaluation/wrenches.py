@@ -75,7 +75,7 @@ def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | Non
 
 
 def with_wrenches(errors: pl.DataFrame, recording: str, sensed: SensorReading) -> pl.DataFrame:
-    """The joints' errors, and below them the wrenches' where a reference wrench is known."""
+    """The joints' errors, then the wrenches' if a reference wrench is known."""
     if sensed.reference is None:
         return errors
     rows = evaluate_wrenches(recording, sensed.wrenches, sensed.reference)

@@ -1,4 +1,4 @@
-"""Friction fitted on free motion alone: contacts left out, another robot doubted."""
+"""Friction fitted on free motion: contacts left out, another robot doubted."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -22,30 +22,30 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.rest import SLIDES, slower
 from vftcli.signals.series import median_step
 
-TOUCH = 7.0  #: Residual that counts as contact, in robust standard deviations of its joint.
+TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
 TOUCH_TIME = 0.15  #: Time it must last. [s]
 TOUCH_MARGIN = 0.3  #: Time left out before and after. [s]
-#: Share of the torque's variation that the profile's links and fitted friction must explain in the
-#: joints that carry weight; with the right robot it is 0.99 or more.
+#: Least share of the torque's variation that profile links and friction explain in the
+#: joints with weight; 0.99 or more with the right robot.
 WRONG = 0.95
-LOAD_EXPLAINS = 0.8  #: Share of the profile's misfit that a suspected load explains.
-UNKNOWN_LOAD = 0.5  #: Smallest load that is suspected. [kg]
-#: A joint carries the arm's weight if its gravity torque varies by this share of the largest.
+LOAD_EXPLAINS = 0.8  #: Least share of the misfit that a load explains.
+UNKNOWN_LOAD = 0.5  #: Smallest suspected load. [kg]
+#: A joint carries weight if its gravity torque varies by this share of the largest.
 HEAVY = 0.1
-#: Times what free links leave from which on the profile's links are another arm's: of right ones
-#: 1.0 to 2.5 where friction or contact hide the torque, of wrong ones 4 to 12.
+#: Least ratio of the profile's rest to free links' for another arm: right links leave 1.0 to 2.5
+#: where friction or contact hide the torque, wrong ones 4 to 12.
 OTHER_LINKS = 3.0
-THIRDS = 3  #: Stretches in which a log's friction is compared, for a warm-up.
-#: Share by which dry friction falls from the first to the last stretch of a warm-up.
+THIRDS = 3  #: Stretches of a log compared for a warm-up.
+#: Least fall of dry friction from the first to the last stretch.
 DRIFT = 0.05
-LEAST = 0.1  #: Smallest such fall. [N·m]
+LEAST = 0.1  #: Least such fall. [N·m]
 
 
 class CleanFit(NamedTuple):
     """Friction fits of free motion."""
 
-    data: Training  #: The training data, contacts without weight.
-    fits: list[JointFit | None]  #: One a joint, None where it does not move.
+    data: Training  #: Training data, contacts at weight 0.
+    fits: list[JointFit | None]  #: One a joint, None at rest.
     remarks: list[Remark]  #: Contacts, drift and doubts.
 
 
@@ -53,7 +53,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     """Friction fitted twice, the second time without contacts.
 
     Raises:
-        IdentificationError: If other links explain what the profile's do not, and it is `strict`.
+        IdentificationError: If it is `strict` and only other links explain the torque.
     """
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
@@ -84,7 +84,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
                 f"{doubts[0]}. Choose another --robot, find the load with --find-payload, or let "
                 "--method base identify the links too"
             )
-        # What other links would not explain either is not the links' fault.
+        # Links are not at fault for torque that no links explain.
         doubts = [doubt for doubt in doubts if doubt.code != "unexplained-torque"]
         doubts.append(caution("noisy-effort", ratio=ratio))
     for doubt in doubts:
@@ -95,27 +95,27 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
 
 
 class ContactSpan(NamedTuple):
-    """A stretch in which something seems to touch the arm."""
+    """A stretch of probable contact."""
 
     start: float  #: First instant. [s]
     stop: float  #: Last instant. [s]
-    joint: int  #: Joint with the largest residual, from 1.
+    joint: int  #: Joint of the largest residual, from 1.
     size: float  #: Its residual there. [N·m]
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
-    """Stretches with a residual far outside the rest of the log, neighbours joined.
+    """Stretches with a residual far above the log's, neighbours joined.
 
-    Near a reversal a joint may stick: only what exceeds its dry friction counts there.
+    Near a reversal a joint may stick: only torque above dry friction counts.
 
     Args:
         motion: The prepared log.
-        residual: Torque that the fitted model does not explain. (M, n) [N·m]
+        residual: Torque that the model leaves. (M, n) [N·m]
         dry: Coulomb torque of each joint. (M, n) [N·m]
     """
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
-    # The filter spreads what happens at standstill over a period of its cutoff.
+    # The filter spreads an event at standstill over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.processing.cutoff * median_step(motion.t))))
     sticks = near(slower(motion.dq, SLIDES), reach)
     excess = np.maximum(np.abs(residual) - np.abs(dry) * sticks, 0.0)
@@ -134,7 +134,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
 
 
 def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Array:
-    """Dry friction of each joint along a log by its fit, load included. (M, n) [N·m]"""
+    """Dry friction of each joint by its fit, with load. (M, n) [N·m]"""
     load = log.columns.load[log.motion.kept]
     out = np.zeros(load.shape)
     for j, fit in enumerate(fits):
@@ -144,10 +144,10 @@ def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Ar
 
 
 def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
-    """Residual of the profile's links over that of free ones, of heavy joints. (h,) [1]
+    """Rest of the profile's links over free ones', heavy joints. (h,) [1]
 
-    All inertial parameters are let go, be they physical or not, the structure of the friction
-    held: what they leave is what no links explain, the noise of this log.
+    All inertial parameters are free, physical or not; the friction's structure is fixed.
+    No links explain the rest: it is this log's noise.
     """
     shapes = tuple(Shape(()) if fit is None else fit.shape for fit in fits)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)
@@ -168,7 +168,7 @@ def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
 
 
 def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
-    """Weighted RMS of each joint over all logs; 0 of no weight. (n,) [N·m]"""
+    """Weighted RMS of each joint over all logs; 0 without weight. (n,) [N·m]"""
     weights = np.concatenate([log.weights for log in data.logs])
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
     value: Array = np.sqrt(square / np.maximum(np.sum(weights, axis=0), 1e-12))
@@ -183,13 +183,13 @@ def heavy_joints(data: Training) -> Mask:
 
 
 def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """Remarks on torque that the profile's links and fitted friction do not explain."""
+    """Remarks on torque that profile links and friction leave."""
     doubts = list[Remark]()
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
         tau, name = log.motion.tau, log.motion.recording.name
-        # A load is looked for in what the profile leaves before friction is fitted: Coulomb
-        # friction would take some of it up.
+        # Look for a load before friction is fitted: Coulomb friction would absorb
+        # some of it.
         mass, explained = apparent_load(robot, log.motion, tau - (log.rigid + log.losses))
         if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
             load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}
@@ -206,9 +206,9 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 
 
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """Remarks on logs with friction that falls from third to third.
+    """Remarks on logs in which friction falls from third to third.
 
-    What the fit leaves along the direction is what a third has beyond the whole log's dry friction.
+    The fit's rest along the direction is a third's dry friction beyond the log's.
     """
     models = [JointFriction() if fit is None else fit.friction for fit in fits]
     dry = dry_friction(models, data.robot.joints)

@@ -1,4 +1,4 @@
-"""Friction, rotor inertia and drive constant of each joint, the links held."""
+"""Friction, rotor inertia and drive constant per joint, links fixed."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from vftcli.signals.rest import MOVES
 PLAIN = ("coulomb", "viscous", "offset")
 CURVED = ("coulomb", "logarithmic", "offset")
 RICHEST = (*PLAIN, "quadratic", "load_coulomb")
-#: Sets of friction terms that compete, simplest first.
+#: Sets of friction terms to compare, simplest first.
 CANDIDATES: tuple[tuple[str, ...], ...] = (
     ("coulomb", "offset"),
     PLAIN,
@@ -38,30 +38,30 @@ CANDIDATES: tuple[tuple[str, ...], ...] = (
     (*CURVED, "stribeck"),
     (*CURVED, "stribeck", "load_coulomb"),
 )
-#: Presliding lengths that compete with none, one for the whole arm. [rad]
+#: Presliding lengths compared with none, one for the whole arm. [rad]
 PRESLIDING_LENGTHS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
-#: Terms that may be beside the points of a bent line.
+#: Terms allowed beside the points of a bent line.
 BESIDE_POINTS = (("offset",), ("offset", "load_coulomb"))
-#: Terms that would push the joint along with a negative value.
+#: Terms that push the joint if negative.
 NEVER_NEGATIVE = ("coulomb", "presliding", "load_coulomb", "stribeck")
-#: Terms bounded at zero in the fit of a joint for which no candidate is friction.
+#: Terms bounded at zero if no candidate of a joint is friction.
 BOUNDED = ("coulomb", "viscous")
 
-#: Velocities are turned where both terms push, so that the bound leaves this many times the power,
-#: by more than this share of the joint's largest torque: of right ones a model's error pushes by up
-#: to .7 % of it, while friction is 2 % (a Panda's wrist) to 20 % (a UR's).
+#: Velocities are reversed if both terms push, the bound leaves this many times the power,
+#: and by more than this share of the joint's largest torque: a right model's error pushes by up
+#: to .7 % of it; friction is 2 % (a Panda's wrist) to 20 % (a UR's).
 TURNED, PUSH = 2.0, 0.02
 
-SLIDING = 3e-3  #: Smoothing of the sign where presliding says what happens around rest. [rad/s]
+SLIDING = 3e-3  #: Smoothing of the sign beside presliding. [rad/s]
 #: Band in which the presliding length is judged: observers of 3 … 10 1/s pass .5 … 1.6 Hz. [Hz]
 LISTENING = 2.0
-MARGIN = 1.01  #: A simpler model is preferred within this factor of the best error.
-#: A shorter presliding length within this factor of the best is preferred, and none to all.
+MARGIN = 1.01  #: A simpler model wins within this factor of the best error.
+#: A shorter presliding length wins within this factor of the best, none over all.
 LENGTH_MARGIN = 1.02
-LIGHT = 1.0  #: Spread of the gravity torque below which growth with load cannot be seen. [N·m]
-#: Share of a fit's error below which the profile's friction is kept.
+LIGHT = 1.0  #: Least spread of gravity torque that shows growth with load. [N·m]
+#: Share of a fit's error below which the profile's friction stays.
 KEPT = 0.85
-#: Relative standard deviation up to which a drive constant is fitted to free motion.
+#: Largest relative standard deviation of a drive constant from free motion.
 CONSTANT_KNOWN = 0.02
 
 
@@ -69,7 +69,7 @@ class PreslidingScore(NamedTuple):
     """The presliding length of an arm."""
 
     length: float  #: The chosen one, 0 for none. [rad]
-    #: Cross-validated error of every length over that of none, root of the mean square over the
+    #: Cross-validated error of every length over that of none, root mean square of the
     #: joints.
     errors: dict[float, float]
 
@@ -78,17 +78,17 @@ class JointData(NamedTuple):
     """The equations of one joint, over all training logs."""
 
     joint: int  #: Joint, from 0.
-    y: Array  #: Torque that friction and rotor shall explain. (M,) [N·m]
-    #: Columns beside friction: q̈ where the rotor inertia is sought, the rigid-body torque where
-    #: the drive constant is. (M, f)
+    y: Array  #: Torque of friction and rotor. (M,) [N·m]
+    #: Columns beside friction: q̈ for an unknown rotor inertia, the rigid-body torque for an
+    #: unknown drive constant. (M, f)
     fixed: Array
-    weights: Array  #: 0 where a sample says nothing, 1 elsewhere. (M,)
+    weights: Array  #: 0 for empty samples, 1 elsewhere. (M,)
     sources: Sequence[FrictionColumns]  #: Friction columns of each log.
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
-    speed_limit: float  #: Speed up to which its friction may not fall. [rad/s]
-    torque_limit: float = 0.0  #: The joint's largest torque, 0 if not known. [N·m]
-    #: Torque of the profile's friction and rotor; None where they do not compete. (M,) [N·m]
+    speed_limit: float  #: Its friction may not fall up to this speed. [rad/s]
+    torque_limit: float = 0.0  #: The joint's largest torque, 0 if unknown. [N·m]
+    #: Torque of the profile's friction and rotor; None if not compared. (M,) [N·m]
     profile: Array | None = None
 
     @property
@@ -104,7 +104,7 @@ class JointData(NamedTuple):
         return left_out(lengths, [speed > MOVES for speed in self.speeds])
 
     def slow(self, signals: Array) -> Array:
-        """Signals in the band in which an observer listens, each log by itself. (M, k)"""
+        """Signals in an observer's band, each log by itself. (M, k)"""
         motions = [source.motion for source in self.sources]
         cuts = np.cumsum([motion.samples for motion in motions])[:-1]
         return np.concatenate(
@@ -122,21 +122,21 @@ class JointData(NamedTuple):
         return np.hstack([friction, self.fixed])
 
     def fit(self, shape: Shape) -> ColumnFit:
-        """Robust least squares of a shape's coefficients and the fixed columns'."""
+        """Robust least squares of a shape and the fixed columns."""
         return fit_column(self.columns(shape), self.y, self.weights)
 
 
 class JointFit(NamedTuple):
-    """Friction of one joint, with what was fitted beside it."""
+    """Friction of one joint and the numbers fitted beside it."""
 
     shape: Shape  #: The chosen structure.
     fit: ColumnFit  #: Friction coefficients, then q̈'s, then the rigid torque's.
-    #: Candidate → RMS of what it misses of stretches left out; empty where none competed. [N·m]
+    #: Candidate → RMS missed of stretches left out; empty without competition. [N·m]
     scores: dict[Shape, float]
     constant: bool  #: Whether the drive constant was fitted too.
-    presliding: PreslidingScore  #: The arm's presliding length, which all joints share.
-    #: RMS of what the model misses of stretches left out, and what the profile's friction and rotor
-    #: miss there; NaN where they were not compared. [N·m]
+    presliding: PreslidingScore  #: The presliding length of all joints.
+    #: RMS that the model, and the profile's friction and rotor, miss of stretches left out;
+    #: NaN if not compared. [N·m]
     errors: tuple[float, float] = (np.nan, np.nan)
 
     @property
@@ -146,7 +146,7 @@ class JointFit(NamedTuple):
 
     @property
     def at_bound(self) -> tuple[str, ...]:
-        """The friction terms that sit at their bound of zero."""
+        """Friction terms at their bound of zero."""
         rubs = not self.scores and self.shape.terms
         return tuple(t for t in BOUNDED if rubs and t not in self.shape.terms)
 
@@ -157,7 +157,7 @@ class JointFit(NamedTuple):
 
 
 def fit_frictions(data: Training) -> list[JointFit | None]:
-    """Fit every joint that moves, the links held at the profile; None for the others."""
+    """Fits of all moving joints, links from the profile; None at rest."""
     moving = [j for j in range(data.robot.joints) if data.moves[j]]
     presliding = choose_presliding(
         [data_of_joint(data, j, data.fit_constants) for j in moving if data.rubs]
@@ -165,7 +165,7 @@ def fit_frictions(data: Training) -> list[JointFit | None]:
     fits: list[JointFit | None] = [None] * data.robot.joints
     for j in moving:
         fit = fit_joint(data, j, presliding, data.fit_constants)
-        # A joint with little load cannot tell its constant, the last value, from friction.
+        # A light joint cannot separate its constant, the last value, from friction.
         if data.fit_constants and fit.fit.sd[-1] >= CONSTANT_KNOWN * abs(fit.fit.values[-1]):
             fit = fit_joint(data, j, presliding, False)
         fits[j] = fit
@@ -188,8 +188,8 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
 def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     """The equations of joint j (from 0) over all logs.
 
-    With a drive constant to be found the rigid body's torque is a column with a coefficient that
-    would be 1 if the profile's constant were right; without, it is subtracted.
+    For an unknown drive constant the rigid body's torque is a column; its coefficient would be 1
+    with the profile's right constant. Else it is subtracted.
     """
 
     def joined(signal: Callable[[TrainingLog], Array]) -> Array:
@@ -222,13 +222,13 @@ def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array
 
 
 def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
-    """Choose one presliding length for the whole arm by cross-validation, or none.
+    """One presliding length for the whole arm by cross-validation, or none.
 
-    It is chosen in the band in which an observer listens: a slow step drowns in a wider one's
-    noise. Of the nearly best it is the shortest, which forgets its start soonest.
+    An observer's band decides: in a wider one a slow step drowns in noise. Of the nearly best the
+    shortest wins: it forgets its start soonest.
     """
     lengths = (0.0, *PRESLIDING_LENGTHS)
-    # Of a joint that goes one way the play operator is a constant.
+    # One way only, the play operator is constant.
     turning = [data for data in joints if data.reverses]
     if not turning:
         return PreslidingScore(0.0, {0.0: 1.0})
@@ -237,10 +237,10 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         terms, parts = tellable_terms(RICHEST, data), data.parts
         y = data.slow(data.y[:, None])[:, 0]
         plain = data.slow(data.columns(Shape(terms, SLIDING)))
-        # Weights of outliers are held: all lengths must answer for the same samples.
+        # Outliers' weights are fixed: all lengths answer for one set of samples.
         weights = fit_column(plain, y, data.weights).weights
-        # What a smoother sign explains as well is not presliding's; one smoother than that is
-        # presliding in the velocity's guise.
+        # A smoother sign that explains as much beats presliding; an even smoother one is
+        # presliding in disguise.
         rivals = [Shape(terms, smoothing) for smoothing in (SLIDING, SMOOTHING)]
         sliding = [
             Shape((*terms, "presliding"), SLIDING, presliding_length=length)
@@ -258,10 +258,10 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
 
 
 def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shape, float]]:
-    """The simplest of a joint's nearly best friction models, and every candidate's error. [N·m]
+    """The simplest of a joint's nearly best models, and all errors. [N·m]
 
-    First the smoothing is chosen with the richest plain model, then the bend of the logarithm,
-    then the terms. A parabola is in the race only where it rises up to the joint's own speed.
+    First the richest plain model decides the smoothing, then the logarithm's bend, then the
+    terms. A parabola competes only if it rises up to the joint's own speed.
 
     Args:
         data: The joint's equations.
@@ -271,10 +271,10 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
     rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
     bounded, is_turned = bounded_shape(plain, data)
     if is_turned:
-        return plain, {}  # the positions may still rub the right way
+        return plain, {}  # positions may still rub correctly
     if not bounded.terms or bounded.terms == ("offset",):
         return bounded, {}
-    # Weights of outliers are held: candidates must answer for the same samples.
+    # Outliers' weights are fixed: candidates answer for one set of samples.
     weights, parts = data.fit(Shape(rich)).weights, data.parts
 
     def error(shape: Shape) -> float:
@@ -299,12 +299,12 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
 
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
-    """The friction shapes that compete for a joint, with the smoothing and bend of `best`.
+    """A joint's competing friction shapes, with `best`'s smoothing and bend.
 
     Args:
-        best: Its smoothing, its bend and its presliding length stay.
+        best: Its smoothing, bend and presliding length stay.
         data: The joint's equations.
-        speed: The joint's highest speed, which decides the points of a bent line. [rad/s]
+        speed: The joint's highest speed, for the points of a bent line. [rad/s]
     """
     shapes: list[Shape] = []
     line = bent(speed)
@@ -313,7 +313,7 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
         if line and terms[0] in line.terms:
             shape = shape._replace(speeds=line.speeds)
         if "stribeck" in terms:
-            # Of slower ones the sign's own rounding hides the fading.
+            # In slower ones the sign's rounding hides the fading.
             seen = [v for v in STRIBECK_VELOCITIES if v > 2 * best.smoothing]
             shapes += [shape._replace(stribeck_velocity=velocity) for velocity in seen]
         else:
@@ -324,21 +324,21 @@ def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[S
 
 
 def tellable_terms(terms: tuple[str, ...], data: JointData) -> tuple[str, ...]:
-    """The terms that the motion can tell: no growth with no load, no offset one-way."""
+    """Terms that the motion shows: no growth without load, no offset one-way."""
     out = tuple(t for t in terms if t != "load_coulomb" or data.load_spread >= LIGHT)
     return out if data.reverses else tuple(t for t in out if t != "offset")
 
 
 def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
-    """The dry terms that come out negative; others may follow the coefficients. (k,)"""
+    """Dry terms with a negative value; others may follow the coefficients. (k,)"""
     own = dict(zip(shape.terms, values, strict=False))
     return tuple(term for term in NEVER_NEGATIVE if own.get(term, 0.0) < 0.0)
 
 
 def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
-    """A shape less the terms at zero, Coulomb and viscous friction bounded there in the fit.
+    """A shape less the terms at zero, Coulomb and viscous friction bounded.
 
-    Also whether velocities seem turned, see `TURNED`.
+    Also whether velocities seem reversed, see `TURNED`.
     """
     powers: dict[Shape, float] = {}
     for without in ((), *((term,) for term in BOUNDED), BOUNDED):
@@ -358,9 +358,9 @@ def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
 
 
 def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
-    """A shape's fit; with presliding, without the dry terms that come out negative.
+    """A shape's fit; with presliding, without negative dry terms.
 
-    Presliding and the smoothed sign share one dry torque: one that takes too much excludes the
+    Presliding and the smoothed sign share one dry torque: too much of one excludes the
     other.
     """
     fit = data.fit(shape)
@@ -372,12 +372,12 @@ def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
 
 
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
-    """Whether no dry term is negative and the friction rises all the way to `speed_limit`.
+    """Whether no dry term is negative and friction rises up to `speed_limit`.
 
     Args:
         shape: The structure.
         values: Its coefficients, others may follow. (k,)
-        speed_limit: Speed up to which it may not fall. [rad/s]
+        speed_limit: It may not fall below this speed. [rad/s]
     """
     friction = shape.friction(values[: len(shape.terms)])
     return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

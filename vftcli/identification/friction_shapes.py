@@ -10,11 +10,15 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.processing import PreparedLog, gravity_torque
-from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic
-from vftcli.robots.presliding import play
+from vftcli.robots.friction import (
+    SMOOTHING,
+    bent_line,
+    coulomb_logarithmic,
+    friction_factor,
+)
 from vftcli.robots.profile import FRICTION_KEYS
 from vftcli.robots.robot import JointFriction, Robot
-from vftcli.robots.temperature import friction_factor, measured_temperature
+from vftcli.robots.running_friction import measured_temperature, play
 from vftcli.signals.arrays import Array
 
 SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
@@ -119,7 +123,7 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One term of a friction shape at every sample: the friction law with its coefficient 1.
+    """One friction term at every sample: the law with its coefficient at 1.
 
     Args:
         term: Its key.

@@ -1,4 +1,4 @@
-"""Logs in, a robot out: the whole way of `vftcli identify`, in the order the data flows."""
+"""Logs in, a robot out: `vftcli identify` in the order of its data."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -85,12 +85,12 @@ def identify(
         robot: The profile to start from.
         task: What to identify.
         held_out: Logs to score on.
-        free: The same motion without the load.
+        free: The motion without the load.
 
     Raises:
         IdentificationError: If the logs do not determine it, or contradict the robot.
         MissingSignalError: If a signal is missing.
-        ParameterError: If two logs are the same run: it would count as two.
+        ParameterError: If two logs are one run: it would count twice.
     """
     sources = logs if free is None else [*logs, free]
     refuse_repeated_logs(sources)
@@ -144,7 +144,7 @@ def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -
             )
         return fit
     # A pair repeats a motion: in both logs some joint travels further than it would at rest. Two
-    # episodes of a dataset carry the same.
+    # episodes of a dataset carry one load.
     moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
     if len(logs) == 2 and moved and not all(r.source.part for r in logs):
         try:

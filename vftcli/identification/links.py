@@ -1,9 +1,9 @@
-"""The links' parameters by least squares: stacked equations, and what they tell of any arm.
+"""The links' parameters by least squares, in combinations that motion shows.
 
-All unknowns stand in one vector: inertial parameters (10 a link), rotor inertias, friction
+One vector holds all unknowns: inertial parameters (10 a link), rotor inertias, friction
 coefficients joint by joint. Of the stacked equations only the R factor of their QR decomposition
-is kept, chunk by chunk, so that memory does not grow with the log. Base parameters are the
-combinations of inertial parameters that any motion can tell at all.
+is kept, chunk by chunk: memory does not grow with the log. Base parameters are the
+combinations of inertial parameters that any motion shows at all.
 """
 
 import itertools
@@ -22,14 +22,14 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
 
-ROWS = 512  #: Samples that are stacked at once.
+ROWS = 512  #: Samples stacked at once.
 REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
-#: Singular values below this share of the largest are left at the start (columns scaled).
+#: Singular values below this share of the largest stay at the start (columns scaled).
 TRUNCATION = 1e-3
-PROBES = 400  #: Random states at which the structure of base parameters is found.
+PROBES = 400  #: Random states for the structure of base parameters.
 #: Diagonal entries of R below this share of the largest are zero: rounding is at 1e-15.
 RANK_TOLERANCE = 1e-8
-#: Share of its size from which a parameter's deviation leaves it undetermined.
+#: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3
 
 
@@ -37,17 +37,17 @@ class ParameterColumns(NamedTuple):
     """Order of the unknowns in their vector."""
 
     chain: Chain  #: The arm's geometry.
-    rotor: bool  #: Whether rotor inertias are unknowns: where torque is measured before the gear.
+    rotor: bool  #: Whether rotor inertias are unknown: with torque measured before the gear.
     shapes: tuple[Shape, ...]  #: Friction structure of each joint.
 
     @property
     def inertial(self) -> int:
-        """Number of inertial unknowns: ten a link, the first of the vector."""
+        """Number of inertial unknowns: ten a link, first in the vector."""
         return LINK * self.chain.joints
 
     @property
     def rotors(self) -> int:
-        """Number of rotor inertias, which follow; 0 where torque is measured behind the gear."""
+        """Number of rotor inertias, next; 0 with torque measured behind the gear."""
         return self.chain.joints if self.rotor else 0
 
     @property
@@ -63,7 +63,7 @@ class ParameterColumns(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of unknowns in all, the length of the vector."""
+        """Length of the vector of unknowns."""
         return int(self.frictions[-1].stop)
 
     @property
@@ -76,7 +76,7 @@ class ParameterColumns(NamedTuple):
         return (*inertial, *rotors, *terms)
 
     def rows(self, log: TrainingLog, span: slice) -> Array:
-        """The regressor A of a span: A x is the drive torque of every joint. (N, n, size)"""
+        """Regressor A of a span: A x is every joint's drive torque. (N, n, size)"""
         n, motion = self.chain.joints, log.motion
         q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
         A = np.zeros((len(q), n, self.size))
@@ -89,20 +89,20 @@ class ParameterColumns(NamedTuple):
 
 
 class Triangles(NamedTuple):
-    """The stacked, weighted equations A x ≈ y of the whole logs, as R factors of [A y]."""
+    """The stacked, weighted equations A x ≈ y of the logs, as R factors of [A y]."""
 
     layout: ParameterColumns  #: The unknowns.
-    parts: tuple[Array, ...]  #: R factor of each cross-validation stretch. (size+1, size+1) each
-    correlation: float  #: Samples that count as one, by the residual's correlation.
+    parts: tuple[Array, ...]  #: R factor of each stretch left out. (size+1, size+1) each
+    correlation: float  #: Samples that count as one: residuals correlate.
 
     def joined(self, leave_out: int | None = None) -> tuple[Array, Array]:
-        """R (size, size) and the right-hand side (size,) of all stretches but one."""
+        """R (size, size) and right-hand side (size,) of all stretches but one."""
         kept = [part for k, part in enumerate(self.parts) if k != leave_out]
         whole = triangle(np.vstack(kept))
         return whole[:-1, :-1], whole[:-1, -1]
 
     def misfit(self, part: int, x: Array) -> float:
-        """Weighted sum of squares that x leaves in one stretch."""
+        """Weighted sum of squares left by x in one stretch."""
         R = self.parts[part]
         return float(np.sum((R[:, -1] - R[:, :-1] @ x) ** 2))
 
@@ -114,19 +114,19 @@ def triangle(rows: Array) -> Array:
 
 
 def residuals(layout: ParameterColumns, log: TrainingLog, x: Array) -> Array:
-    """Drive torque of a log that the unknowns x (size,) do not explain. (M, n) [N·m]"""
+    """Drive torque of a log beyond the unknowns x (size,). (M, n) [N·m]"""
     tau = log.motion.tau
     parts = [tau[span] - layout.rows(log, span) @ x for span in log.motion.chunks()]
     return np.concatenate(parts)
 
 
 def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -> Triangles:
-    """All logs weighed and stacked, outliers weighing less by what the last solution leaves.
+    """All logs weighed and stacked; the last solution weighs outliers down.
 
     Args:
         layout: The unknowns.
         logs: The training logs.
-        start: A solution to start from: the profile with its fitted friction. (size,)
+        start: A first solution: the profile with fitted friction. (size,)
     """
     rows = sum(int(np.count_nonzero(log.weights)) for log in logs)
     if rows < 4 * layout.size:
@@ -152,7 +152,7 @@ def joint_sigma(logs: Sequence[TrainingLog], left: Sequence[Array]) -> Array:
 def triangulate(
     layout: ParameterColumns, logs: Sequence[TrainingLog], left: Sequence[Array], sigma: Array
 ) -> Triangles:
-    """QR updates over all chunks of all logs, one triangle a cross-validation stretch."""
+    """QR updates over all chunks of all logs, a triangle per stretch."""
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
     correlation = []
     for log, residual in zip(logs, left, strict=True):
@@ -160,7 +160,7 @@ def triangulate(
         for r, w in zip(residual.T, log.weights.T, strict=True):
             if np.count_nonzero(w) > 10:
                 correlation.append(correlation_time(r[w > 0]))
-        # Stretches are contiguous: neighbouring samples would tell each other's noise.
+        # Contiguous stretches: neighbours share noise.
         for k, fold in enumerate(folds(log.motion.samples)):
             for start in range(fold.start, fold.stop, ROWS):
                 span = slice(start, min(start + ROWS, fold.stop))
@@ -172,11 +172,11 @@ def triangulate(
 
 
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
-    """Least squares R x ≈ rest in the directions that the data tells (truncated SVD).
+    """Least squares R x ≈ rest in directions with data (truncated SVD).
 
     Returns:
-        The step (k,), its standard deviations for equations of one each (k,), and the share of
-        each unknown that lies in directions without data (k,).
+        The step (k,), its standard deviations for unit equations (k,), and each unknown's
+        share in directions without data (k,).
     """
     scale = np.linalg.norm(R, axis=0)
     scale[scale == 0.0] = 1.0
@@ -188,17 +188,17 @@ def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
 
 
 def least_change(triangles: Triangles, start: Array) -> Array:
-    """Least squares that leaves the start only where the data says so. (size,)"""
+    """Least squares that leaves the start only with data. (size,)"""
     R, z = triangles.joined()
     return start + truncated_step(R, z - R @ start)[0]
 
 
 class Grouping(NamedTuple):
-    """Independent unknowns, and the share of the others that each carries along."""
+    """Independent unknowns, and their shares of the others."""
 
     independent: tuple[int, ...]  #: Places of the independent unknowns. (b,)
     dependent: tuple[int, ...]  #: Places of the others. (d,)
-    carried: Array  #: β: how much of each dependent unknown an independent one carries. (b, d)
+    carried: Array  #: β: each independent unknown's share of a dependent one. (b, d)
 
     def values(self, x: Array) -> Array:
         """Base parameters of a full parameter vector: x₁ + β x₂. (b,)"""
@@ -206,7 +206,7 @@ class Grouping(NamedTuple):
         return base
 
     def sums(self, names: tuple[str, ...]) -> list[str]:
-        """Each base parameter written out as a sum, as "Izz1 + 0.25 m2 + Iyy2"."""
+        """Base parameters as sums, such as "Izz1 + 0.25 m2 + Iyy2"."""
         out = []
         for k, row in zip(self.independent, self.carried, strict=True):
             text = names[k]
@@ -236,7 +236,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
     beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=np.float64)
-    beta[np.abs(beta) < 1e-9] = 0.0  # rounding, which would otherwise enter the names
+    beta[np.abs(beta) < 1e-9] = 0.0  # rounding would enter the names
     first, friction = np.argsort(order[:rank]), range(layout.rotor_places.stop, layout.size)
     independent = (*order[:rank][first].tolist(), *friction)
     carried = np.vstack([beta[first], np.zeros((len(friction), beta.shape[1]))])
@@ -246,7 +246,7 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
 def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     """Base parameters by weighted least squares, as rows of `BASE`.
 
-    Directions without data keep the start; a parameter mostly in them has an infinite deviation.
+    Directions without data keep the start; a parameter mostly in them has infinite deviation.
 
     Args:
         triangles: The stacked equations.

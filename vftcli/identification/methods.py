@@ -1,4 +1,4 @@
-"""The methods: "friction" holds the maker's links, "base" frees them, "auto" chooses.
+"""Methods: "friction" holds the maker's links, "base" frees them, "auto" chooses.
 
 What method "targets" says of a joint's friction is made here too.
 """
@@ -52,7 +52,7 @@ LEAST_SLOPE = 0.05
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:
-    """Friction, rotor inertia and, if asked, drive constants; links at the maker's table."""
+    """Friction, rotor inertia, drive constants if asked; links from the maker."""
     if not (data.rubs or data.rotor):
         raise IdentificationError(
             f"robot {data.robot.name!r} has its torque behind the gears: without friction the "
@@ -98,7 +98,7 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
 
 
 def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array, Array, Number]:
-    """Coefficients of joint j (from 0) and their sd by the drive constant fitted last, and it.
+    """Coefficients of joint j (from 0), sd by its last drive constant, and this.
 
     Torque was made from currents with the profile's K. Where the rigid body's torque comes out as
     scale times what it must be, the true K is K / scale, and so are all coefficients beside it.
@@ -138,7 +138,7 @@ def rotor_remarks(J: Number, where: Where) -> list[Remark]:
 def identified_friction(
     data: Training, j: int, shape: Shape, values: Array, sd: Array, method: str
 ) -> tuple[JointFriction, list[Number]]:
-    """Friction of joint j (from 0) by its fit, and its coefficients beside the profile's.
+    """Friction of joint j (from 0) by its fit, coefficients beside the profile's.
 
     It holds at the temperature of the profile's; others may follow the coefficients. (k,)
     """
@@ -163,7 +163,7 @@ def identified_friction(
 
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
-    """A remark if the fitted friction of joint j (from 0) pushes at some speed, or falls."""
+    """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
     motions = [log.motion for log in data.logs]
     speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in motions)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
@@ -252,7 +252,7 @@ MATTERS = 0.02
 
 
 def whole_arm(data: Training) -> MethodResult:
-    """Base parameters by weighted least squares, and the robot of the nearest physical links.
+    """Base parameters by weighted least squares, robot of nearest physical links.
 
     Friction models are chosen twice, so that an error of the profile's links is no friction.
     """

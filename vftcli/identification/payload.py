@@ -1,4 +1,4 @@
-"""A load on the flange: from a pair of logs with and without it, poses at rest, or motion."""
+"""A load on the flange from logs with and without it, poses at rest, or motion."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -34,68 +34,68 @@ from vftcli.signals.rest import faster, held
 from vftcli.signals.series import resample_columns
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
-STATIC = 4  #: Parameters that gravity tells: mass and three first moments.
-SAME_MOTION = 5e-3  #: Position difference up to which two logs are the same motion. [rad rms]
-COARSE, FINE = 0.05, 5e-4  #: Steps in which the shift between two logs is sought. [s]
-DWELL = 0.5  #: Shortest rest that counts as a pose. [s]
+STATIC = 4  #: Parameters that gravity shows: mass, three first moments.
+SAME_MOTION = 5e-3  #: Largest position difference of two logs of one motion. [rad rms]
+COARSE, FINE = 0.05, 5e-4  #: Steps of the search for the shift between two logs. [s]
+DWELL = 0.5  #: Shortest rest that is a pose. [s]
 POSES = 4  #: Fewest different poses for mass and centre of mass.
-APART = 0.1  #: Poses are different if a joint is this far elsewhere. [rad]
-MOST_NAMED = 4  #: Logs that are called by their names; there may be thousands of episodes.
-STRETCHES = 12  #: Stretches of a motion with errors that count as independent.
-REACH = 1.0  #: A load's centre of mass further than this from the flange cannot be. [m]
-LOOKED_AT = 400  #: Samples of a motion, at most, by which its different poses are counted.
-#: Shortest motion to be weighed: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by
-#: .7 of their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
+APART = 0.1  #: A joint differs by this between two poses. [rad]
+MOST_NAMED = 4  #: Logs called by name; episodes may be thousands.
+STRETCHES = 12  #: Independent stretches of a motion.
+REACH = 1.0  #: Farthest centre of mass from the flange. [m]
+LOOKED_AT = 400  #: Most samples of a motion among which poses are counted.
+#: Shortest motion: of a UR10e and a UR3 the masses of 9 stretches of 10 s scatter by .7 of
+#: their standard deviation, those of 5 s by 1.6, of 2.5 s by 2.4. [s]
 LONG = 10.0
-#: Weighings with the load on the arm: the third moves mass and centre by less than .1 %.
+#: Weighings with the load on the arm: a third moves mass and centre by less than .1 %.
 ROUNDS = 3
 
 
 def names_of(recordings: Sequence[Recording]) -> str:
-    """Names of several logs as one text, for messages and tables; of many the first."""
+    """Names of logs as one text; of many, the first."""
     return listed([recording.name for recording in recordings], MOST_NAMED)
 
 
 class NotSameMotionError(IdentificationError):
-    """Two logs of a supposed pair do not repeat one motion."""
+    """Two logs do not repeat one motion."""
 
 
 class TooFewPosesError(IdentificationError):
-    """Logs hold too few different poses at rest."""
+    """Logs hold too few poses at rest."""
 
 
 class LoadFit(NamedTuple):
     """An identified load."""
 
-    payload: Payload  #: The load on the flange, as a point mass.
+    payload: Payload  #: The load, a point mass.
     mass_sd: float  #: Standard deviation of the mass. [kg]
-    com_sd: Array  #: Standard deviations of the centre of mass in flange axes. (3,) [m]
+    com_sd: Array  #: Those of its centre in flange axes. (3,) [m]
     residual: Array  #: RMS torque left in each joint. (n,) [N·m]
-    loaded: tuple[Recording, ...]  #: The logs that carry it.
+    loaded: tuple[Recording, ...]  #: The logs with the load.
     origin: Remark  #: Its source and method.
 
     def carried_by(self, recording: Recording) -> bool:
-        """Whether a log carries it. Logs differ as objects: their names may be equal."""
+        """Whether a log carries it. Logs are compared as objects: names may be equal."""
         return any(log is recording for log in self.loaded)
 
 
 def load_at_flange(
     x: Array, sd: Array, left: Array, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
-    """A solution as a load in flange axes.
+    """A load in flange axes from a solution.
 
     Args:
         x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
         sd: Their standard deviations. (4,)
         left: RMS torque left in each joint. (n,) [N·m]
         robot: The arm.
-        loaded: The logs that carry it.
+        loaded: The logs with the load.
         origin: How it was found.
     """
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
     if mass <= 0 or mass_sd > 0.5 * mass:
         raise IdentificationError(
-            f"{names}: no load can be told: mass {mass:.3g} ± {mass_sd:.2g} kg; "
+            f"{names}: no load found: mass {mass:.3g} ± {mass_sd:.2g} kg; "
             "use poses or motions in which gravity loads several joints differently"
         )
     R = robot.chain.flange_rotation
@@ -111,23 +111,23 @@ def load_at_flange(
 
 
 class JointsFit(NamedTuple):
-    """Least squares over all joints, each divided by its own residual."""
+    """Least squares over all joints, each divided by its residual."""
 
     x: Array  #: The solution. (k,)
     left: Array  #: Its residual. (N, n)
-    weights: Array  #: Of every sample and joint, 0 where it tells nothing. (N, n)
-    A: Array  #: The columns times their weights. (N, n, k)
+    weights: Array  #: Of samples and joints, 0 where empty. (N, n)
+    A: Array  #: Columns times weights. (N, n, k)
 
     @property
     def inverse(self) -> Array:
-        """(AᵀA)⁻¹, columns scaled; zero where the data says nothing. (k, k)"""
+        """(AᵀA)⁻¹, columns scaled; zero without data. (k, k)"""
         flat = self.A.reshape(-1, self.A.shape[2])
         return inverse_of(flat.T @ flat)
 
     def cluster_covariance(self, clusters: Sequence[slice | Indices]) -> Array:
-        """Covariance of x for a residual that is a cluster's own. (k, k)
+        """Covariance of x with residuals that clusters share. (k, k)
 
-        What each cluster pulls the solution by is what it is: G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
+        Each cluster's pull on the solution makes G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
         B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
         linear models", Biometrika 73(1), 1986).
 
@@ -140,25 +140,24 @@ class JointsFit(NamedTuple):
         return covariance * len(clusters) / (len(clusters) - 1)
 
     def motion_covariance(self, y: Array, gain: float) -> Array:
-        """Covariance of x fitted to a motion, by its `STRETCHES` and its drives. (k, k)
+        """Covariance of x of a motion, by `STRETCHES` and drives. (k, k)
 
-        Friction of another temperature lasts as long as a motion goes one way: longer than
-        residuals do.
+        Friction of another temperature outlasts residuals: it holds while a motion goes one way.
         """
         stretches = folds(len(self.A), STRETCHES)
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
 
     def gain_covariance(self, y: Array, gain: float) -> Array:
-        """Covariance of x by drive constants that are not known exactly. (k, k)
+        """Covariance of x by uncertain drive constants. (k, k)
 
-        Half of their variance is all joints' (gear, warmth), which scales the mass; half is each
-        one's.
+        Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
+        each one.
 
         Args:
-            y: The torque that is explained. (N, n)
+            y: The torque to explain. (N, n)
             gain: Relative standard deviation of a joint's torque.
         """
-        # What each joint's torque contributes to the solution: their sum is the solution.
+        # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
         together = shares.sum(axis=0)
         covariance: Array = 0.5 * gain**2 * (np.outer(together, together) + shares.T @ shares)
@@ -166,7 +165,7 @@ class JointsFit(NamedTuple):
 
 
 def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
-    """Least squares of columns A (N, n, k) to y (N, n), the samples weighed by `usable` (N, n)."""
+    """Least squares of columns A (N, n, k) to y (N, n), weights `usable` (N, n)."""
     scale = np.std(y, axis=0)
     for _ in range(PASSES):
         w = np.sqrt(usable) / np.maximum(scale, 1e-9)
@@ -178,14 +177,14 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
 
 
 def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
-    """Drive torque of a load's mass and first moments in the last link's frame. (N, n, 4)"""
+    """Torque of mass and first moments in the last link's frame. (N, n, 4)"""
     return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
 
 
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
-    """A load from the same motion with and without it; which is which shows by itself.
+    """A load from one motion with and without it; the loaded log shows by itself.
 
-    The torque difference at the same phase is the load's, and friction's that grows with it.
+    At equal phase the torque differs by the load and by friction that grows with it.
     """
     for loaded, free in ((second, first), (first, second)):
         fit, sd, origin = solve_pair(loaded, free, robot)
@@ -196,7 +195,7 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
 
 
 def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[JointsFit, Array, Remark]:
-    """Fit of a log's torque beyond the free one's, sd of mass and moments (4,), and the origin."""
+    """Fit beyond the free log's torque, sd of mass and moments (4,), origin."""
     processing = Processing()
     motion = prepare(loaded, robot, processing)
     shift, distance = find_time_shift(motion, free)
@@ -209,7 +208,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[Joints
     Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
     usable = motion.usable[inside].astype(float)
     fit = fit_all_joints(Y, extra, usable)
-    # How friction grows depends on the load that is sought: a few rounds settle it.
+    # Friction grows with the load we seek: a few rounds settle it.
     for _ in range(4):
         A = np.concatenate([Y, load_friction(robot, q, sign, fit.x[:STATIC])], axis=2)
         fit = fit_all_joints(A, extra, usable)
@@ -219,7 +218,7 @@ def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[Joints
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
-    """Columns sign(q̇)·(|g with load| − |g without|), one a joint. (N, n, n)"""
+    """Columns sign(q̇)·(|g with load| − |g without|) per joint. (N, n, n)"""
     n = robot.joints
     Y = torque_regressor(robot.chain, q, np.zeros_like(q), np.zeros_like(q))
     phi = chain_parameters(robot.loaded_chain)
@@ -232,7 +231,7 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
 
 
 def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float]:
-    """Shift [s] from the motion's clock to the other log's, and what is left. [rad rms]"""
+    """Shift [s] from the motion's clock to the other's, and rest. [rad rms]"""
     if not len(motion.t):
         name = motion.recording.name
         raise NotSameMotionError(f"no joint of {name} moves; a pair must repeat one trajectory")
@@ -240,14 +239,14 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
     def distance(shift: float) -> float:
         at = motion.t + shift
         inside = (at >= other.t[0]) & (at <= other.t[-1])
-        # Two short ends may agree by chance: at least half of the motion must overlap.
+        # Short ends may agree by chance: half of the motion must overlap.
         if np.count_nonzero(inside) < 0.5 * len(at):
             return float("inf")
         there = resample_columns(at[inside], other.t, other.q)
         return float(np.sqrt(np.mean((there - motion.q[inside]) ** 2)))
 
     low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]
-    # The distance has many local minima, so the whole range is tried before it is refined.
+    # The distance has many minima: try the whole range, then refine.
     best = min(np.arange(low, high, COARSE), key=distance)
     for step in (COARSE / 5, COARSE / 25, FINE):
         best = min(best + step * np.arange(-6, 7), key=distance)
@@ -261,11 +260,11 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
 
 
 def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
-    """A load from poses at rest: the torque beyond the robot's own gravity.
+    """A load from poses at rest, by torque beyond the robot's own gravity.
 
-    Stiction hides in every pose; its size is what the residual shows, and many poses average it.
-    What the model misses of an arm, and what a day does to its drives, is alike in all poses of a
-    log: of several logs, how they differ is part of the standard deviations.
+    Stiction acts in every pose: the residual shows its size, many poses average it. The model's
+    errors and a day's effect on the drives are alike in all poses of a log: with several logs,
+    their difference is part of the standard deviations.
     """
     each = [resting_poses(recording, robot) for recording in recordings]
     q, torque = (np.concatenate(parts) for parts in zip(*each, strict=True))
@@ -278,7 +277,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     zero = np.zeros_like(q)
     extra = torque - gravity_torque(robot, q)
     fit = fit_all_joints(load_columns(robot, q, zero, zero), extra, np.ones_like(extra))
-    # Poses are no series in time: each tells for itself.
+    # Poses are no series in time.
     noise = fit.inverse / (1.0 - STATIC / extra.size)
     gain = max(gain_sd(recording, robot) for recording in recordings)
     covariance = noise + fit.gain_covariance(extra, gain)
@@ -293,7 +292,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
 
 
 def different_poses(q: Array) -> int:
-    """Number of poses (P, n) that lie `APART` from each other."""
+    """Number of poses (P, n) at least `APART` apart."""
     found: list[Array] = []
     for pose in q:
         if not found or np.min(np.max(np.abs(np.array(found) - pose), axis=1)) > APART:
@@ -306,7 +305,7 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
     effort, still = drive_torque(recording, robot), held(recording.q, recording.median_step)
     spans = []
     for start, stop in intervals(recording.t, still, least=DWELL):
-        edge = (stop - start) // 5  # where the arm still settles or already leaves
+        edge = (stop - start) // 5  # the arm still settles or leaves
         spans.append(slice(start + edge, stop - edge))
     means = [[x[span].mean(axis=0) for span in spans] for x in (recording.q, effort)]
     q, torque = np.reshape(means, (2, -1, robot.joints))
@@ -314,10 +313,10 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 
 
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
-    """A load from motion: the torque beyond the robot's own weight.
+    """A load from motion, by torque beyond the robot's own weight.
 
-    The columns of `vftcli.repetition.free_load` know of a load's weight alone: with what was found
-    on the arm the motion is weighed again, so that the load's inertia does not count as weight.
+    The columns of `vftcli.repetition.free_load` hold only a load's weight. A second weighing
+    carries the load found, so that its inertia does not count as weight.
     """
     names = names_of(recordings)
     q = np.concatenate([recording.q for recording in recordings])
@@ -351,20 +350,18 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
 
 
 def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Array, float]:
-    """A load weighed in motion, from what it is known to be.
+    """A load weighed in motion, beside the load already known.
 
-    A joint counts where it moves, and its friction is free: a tanh(q̇/v₀) + b q̇ + o. Nothing is
-    subtracted that went through the same drives, so that an error of theirs acts on the arm's own
-    weight.
+    A joint counts where it moves; its friction is free: a tanh(q̇/v₀) + b q̇ + o. Nothing
+    through these drives is subtracted: their errors act on the arm's own weight.
 
     Args:
-        runs: Logs that carry it.
-        carried: Mass and first moment of what their models carry of it. (4,) [kg, kg·m]
+        runs: Logs with the load.
+        carried: Mass and first moment in their models. (4,) [kg, kg·m]
 
     Returns:
         Mass and first moment in flange axes (4,) [kg, kg·m], their covariance (4, 4), RMS left in
-        each joint (n,) [N·m], and what is left of the torque beside weight and friction of the
-        arm, by its power.
+        each joint (n,) [N·m], and the torque's rest beside the arm's weight and friction, by power.
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
@@ -388,7 +385,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
 
 
 def carrying(run: Run, x: Array) -> Run:
-    """A run with a load in its model too, a point mass of x (4,) [kg, kg·m] in flange axes."""
+    """A run with a point mass x (4,) [kg, kg·m] in flange axes in its model."""
     load = Payload(mass=float(x[0]), com=x[1:] / x[0], inertia=np.zeros((3, 3)))
     q, dq, bare, terms = run.recording.q, run.recording.require("dq"), run.robot.chain, run.terms
     own, loaded = momentum_terms(bare, q, dq), momentum_terms(bare.with_payload(load), q, dq)

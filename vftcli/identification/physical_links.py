@@ -1,4 +1,4 @@
-r"""The physical links nearest to least squares: a barrier at the edge of what a body can be.
+r"""Physical links nearest to least squares: a barrier bounds each body.
 
 A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
 
@@ -164,10 +164,10 @@ def starting_point(layout: ParameterColumns, x: Array) -> Array:
 def pulled_links(
     triangles: Triangles, profile: Array, leave_out: int | None = None
 ) -> Iterator[tuple[float, Array]]:
-    """Each weight and the physical parameters (size,) under it, the strongest pull first."""
+    """Weights and their physical parameters (size,), strongest pull first."""
     start = x = starting_point(triangles.layout, profile)
     R, z = triangles.joined(leave_out)
-    # Correlated rows say the same thing again; dividing them makes the misfit a log-likelihood
+    # Correlated rows repeat each other; dividing them makes the misfit a log-likelihood
     # that can be weighed against the distance.
     shrink = 1.0 / np.sqrt(triangles.correlation)
     for weight in WEIGHTS[::-1]:
@@ -190,7 +190,7 @@ def nearest_physical_links(
 
 
 def predicts_best_unpulled(triangles: Triangles, profile: Array) -> bool:
-    """Whether every pull to the profile but the weakest predicts left-out stretches worse."""
+    """Whether all pulls but the weakest predict left-out stretches worse."""
     misfits = dict.fromkeys(WEIGHTS, 0.0)
     for part in range(len(triangles.parts)):
         for weight, x in pulled_links(triangles, profile, leave_out=part):

@@ -1,4 +1,4 @@
-"""From a log to the torques an identification compares: filtered alike, without delay."""
+"""A log's torques for identification: filtered alike, without delay."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,8 +10,7 @@ from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction
-from vftcli.robots.temperature import measured_temperature
+from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
@@ -28,7 +27,7 @@ GAP = 10.0  #: Steps longer than this many median steps are left out.
 
 @dataclass(frozen=True, kw_only=True)
 class Processing:
-    """Filter and decimation: everything a joint's torque is made of goes through one filter."""
+    """Filter and decimation: all parts of a joint's torque share one filter."""
 
     #: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
     cutoff: float = 8.0
@@ -61,7 +60,7 @@ class Processing:
 
 @dataclass(frozen=True, kw_only=True)
 class PreparedLog:
-    """A log prepared for identification: M samples from the first to the last that moves."""
+    """A log prepared for identification: M samples from first to last motion."""
 
     recording: Recording  #: The log.
     processing: Processing  #: Its filter.
@@ -133,7 +132,7 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
 
 
 def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
-    """Whether each sample of each joint tells anything: no long stop, no gap beside it. (T, n)"""
+    """Samples with information, by joint: no long stop, no gap beside. (T, n)"""
     usable = np.ones(dq.shape, dtype=bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
         usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))

@@ -1,4 +1,4 @@
-"""Identification: the new robot, how well it predicts, and what the reader should know.
+"""Identification: the new robot, its predictions, and remarks for the reader.
 
 A log is scored filtered and in motion, from its first to its last sample that moves.
 """
@@ -85,7 +85,7 @@ ENOUGH = 50  #: Samples in motion that a remark on friction needs.
 WORSE = 1.5  #: Times the training's residual from which a held-out joint is remarked on.
 #: A model that leaves this many times what the profile leaves of a log has made it worse.
 BEHIND = 1.01
-NEAR = 0.01  #: Largest joint distance at which two samples are the same place. [rad]
+NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
 SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
 #: Share of a log's samples on another's trajectory from which on it repeats that trajectory.
 REPEATED = 0.8
@@ -172,7 +172,7 @@ class Identification:
 
 
 def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing) -> Trace:
-    """Measured torque of a log beside what the identified robot and the profile expect."""
+    """Measured torque of a log, and the identified robot's and the profile's."""
     motion = prepare(log, profile, processing)
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
@@ -185,7 +185,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: P
 
 
 def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
-    """Remarks on logs that got worse or repeat others, and joints much worse elsewhere."""
+    """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
     train = [trace for trace in traces if trace.role == "train"]
     held_out = [trace for trace in traces if trace.role == "held-out"]
     remarks = []
@@ -249,7 +249,7 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
-    """Whether friction explains how the residual of joint j (from 0) differs from training.
+    """Whether friction explains joint j's (from 0) residual beyond training.
 
     Coulomb and viscous friction and an offset are fitted to the residual; where they explain
     `EXPLAINS` of it, friction is named as its cause.
@@ -278,7 +278,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
 
 
 def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
-    """Share of the test's moving samples that lie on the training log's path through (q, q̇).
+    """Share of the test's moving samples on the training log's (q, q̇) path.
 
     Such a log is no test: whatever error the model has along that path, it has fitted.
     """

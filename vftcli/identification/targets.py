@@ -1,9 +1,9 @@
-"""Method "targets": what a UR controller believes of its arm, read off its own targets.
+"""Method "targets": a UR controller's own model of its arm, by its targets.
 
-The controller logs the torque its inverse dynamics asks for (target_moment) and the current it
-expects (target_current). At rest their ratio is K; in motion target_moment less the maker's rigid
-body is J q̈, and K·target_current − target_moment is the controller's friction. Nothing of this
-needs free motion: a hand on the arm changes the measured effort, not the one that was asked for.
+The controller logs the torque of its inverse dynamics (target_moment) and the current it
+expects (target_current). At rest their ratio is K; in motion target_moment less the maker's
+rigid body is J q̈, and K·target_current − target_moment is the controller's friction. Free motion
+is not needed: a hand on the arm changes the measured effort, not the target.
 """
 
 from collections.abc import Sequence
@@ -46,33 +46,33 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import NONZERO, SLIDES, faster
 
-#: Cutoff for targets: above it the measured motion no longer follows the asked one. [Hz]
+#: Cutoff for targets: above it the measured motion does not follow them. [Hz]
 CUTOFF = 4.0
-#: Relative standard deviation up to which a drive constant counts as determined.
+#: Largest relative deviation of a determined drive constant.
 CONSTANT_KNOWN = 1e-2
-ROTOR_KNOWN = 2e-2  #: The relative deviation up to which a rotor inertia does.
-#: Friction shapes beside which the drive constants must agree.
+ROTOR_KNOWN = 2e-2  #: That of a rotor inertia.
+#: Friction shapes that must agree on drive constants.
 SHAPES = (
     Shape(("coulomb", "viscous", "quadratic")),
     Shape(("coulomb", "viscous", "quadratic", "offset")),
 )
-#: Friction shapes of which the best is written where too few points of the law are reached.
+#: Friction shapes, the best of them written where the law has too few points.
 WRITTEN = tuple(
     Shape(("coulomb", "logarithmic"), logarithmic_velocity=bend) for bend in LOGARITHMIC_VELOCITIES
 )
-UNASKED = 0.5  #: Share of the motion with a target velocity below which a hand led the arm.
-#: Share of the law that a joint's friction has at most when a hand leads the arm; programs feed .8
-#: to 1.3 of it forward, by temperature and load.
+UNASKED = 0.5  #: Least share of motion with a target velocity: below it a hand led the arm.
+#: Most of the law in a joint's friction under a guiding hand; programs feed .8 to 1.3 of it
+#: forward, by temperature and load.
 GUIDED = 0.4
-SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of the samples used, which must agree too. [rad/s]
-SETTLE = 0.1  #: Left out at both ends of a rest. [s]
-STEADY = 5e-3  #: Relative change of the target current during a rest up to which it is one.
-#: Relative difference of gravity that is not remarked on: a third of that of 9.82 to 9.81 m/s².
+SPEEDS = (0.0, 0.05, 0.1, 0.2)  #: Lowest speeds of samples, which must agree too. [rad/s]
+SETTLE = 0.1  #: Cut at both ends of a rest. [s]
+STEADY = 5e-3  #: Largest relative change of the target current in a rest.
+#: Largest relative difference of gravity without a remark: a third of that of 9.82 to 9.81 m/s².
 SAME_GRAVITY = 3e-4
 
 
 class Estimate(NamedTuple):
-    """One number with its standard deviation and whether the log determines it."""
+    """A number, its standard deviation, and whether the log determines it."""
 
     value: float
     sd: float
@@ -80,7 +80,7 @@ class Estimate(NamedTuple):
 
 
 UNKNOWN = Estimate(float("nan"), float("inf"), False)
-#: A friction shape, its coefficients and their standard deviations. (k,), (k,)
+#: A friction shape, its coefficients, their deviations. (k,), (k,)
 FrictionLaw = tuple[Shape, Array, Array]
 
 
@@ -89,12 +89,12 @@ class ControllerModel(NamedTuple):
 
     constant: Estimate  #: Drive constant K. [N·m/A]
     rotor: Estimate  #: Reflected rotor inertia. [kg·m²]
-    friction: FrictionLaw | None  #: The law it feeds forward, None where the joint does not move.
+    friction: FrictionLaw | None  #: Its feed-forward law, None at rest.
     gravity: Estimate  #: Its gravity torque over the profile's.
 
 
 def targets_method(data: Training) -> MethodResult:
-    """K, rotor inertia and friction as the controller itself uses them."""
+    """K, rotor inertia and friction of the controller's own model."""
     robot = data.robot
     models = controller_models(data.recordings, robot)
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
@@ -122,7 +122,7 @@ def targets_method(data: Training) -> MethodResult:
 
 
 def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]:
-    """Remarks on numbers of joint j (from 0) that the targets leave open: the profile's stay."""
+    """Remarks on joint j's (from 0) open numbers: the profile's stay."""
     remarks, where = [], Where(joints=(j + 1,))
     if not model.constant.known:
         values = {"profile_NmA": profile_constant(robot, j)}
@@ -140,11 +140,11 @@ def target_remarks(j: int, model: ControllerModel, robot: Robot) -> list[Remark]
 
 
 def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
-    """A remark if the controller computes with another gravity than the profile."""
+    """A remark if the controller's gravity differs from the profile's."""
     scales = [m.gravity for m in models if m.gravity.known]
     if not scales:
         return []
-    # All joints feel one gravity: their ratios count by their inverse variances.
+    # All joints feel one gravity: weights are inverse variances.
     weights = np.array([1.0 / max(s.sd, 1e-9) ** 2 for s in scales])
     ratio = float(weights @ np.array([s.value for s in scales]) / weights.sum())
     least = max(SAME_GRAVITY, 2.0 / float(np.sqrt(weights.sum())))
@@ -152,14 +152,14 @@ def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
 
 
 class ControllerTargets(NamedTuple):
-    """Targets beside the motion, filtered alike, of one log or of several."""
+    """Targets beside the motion, filtered alike, of logs."""
 
     sources: tuple[FrictionColumns, ...]  #: Friction columns of each log.
     dq: Array  #: Measured velocities. (M, n) [rad/s]
     ddq: Array  #: Measured accelerations. (M, n) [rad/s²]
     current: Array  #: Target current. (M, n) [A]
     moment: Array  #: Target moment. (M, n) [N·m]
-    lead: Array  #: Its time derivative: what a shift in time would add. (M, n) [N·m/s]
+    lead: Array  #: Its time derivative: effect of a time shift. (M, n) [N·m/s]
     rigid: Array  #: The profile's rigid-body torque. (M, n) [N·m]
     gravity: Array  #: The profile's gravity torque. (M, n) [N·m]
 
@@ -201,8 +201,8 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[Co
 
 
 def joint_model(j: int, log: ControllerTargets, before: float) -> ControllerModel:
-    """The model of joint j (from 0); K first, since friction needs it."""
-    # Of two ways to K, the surer one in this log is used.
+    """Model of joint j (from 0); K first, since friction needs it."""
+    # Of two ways to K, the surer one wins.
     still, moving = constant_at_rest(j, log), constant_in_motion(j, log)
     constant = min((still, moving), key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
     K = constant.value if constant.known else before
@@ -211,7 +211,7 @@ def joint_model(j: int, log: ControllerTargets, before: float) -> ControllerMode
 
 
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
-    """K from the ratio at rest, where friction asks for nothing; sd from the current's digits."""
+    """K from the ratio at rest, without friction; sd from the current's digits."""
     points = []
     for source in log.sources:
         recording = source.motion.recording
@@ -236,13 +236,13 @@ def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
 
 
 def resolution(values: Array) -> float:
-    """The smallest step between two values of a signal: its digits."""
+    """Smallest step between two values of a signal: its digits."""
     steps = np.diff(np.unique(np.round(values, 9)))
     return float(steps.min()) if steps.size else 0.0
 
 
 def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
-    """K from currents that follow moments; sd from how little the friction's shape matters."""
+    """K from current against moment; sd from the friction's shapes."""
     moment, speed = log.moment[:, j], np.abs(log.dq[:, j])
     constants, spread = [], []
     for shape in SHAPES:
@@ -263,9 +263,9 @@ def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
 
 
 def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
-    """J from what the moment has beyond the rigid body, and the gravity the controller uses.
+    """J from the moment beyond the rigid body, and the controller's gravity.
 
-    y = J q̈ + s g + c + δ·dy/dt: the scale s tells 9.82 from 9.81 m/s², δ a shift in time.
+    y = J q̈ + s g + c + δ·dy/dt: s separates 9.82 from 9.81 m/s², δ shifts time.
     """
     ddq, gravity, lead, y = (
         signal[:, j] for signal in (log.ddq, log.gravity, log.lead, log.moment - log.rigid)
@@ -273,11 +273,11 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
     A = np.column_stack([ddq, gravity, np.ones(len(y)), lead])
     if np.std(ddq) < 1e-2:
         return UNKNOWN, UNKNOWN
-    # Half of what robustness changes is added to the spread: an account of the model's error.
+    # Half of robustness's change joins the spread, for the model's error.
     fit, plain = fit_column(A, y, np.ones(len(y))), solve(A, y)
     value, sd = float(plain[0]), float(np.hypot(fit.sd[0], 0.5 * (fit.values[0] - plain[0])))
     rotor = Estimate(value, sd, value > 0 and sd <= ROTOR_KNOWN * value)
-    # A joint with gravity that hardly changes tells the constant and the scale only together.
+    # With nearly constant gravity only constant and scale together show.
     scale = 1.0 + float(plain[1])
     scale_sd = float(np.hypot(fit.sd[1], 0.5 * (fit.values[1] - plain[1])))
     return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
@@ -286,10 +286,10 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
 def controller_friction(
     j: int, log: ControllerTargets, constant: float
 ) -> tuple[Shape, Array, Array] | None:
-    """The shape that K·target_current − target_moment fits best, its coefficients and their sd.
+    """Best shape of K·target_current − target_moment, coefficients, sd.
 
-    The controller's own law is a bent line; its points are read where the motion spans them,
-    elsewhere a logarithm replaces it. None where the joint does not move.
+    The controller's own law is a bent line: its points where the motion spans them, elsewhere
+    a logarithm. None at rest.
     """
     speed = np.abs(log.dq[:, j])
     fast = float(np.quantile(speed, 0.9))
@@ -317,9 +317,9 @@ def controller_friction(
 def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) -> None:
     """Raise if a hand led the arm: the controller then uses less friction.
 
-    Where the log has target velocities, they are zero while the arm moves; elsewhere the friction
-    fed forward is a fraction of the law, .1 to 1.1 of it as the joint may be: one joint far below
-    the law tells.
+    Logged target velocities are then zero while the arm moves. Without them the friction fed
+    forward is a fraction of the law, .1 to 1.1 by joint: one joint far below the law
+    shows the hand.
     """
     moves = faster(recording.require("dq"), SLIDES)
     guided = False

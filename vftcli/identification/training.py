@@ -49,11 +49,11 @@ class Training:
 
     @property
     def rotor(self) -> bool:
-        """Whether the torque is measured before the gear, so that it accelerates the rotor too."""
+        """Whether torque is measured before the gear and accelerates the rotor too."""
         return self.robot.torque_source != "link_torque"
 
     def top_speed(self, j: int) -> float:
-        """Speed limit of joint j (from 0), its fastest motion where the robot has none. [rad/s]"""
+        """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
         fastest = max(float(np.max(np.abs(log.motion.dq[:, j]))) for log in self.logs)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 

@@ -1,4 +1,4 @@
-"""Disturbance observers: p and μ along a log in, one estimate of the external torque out."""
+"""Disturbance observers: p and μ of a log in, external torque out."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""What the paper prints otherwise, run by `--as-printed` to show its errata.
+"""Printed variants of the paper, run by `--as-printed` to show its errata.
 
 FDO (29): k₃ has 1 + 2a in its denominator, which adds a²/(1+2a)·(pᵗ + pᵗ⁻¹) to dᵗ, a share of the
 momentum that leaks into the estimate; and the filter starts from Y₂⁰ = 0, τ̂⁰ = ωp⁰, which forgets
@@ -72,7 +72,7 @@ def updated(prior: Array, r: Array) -> tuple[Array, Array]:
 
 
 def settled_prior(model: Discrete, noise: Array) -> Array:
-    """The covariance before a measurement that a constant sample time settles to. (2, 2, n)"""
+    """Settled covariance before a measurement, constant sample time. (2, 2, n)"""
     prior = noise
     for _ in range(LONGEST):
         before = prior
@@ -95,7 +95,7 @@ def printed_steady(model: Discrete, d: Densities) -> Steady:
 
 
 def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) -> Array:
-    """The input of the FDO with k₃ and, at a log's begin, the start as printed. (T, n) [N·m·s]"""
+    """Input of the FDO with printed k₃ and, at a log's begin, start. (T, n) [N·m·s]"""
     a = 0.5 * omega * terms.dt
     driven: Array = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
     if begins:
@@ -104,7 +104,7 @@ def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) 
 
 
 def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[Array, Array]:
-    """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²): its values (T, n), and the last two. (2, n) [N·m]"""
+    """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²): (T, n), the last two (2, n). [N·m]"""
     a = 0.5 * terms.dt * gain
     F, g = np.array([[1.0 - a, -a], [a**0, 0.0 * a]]), np.array([gain, 0.0 * gain])
     # As printed it may well diverge: that is the result, and is shown as unknown.
@@ -119,7 +119,7 @@ def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[A
 
 
 def printed_start(usual: Discrete, densities: Densities, prior: Covariance | None) -> KalmanState:
-    """What the filter with the printed hold is before a log: its prior, settled if not given."""
+    """State of the printed-hold filter before a log: its prior, settled by default."""
     P = settled_prior(usual, printed_noise(usual, densities))
     if prior is not None:
         P = np.array([[prior.p11, prior.p12], [prior.p12, prior.p22]])

@@ -1,12 +1,12 @@
-"""Gains from a log's own spectra: the natural frequency with the smallest expected error.
+"""Gains from a log's spectra: natural frequencies of least expected error.
 
-A Kalman filter's ω_n trades what its lag leaves out of the external torque against what it lets
-through of the noise. Both follow from the spectra of the free and the loaded part of the log, so
-that nobody has to guess:
+A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise that
+passes. Both follow from the spectra of the log's free and loaded part,
+without a guess:
 
     ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
 
-with H the filter's exact complex response, or the smoother's real one.
+with the filter's exact complex response H, or the smoother's real one.
 """
 
 from collections.abc import Callable
@@ -25,23 +25,23 @@ from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.shown import Shown
 from vftcli.signals.terms import DynamicsTerms
 
-SLOWEST = 1.0  #: Smallest natural frequency that is tried. [rad/s]
-#: The same for `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
-#: lets 1/(1 + (ω/ω_n)⁴) through. A joint that nothing pushed may be pushed next. [rad/s]
+SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
+#: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
+#: passes 1/(1 + (ω/ω_n)⁴). A joint without a push may be pushed next. [rad/s]
 SLOWEST_BEST = 9.0
-FASTEST = 2.0  #: Largest natural frequency that is tried, times the sample time. [rad]
-TRIED = 96  #: Natural frequencies tried, on a logarithmic scale.
-LEAST_SHARE = 1e-3  #: R stands for at least this share of the noise in the free part. [1]
-#: And for at least this torque: a log in single precision keeps 1e-5 of 100 N·m. [N·m]
+FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
+TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
+LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
+#: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
 FINEST = 1e-6
 
 
 class Curve(NamedTuple):
-    """The expected error of one kind of filter against its natural frequency."""
+    """Expected error of a kind of filter by its natural frequency."""
 
     omega_n: Array  #: Natural frequencies tried. (G,) [rad/s]
     rmse: Array  #: Expected error. (G, n) [N·m]
-    best: Array  #: The natural frequency with the smallest. (n,) [rad/s]
+    best: Array  #: The best natural frequency. (n,) [rad/s]
 
     @property
     def least(self) -> Array:
@@ -50,7 +50,7 @@ class Curve(NamedTuple):
 
 
 def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
-    """A Kalman observer with natural frequencies, ζ = 1/√2: Q_τ = R ω_n⁴ and Q_p = 0. (n,)"""
+    """Kalman observer of ω_n at ζ = 1/√2: Q_τ = R ω_n⁴, Q_p = 0. (n,)"""
     density = np.broadcast_to(np.asarray(r, dtype=np.float64), omega_n.shape)
     return KalmanObserver(
         discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
@@ -58,13 +58,13 @@ def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
 
 
 def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
-    """A smoother on the Kalman filter with these natural frequencies and ζ = 1/√2. (n,) [rad/s]"""
+    """Smoother of these ω_n at ζ = 1/√2. (n,) [rad/s]"""
     return KalmanSmoother(filter=kalman_filter(omega_n, r))
 
 
-#: Natural frequencies (n,) [rad/s], and R if it is not 1 → the observer.
+#: Natural frequencies (n,) [rad/s], and R if not 1 → observer.
 Kind = Callable[..., Observer]
-#: Name at the command line → what is tuned.
+#: Command-line name → what is tuned.
 KINDS: dict[str, Kind] = {
     "best": kalman_smoother,
     "kfo-auto": kalman_filter,
@@ -73,15 +73,15 @@ KINDS: dict[str, Kind] = {
 
 
 def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
-    """Natural frequencies worth trying at a sample time. (G,) [rad/s]"""
+    """Natural frequencies to try at a sample time. (G,) [rad/s]"""
     found: Array = np.geomspace(SLOWEST, FASTEST / step, TRIED)
     fast: Array = found[found >= min(slowest, found[-1])]
     return fast
 
 
 def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
-    """Expected rmse of every joint at every natural frequency. (G, n) [N·m]"""
-    # Every natural frequency is a joint of one observer: one call gives all responses.
+    """Expected rmse of joints at natural frequencies. (G, n) [N·m]"""
+    # Each natural frequency is a joint of one observer: one call gives all responses.
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
     missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
     passed = (np.abs(response) ** 2).T @ spectra.noise
@@ -89,22 +89,22 @@ def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
 
 
 def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve:
-    """The expected error over all natural frequencies, and where it is smallest."""
+    """Expected errors of natural frequencies, and the best."""
     omega_n = natural_frequencies(spectra.step, slowest)
     rmse = expected_error(kind, omega_n, spectra)
     return Curve(omega_n, rmse, omega_n[np.argmin(rmse, axis=0)])
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
-    """A warning on the joints whose natural frequency ran to a bound of what is tried, if any.
+    """A warning on joints at a bound of the natural frequencies, if any.
 
-    At the slowest the spectra tell no external torque from the noise there; at the fastest, no
-    noise from the external torque.
+    At the slowest the spectra do not separate external torque from noise; at the fastest, not
+    noise from external torque.
 
     Args:
         name: The observer.
-        rate: What was chosen of the grid. (n,) [rad/s]
-        grid: What was tried, as by `natural_frequencies`. (G,) [rad/s]
+        rate: The chosen ones. (n,) [rad/s]
+        grid: The tried ones, of `natural_frequencies`. (G,) [rad/s]
     """
     reached = {
         "gain-at-slowest": (rate <= grid[0], grid[0]),
@@ -122,13 +122,13 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
-    """R with which the filter's innovations have the variance that it expects. (n,)
+    """R at which the innovations have the variance the filter expects. (n,)
 
-    Gains depend on Q/R alone; R sets the scale of the covariance. The innovation is what the
-    estimate jumps by, ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may come out as
-    nothing, or as less where S_d was extrapolated from a few impacts, and no filter runs on R = 0:
-    R is held above `LEAST_SHARE` of what S_n makes of it and above the noise of `FINEST`, a torque
-    that is constant over a sample.
+    Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's jump,
+    ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too small where few
+    impacts extrapolate S_d, and no filter runs on R = 0: R is at least `LEAST_SHARE` of S_n's R and
+    the noise of `FINEST`, a torque that is constant over a
+    sample.
     """
     n = len(omega_n)
     unit = kalman_filter(omega_n)
@@ -146,30 +146,30 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class AutoTuned(Shown):
-    """An observer with gains from the log, or with hand-set ones where there are none."""
+    """An observer with gains from the log, or set by hand."""
 
-    name: str  #: Name at the command line.
-    observer: Observer  #: The observer itself.
-    #: What was minimised, None where it fell back.
+    name: str  #: Command-line name.
+    observer: Observer  #: The observer.
+    #: The expected error; None for set gains.
     curve: Curve | None = field(default=None, repr=False)
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
-        """Run over a whole log; a joint of which gains and log make no number is not finite."""
+        """Estimate of a log; joints without a number are not finite."""
         with np.errstate(all="ignore"):
             return replace(self.observer.estimate(terms), name=self.name)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What the gains mean at a sample time; where the log tuned them, none is left to. [s]"""
+        """Meaning of the gains at a sample time; none to set if the log set them. [s]"""
         meaning = self.observer.tuning(step, joints)
         return replace(meaning, parameter_count=0) if self.curve is not None else meaning
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
+        """Complex gain from torque to estimate at `frequency` [Hz]. (F, n)"""
         return self.observer.frequency_response(frequency, step, joints)
 
 
 def tune_to_spectra(name: str, spectra: Spectra) -> AutoTuned:
-    """The observer `name` with the natural frequencies its spectra call for."""
+    """The observer `name` with the spectra's natural frequencies."""
     found = error_curve(KINDS[name], spectra, SLOWEST_BEST if name == "best" else SLOWEST)
     best = frozen(found.best)
     observer = KINDS[name](best, noise_level(best, spectra))

@@ -1,9 +1,9 @@
-"""What a user may choose of the observers: which run, with which gains, in which form."""
+"""A user's choice of observers: their names, gains and form."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import ESTIMATE, Choice, Option
@@ -42,13 +42,13 @@ def goal_of(text: str) -> "Goal":
 
 @dataclass(frozen=True, kw_only=True)
 class ObserverChoice(Choice):
-    """Which observers run, and what their gains are.
+    """Observers to run, and their gains.
 
     Raises:
         ParameterError: If there is no such observer, or none of those named could run online.
     """
 
-    GROUP: ClassVar[str] = ESTIMATE
+    GROUP = ESTIMATE
 
     #: The observers, keys of `vftcli.observers.table.OBSERVERS`, "best" first. None given:
     #: `DEFAULT`, or the paper's four where their own formulas or one footing for all of them is
@@ -169,12 +169,12 @@ class ObserverChoice(Choice):
 
     @property
     def of_robot_file(self) -> bool:
-        """Whether the observers run with the gains of the robot's file, and none is changed."""
+        """Whether all observers run with unchanged gains of the robot's file."""
         changed = self.settings or self.gains_file is not None or self.match is not None
         return self.gains == PAPER_GAINS and not changed
 
     def beside_print(self) -> "ObserverChoice":
-        """The choice beside a printed table: without `best` where that is there by default."""
+        """The choice beside a printed table: without a default `best`."""
         from vftcli.observers.table import DEFAULT, PAPER
 
         return replace(self, names=PAPER) if self.names == DEFAULT else self
@@ -182,10 +182,10 @@ class ObserverChoice(Choice):
     def build(
         self, robot: "Robot", step: float, shown: "LogSpectra | None" = None
     ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
-        """Build the observers for one robot and sample time, with remarks on gains nobody gave.
+        """Observers for one robot and sample time, with remarks on unset gains.
 
         Args:
-            robot: The arm, whose file gives the gains that are not set here.
+            robot: The arm; its file gives the gains that are not set here.
             step: Sample time. [s]
             shown: What the complete log shows of noise and contact, None where its free part is
                 not known.

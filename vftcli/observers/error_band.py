@@ -1,4 +1,4 @@
-"""How far an estimate may be off, sample by sample, as the log itself shows it.
+"""Error of an estimate, sample by sample, by the log itself.
 
 One model for every estimator, whatever its own covariance says,
 
@@ -6,7 +6,7 @@ One model for every estimator, whatever its own covariance says,
 
 with e² the mean square of what the estimator reads where nothing touches the arm, bias and model
 error included, a resting joint's and a moving joint's apart; the integral what lag and bandwidth
-leave out of the torque there is; and c the standard deviation of a correction that was taken off.
+leave out of the torque there is; and c the standard deviation of a subtracted correction.
 A resting joint holds stiction that no estimator sees: there e is at least the share of the dry
 friction that drives were measured to hold.
 """
@@ -70,7 +70,7 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
 def error_band(
     free: FreeError, missed: Array, resting: Mask, correction_sd: Array | None = None
 ) -> Array:
-    """Standard deviation of an estimate's error, as the module's equation has it. (T, n) [N·m]
+    """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
 
     Args:
         free: What the estimator reads where nothing touches the arm.

@@ -1,4 +1,4 @@
-"""What the two first-order observers share: sample times, restarts, and what a gain means."""
+"""Common part of the two first-order observers: steps, restarts, gains."""
 
 from typing import NamedTuple
 
@@ -15,7 +15,7 @@ GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 
 
 class FirstOrderState(NamedTuple):
-    """Where a first-order observer stands after a block of a log."""
+    """State of a first-order observer after a block of a log."""
 
     states: Array  #: Its states, the estimate first. (m, n) [N·m]
     gaps: int = 0  #: Number of gaps that it started afresh after.
@@ -37,7 +37,7 @@ def run_first_order(
     driven: Array | None = None,
     afresh: Array | None = None,
 ) -> tuple[Array, FirstOrderState]:
-    """Run τ̂ᵗ = (1−a)/(1+a) τ̂ᵗ⁻¹ + rate/(1+a) dᵗ with a = rate·Ts/2 over a block of a log. (T, n)
+    """τ̂ᵗ = (1−a)/(1+a) τ̂ᵗ⁻¹ + rate/(1+a) dᵗ, a = rate·Ts/2, of a block. (T, n)
 
     Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign: there the
     filter starts afresh, and a remark says so. Gains with a > 1 at the nominal step restart
@@ -106,9 +106,9 @@ def first_order_tuning(rate: Array, step: float, parameter_count: int) -> Tuning
 
 
 def first_order_response(rate: Array, frequency: Array, step: float) -> Complex:
-    """Exact response to τ_ext = e^{jωt} of r = rate·(p − p⁻¹)/(1+a) + (1−a)/(1+a) r⁻¹. (F, n)
+    """Exact response of r = rate·(p − p⁻¹)/(1+a) + (1−a)/(1+a) r⁻¹. (F, n)
 
-    The momentum is the continuous integral e^{jωt}/(jω), sampled.
+    For τ_ext = e^{jωt}; its momentum is the continuous integral e^{jωt}/(jω), sampled.
     """
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
     # At 0 Hz the quotient is 0/0; its limit is reached to the last digit long before.

@@ -1,4 +1,4 @@
-"""The disturbance Kalman filter at a sample time: A, B, Q, R and the gains L (36)–(44).
+"""Disturbance Kalman filter at a sample time: A, B, Q, R, gains L (36)–(44).
 
 For one joint: state x = [p; τ_ext], input μ, output p, ẋ = A_c x + B_c μ + w with
 A_c = [[0, 1], [0, −a]].
@@ -28,7 +28,7 @@ class Densities(NamedTuple):
 
 
 class Discrete(NamedTuple):
-    """A discretised two-state model, each entry with the shape of the broadcast (Ts, joint).
+    """A discrete two-state model, each entry of the shape (Ts, joint) broadcast.
 
     A = [[1, a12], [0, a22]], B = [Ts; 0], process noise q11, q12, q22, measurement noise r.
     """
@@ -43,7 +43,7 @@ class Discrete(NamedTuple):
 
 
 def forward_euler(step: Array, d: Densities) -> Discrete:
-    """Forward Euler (41): A = I + Ts·A_c, Q̂ = Ts·diag(Q_p, Q_τ), which is stable for aTs ≤ 2."""
+    """Forward Euler (41): A = I + Ts·A_c, Q̂ = Ts·diag(Q_p, Q_τ); aTs ≤ 2: stable."""
     shape = np.broadcast_shapes(np.shape(step), d.r.shape)
     step = np.broadcast_to(step, shape)
     return Discrete(
@@ -58,7 +58,7 @@ def forward_euler(step: Array, d: Densities) -> Discrete:
 
 
 def zero_order_hold(step: Array, d: Densities) -> Discrete:
-    r"""Exact discretisation (43), (44) with the corrected lower-right block −A_cᵀ (Van Loan).
+    r"""Exact discretisation (43), (44), corrected lower-right block −A_cᵀ (Van Loan).
 
     Written out, with E(s) = (1 − e^{−as})/a and a → 0 in brackets:
 
@@ -140,7 +140,7 @@ class Covariance(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """Filtered gains L₁ (momentum) and L₂ (torque) and the covariance after the update."""
+    """Filtered gains L₁ (momentum), L₂ (torque), covariance after the update."""
 
     l1: Array
     l2: Array
@@ -148,14 +148,14 @@ class Gains(NamedTuple):
 
 
 class Steady(NamedTuple):
-    """What a constant sample time settles to: the gains and the prior covariance."""
+    """Settled gains and prior covariance at a constant sample time."""
 
     gains: Gains
     prior: Covariance
 
 
 def steady(model: Discrete, decay: Array) -> Steady:
-    """The stationary filter, the stabilising solution of the discrete Riccati equation.
+    """Stationary filter: stabilising solution of the discrete Riccati equation.
 
     For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R), β = (Q₁₁ − TsQ₁₂)/R, y = ½(λ + √(λ² + 16 + 4β)),
     r = ½(y − √(y² − 4)), L₁ = 1 − r², L₂ = λr/Ts; for A_τ ≠ 0 by SciPy's solver, joint by joint.
@@ -178,7 +178,7 @@ def steady(model: Discrete, decay: Array) -> Steady:
 
 
 def solved_prior(model: Discrete) -> Covariance:
-    """The stationary prior from SciPy's discrete Riccati solver, one joint at a time. (n,)"""
+    """Stationary prior by SciPy's discrete Riccati solver, each joint. (n,)"""
     from scipy.linalg import solve_discrete_are
 
     entries = []
@@ -227,7 +227,7 @@ def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
 
 
 class KalmanState(NamedTuple):
-    """Where a Kalman observer stands after a block of a log."""
+    """State of a Kalman observer after a block of a log."""
 
     error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
     posterior: Covariance  #: Their covariance. (n,) each

@@ -8,7 +8,7 @@ from vftcli.observers.observer import Observer
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.terms import DynamicsTerms
 
-LEAD = 60.0  #: For how many 1/ω_n of the slowest joint the arm is taken to have stood before a log.
+LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.
 SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
 
@@ -40,7 +40,7 @@ def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorq
 
 
 def settling_samples(observer: Observer, step: float, joints: int) -> int:
-    """Samples after which `SETTLED` of where an estimate started is left, of the slowest joint.
+    """Samples until `SETTLED` of a start is left, of the slowest joint.
 
     Args:
         observer: The observer.

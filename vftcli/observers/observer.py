@@ -1,4 +1,4 @@
-"""What every observer is: parameters in, one estimate of the external torque out."""
+"""Interface of every observer: parameters in, external torque out."""
 
 from abc import abstractmethod
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class Tuning(Shown):
-    """What an observer's parameters mean, joint by joint."""
+    """Meaning of an observer's parameters, joint by joint."""
 
     omega_n: Array  #: Natural frequency; for a first-order observer its cutoff. (n,) [rad/s]
     zeta: Array  #: Damping ratio; NaN for a first-order observer. (n,)
@@ -33,7 +33,7 @@ class Tuning(Shown):
 
 
 class Observer(Protocol):
-    """A disturbance observer; it knows (t, p, μ) and nothing else of the robot or its log."""
+    """A disturbance observer; it knows only (t, p, μ) of robot and log."""
 
     @property
     def name(self) -> str:
@@ -45,7 +45,7 @@ class Observer(Protocol):
         ...
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What the parameters mean at a sample time. [s]"""
+        """Meaning of the parameters at a sample time. [s]"""
         ...
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
@@ -54,7 +54,7 @@ class Observer(Protocol):
 
 
 class BlockObserver(Shown):
-    """An observer that goes on from where it was after the block before; a log is one block."""
+    """An observer that continues after the last block; a log is one block."""
 
     @property
     @abstractmethod
@@ -63,7 +63,7 @@ class BlockObserver(Shown):
 
     @abstractmethod
     def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
-        """The estimate of a block, and what the observer is after it; None where a log begins."""
+        """Estimate of a block, and the observer's state after; None at a log's start."""
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """The estimate of a whole log, from rest at its first sample."""

@@ -1,17 +1,17 @@
-r"""The paper's four observers: filtered dynamics, generalised momentum, and two Kalman filters.
+r"""The paper's four observers: filtered dynamics, momentum, two Kalman filters.
 
-All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and μ = τ + Cᵀq̇ − g − F_f, and all
-have one input: the momentum that a log gains over a sample and the model does not explain,
+All rest on :math:`\dot p = \mu + \tau_{ext}` (33) with p = M q̇ and μ = τ + Cᵀq̇ − g − F_f. Their
+one input is the momentum gained over a sample beyond the model:
 
     dᵗ = pᵗ − pᵗ⁻¹ − ½Ts(μᵗ + μᵗ⁻¹).
 
     FDO, GMO   τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a),  a = ½K Ts
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
-from zero at the log's first sample. `first_order` holds what the first two share, `kalman_model`
-A, Q, R and L at a sample time, `uneven` what follows a clock that jitters, `as_printed` what the
-paper prints otherwise. An observer runs over a block of a log and says where it is after it; a
-whole log is one block.
+from zero at the log's first sample. `first_order` holds the first two's common part,
+`kalman_model` A, Q, R and L at a sample time, `uneven` the runs on a clock that jitters,
+`as_printed` the paper's printed variants. An observer runs over a block and returns its state;
+a whole log is one block.
 """
 
 from dataclasses import dataclass
@@ -64,13 +64,13 @@ from vftcli.signals.series import Clock
 from vftcli.signals.steady_filter import steady_filter
 from vftcli.signals.terms import DynamicsTerms, one_sample_earlier
 
-#: Weights that pick the external torque out of a Kalman filter's two states. (2, 1)
+#: Weights of the external torque in a Kalman filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class FilteredDynamicsObserver(BlockObserver):
-    r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, nothing differentiated.
+    r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, no derivative.
 
     τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the bilinear
     transform with a = ωTs/2 (27)–(29):
@@ -78,17 +78,17 @@ class FilteredDynamicsObserver(BlockObserver):
         Y₁ᵗ = k₁Y₁ᵗ⁻¹ − k₂(μᵗ + μᵗ⁻¹),  Y₂ᵗ = k₁Y₂ᵗ⁻¹ + k₃(pᵗ + pᵗ⁻¹),  τ̂ = Y₁ + Y₂ + ωp
 
     k₁ = (1−a)/(1+a), k₂ = a/(1+a), k₃ = −ωa/(1+a), from Y₁⁰ = 0 and Y₂⁰ = −ωp⁰, so that τ̂⁰ = 0.
-    With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are together the momentum observer with
-    K = ω, for every sample time. The printed k₃ and start are errata: `as_printed`.
+    With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are the momentum observer with K = ω,
+    at every sample time. The printed k₃ and start are errata: `as_printed`.
 
-    Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
+    Past a gap with a > 1 the filter starts afresh, with a remark.
 
     Raises:
         ParameterError: If the cutoff is not positive.
     """
 
     name: ClassVar[str] = "fdo"
-    omega: float = 10.0  #: Cutoff ω, the same for all joints. [rad/s]
+    omega: float = 10.0  #: Cutoff ω of all joints. [rad/s]
     as_printed: bool = False  #: Use the printed k₃ and start.
 
     def __post_init__(self) -> None:
@@ -100,7 +100,7 @@ class FilteredDynamicsObserver(BlockObserver):
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """The estimate of a block from where the block before ended; None where the log begins."""
+        """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
         driven = afresh = None
         if self.as_printed:
@@ -111,11 +111,11 @@ class FilteredDynamicsObserver(BlockObserver):
         return self.estimated(terms, tau, remarks=state.remarks), state
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What ω means at a sample time. [s]"""
+        """Meaning of ω at a sample time. [s]"""
         return first_order_tuning(np.full(joints, self.omega), step, parameter_count=1)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain at `frequency` [Hz]: that of a momentum observer with K = ω. (F, n)"""
+        """Complex gain of a momentum observer with K = ω at `frequency` [Hz]. (F, n)"""
         return first_order_response(np.full(joints, self.omega), frequency, step)
 
 
@@ -127,17 +127,17 @@ class MomentumObserver(BlockObserver):
 
         rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
 
-    (35) as printed feeds back one sample late, unstable from K·Ts = 2 on: `as_printed`.
+    (35) as printed feeds back a sample late, unstable from K·Ts = 2: `as_printed`.
 
-    Past a gap with a > 1 the filter starts afresh, and the estimate's remarks say so.
+    Past a gap with a > 1 the filter starts afresh, with a remark.
 
     Raises:
         ParameterError: If a gain is not positive.
     """
 
     name: ClassVar[str] = "gmo"
-    gain: Array | float = 10.0  #: Bandwidth K, one number or one a joint. (n,) [1/s]
-    as_printed: bool = False  #: Feed back one sample late, as (35) is printed.
+    gain: Array | float = 10.0  #: Bandwidth K, one or one a joint. (n,) [1/s]
+    as_printed: bool = False  #: Feed back a sample late, as (35) is printed.
 
     def __post_init__(self) -> None:
         gain = numbers_of(self.gain, "gain", self.name)
@@ -148,7 +148,7 @@ class MomentumObserver(BlockObserver):
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
-        """The estimate of a block from where the block before ended; None where the log begins."""
+        """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
         gain = per_joint(self.gain, terms.joints)
         if not self.as_printed:
@@ -162,7 +162,7 @@ class MomentumObserver(BlockObserver):
         return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What K means at a sample time. [s]"""
+        """Meaning of K at a sample time. [s]"""
         return first_order_tuning(per_joint(self.gain, joints), step, parameter_count=joints)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
@@ -174,29 +174,29 @@ class MomentumObserver(BlockObserver):
 class KalmanObserver(BlockObserver):
     r"""KFO (36)–(44): Kalman filter on x = [p; τ_ext], ṗ = μ + τ_ext + w_p, τ̇_ext = A_ττ_ext + w_τ.
 
-    With diagonal R, Q_p and Q_τ it is n two-state filters whose gains do not depend on the data.
+    With diagonal R, Q_p and Q_τ it is n two-state filters with gains independent of data.
     The input is the trapezoid ½(μᵗ + μᵗ⁻¹). The first sample is x̂⁰ = [p⁰; 0] with the stationary
-    prior, so that at a constant sample time there is no transient of the gains; on an uneven clock
-    the covariance is propagated with every step's own A, B, Q and R. `sd` of its estimate is √P₂₂,
-    the filter's own account of its error.
+    prior: a constant sample time has no transient of the gains. On an uneven clock each step
+    propagates the covariance with its own A, B, Q and R. The estimate's `sd` is √P₂₂, the filter's
+    own error.
 
-    For A_τ = 0, A_c² = 0 and both discretisations have the same A and B; they differ in Q only.
+    For A_τ = 0, A_c² = 0 and both discretisations share A and B; only Q differs.
 
     Raises:
         ParameterError: If a variance is not positive, or a name is unknown.
     """
 
     discretisation: str = "fe"  #: "fe" (41), (42) or "zoh" (43), (44).
-    r_diag: Array | float = 0.5  #: R, one number or one a joint. (n,) [(N·m·s)²·s under "density"]
+    r_diag: Array | float = 0.5  #: R, one or one a joint. (n,) [(N·m·s)²·s under "density"]
     q_p_diag: Array | float = 0.01  #: Q_p. (n,) [(N·m)²·s]
     q_tau_diag: Array | float = 5000.0  #: Q_τ. (n,) [(N·m)²/s]
-    #: a in A_τ = −a; a number with its sign turned means the same. (n,) [1/s]
+    #: a in A_τ = −a, of either sign. (n,) [1/s]
     decay: Array | float = 0.0
     noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
-    #: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂), one a joint, or None for the stationary one. (3,
+    #: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂) per joint, or None: stationary. (3,
     #: n)
     initial_covariance: Array | None = None
-    #: Use μᵗ alone (40), the literal noise convention, and (44)'s printed block.
+    #: Use μᵗ alone (40), the literal noise convention, (44)'s printed block.
     as_printed: bool = False
 
     def __post_init__(self) -> None:
@@ -205,7 +205,7 @@ class KalmanObserver(BlockObserver):
         check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = numbers_of(getattr(self, name), name, self.name)
-            # The paper gives A_τ = −a, its tables a: either sign means the same decay.
+            # The paper gives A_τ = −a, its tables a: either sign means this decay.
             value = frozen(np.abs(value)) if name == "decay" else value
             object.__setattr__(self, name, value)
             least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
@@ -223,7 +223,7 @@ class KalmanObserver(BlockObserver):
     def run(
         self, terms: DynamicsTerms, state: KalmanState | None = None
     ) -> tuple[ExternalTorque, KalmanState]:
-        """The estimate of a block from where the block before ended; None where the log begins."""
+        """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
         n, begins = terms.joints, state is None
         densities, d = self.densities(n), self.unexplained(terms)
@@ -257,7 +257,7 @@ class KalmanObserver(BlockObserver):
         return Densities(*(per_joint(value, joints) for value in values))
 
     def model(self, step: Array | float, joints: int) -> Discrete:
-        """The discrete model at one sample time, or one a sample as a column (T, 1). [s]"""
+        """Discrete model at one sample time, or at each as a column (T, 1). [s]"""
         return self._model_of(self.densities(joints), step)
 
     def _model_of(self, densities: Densities, step: Array | float) -> Discrete:
@@ -272,27 +272,27 @@ class KalmanObserver(BlockObserver):
 
     @property
     def prints_hold(self) -> bool:
-        """Whether its noise is that of (44) as printed."""
+        """Whether its noise is (44)'s as printed."""
         return self.as_printed and self.discretisation == "zoh"
 
     def _settled(self, model: Discrete, densities: Densities) -> Steady:
-        """What a model of one sample time settles to."""
+        """Settled state of a model at one sample time."""
         if self.prints_hold:
             return printed_steady(model, densities)
         return steady(model, densities.decay)
 
     def is_steady(self, clock: Clock) -> bool:
-        """Whether the gains along a log of this clock are the stationary ones from its start on."""
+        """Whether a log's clock gives stationary gains from its start."""
         return clock.uniform and self.initial_covariance is None
 
     def unexplained(self, terms: DynamicsTerms) -> Array:
-        """The filter's input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or with u = μᵗ (40). (T, n)"""
+        """Input pᵗ − pᵗ⁻¹ − Ts·u: `DynamicsTerms.d`, or u = μᵗ (40). (T, n)"""
         if not self.as_printed:
             return terms.d
         return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
     def first_prior(self, settled: Steady) -> Covariance:
-        """Covariance before the first update: the user's, or the stationary one. (n,)"""
+        """Covariance before the first update: given or stationary. (n,)"""
         if self.initial_covariance is None:
             return settled.prior
         given, joints = np.asarray(self.initial_covariance, np.float64), len(settled.prior.p11)
@@ -302,14 +302,14 @@ class KalmanObserver(BlockObserver):
         return Covariance(*np.broadcast_to(given.reshape(3, -1), (3, joints)))
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)) of the effective densities, and the exact delay.
+        """ω_n = (Q_τ/R)^¼, ζ = ½√(2 + Q_p/√(Q_τR)), exact delay.
 
-        Q and R are taken as the convention makes them at this sample time; the delay to a ramp is
-        L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
+        Q and R are the convention's effective densities at this sample time; the delay to a ramp
+        is L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
         """
         d, model = self.densities(joints), self.model(step, joints)
         gains = self.steady(step, joints).gains
-        # The convention scales all of Q alike, so Q₂₂/Ts (with A_τ = 0) is the effective density.
+        # The convention scales all of Q: Q₂₂/Ts (with A_τ = 0) is the effective density.
         literal = self.as_printed or self.noise_convention == "literal"
         scale = model.step if literal and self.discretisation == "fe" else np.ones(joints)
         r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
@@ -327,13 +327,13 @@ class KalmanObserver(BlockObserver):
         )
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Exact response to τ_ext = e^{jωt} whose integral, the momentum, is sampled. (F, n)"""
+        """Exact response to τ_ext = e^{jωt}, its integral, the momentum, sampled. (F, n)"""
         model, gains = self.model(step, joints), self.steady(step, joints).gains
         omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
         omega = np.where(omega == 0.0, 1e-9, omega)
         back = np.exp(-1j * omega * step)
         (f11, f12), (f21, f22) = closed_loop(gains, model.a12, model.a22)
-        # (I − F z⁻¹) x = L p: the second row of the inverse times L.
+        # (I − F z⁻¹) x = L p: the inverse's second row times L.
         determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
         second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant
         response: Complex = second / (1j * omega)

@@ -1,14 +1,14 @@
-"""Rauch–Tung–Striebel smoother on the disturbance Kalman filter: `kfo-rts`, for complete logs.
+"""Rauch–Tung–Striebel smoother on the disturbance Kalman filter: `kfo-rts`.
 
-A log is complete, so an estimate at t may use what came after t. The smoother is the Kalman
-filter's fixed-interval answer, run backwards in the form of Bryson and Frazier, which needs the
-innovations ν only and inverts nothing but a number:
+In a complete log an estimate at t may use later samples. The smoother is the Kalman filter's
+fixed-interval answer, run backwards in Bryson and Frazier's form. It needs only the innovations ν
+and inverts only numbers:
 
     λ̃ᵗ = Aᵀ[(I − LC)ᵀ λ̃ᵗ⁺¹ − Cᵀ νᵗ⁺¹/Sᵗ⁺¹],  λ̃ = 0 at the last sample,  x̂ₛᵗ = x̂ᵗ − Pᵗ λ̃ᵗ
 
 with P the filter's posterior and S its innovation variance. In the long run it is the two-sided
-filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap, because it knows that
-one is coming.
+filter |H|² = Q_τ/(Q_τ + Q_p ω² + R ω⁴): no delay, but it leads before a tap: it knows the
+future.
 
 References:
     H. E. Rauch, F. Tung, C. T. Striebel, "Maximum likelihood estimates of linear dynamic systems",
@@ -30,22 +30,22 @@ from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
 from vftcli.signals.terms import DynamicsTerms
 
-#: Share of the smoother's settled information that may be missing where it counts as settled.
+#: Share of the settled information that may still be missing.
 SETTLED = 1e-16
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class KalmanSmoother(Shown):
-    """Fixed-interval smoother on a disturbance Kalman filter, with the filter's own parameters.
+    """Fixed-interval smoother with a disturbance Kalman filter's parameters.
 
-    Exact at uneven clocks; memory grows with the log, time too.
+    Exact at uneven clocks; memory and time grow with the log.
     """
 
-    filter: KalmanObserver  #: The Kalman observer that it smooths.
-    name: str = "kfo-rts"  #: Name at the command line.
+    filter: KalmanObserver  #: The filter to smooth.
+    name: str = "kfo-rts"  #: Command-line name.
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
-        """Smooth a whole log; `sd` is the smoother's own √P₂₂."""
+        """A smoothed log; `sd` is the smoother's own √P₂₂."""
         if self.filter.is_steady(terms.clock):
             tau, sd = self._steady(terms)
         else:
@@ -53,7 +53,7 @@ class KalmanSmoother(Shown):
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
 
     def _steady(self, terms: DynamicsTerms) -> tuple[Array, Array]:
-        """Smooth with settled gains. (T, n) each"""
+        """Smoothed with settled gains. (T, n) each"""
         samples, n = terms.p.shape
         settled = self.filter.steady(terms.clock.step, n)
         model = self.filter.model(terms.clock.step, n)
@@ -62,7 +62,7 @@ class KalmanSmoother(Shown):
         tau, _ = steady_filter(F, g, d, np.zeros((2, n)), wanted=TORQUE)
         nu = innovations(tau, gains.l2 * S, model.a22)  # ν/S
         backward, b = backward_filter(gains, model.a12, model.a22)
-        # λ̃ᵗ is driven by νᵗ⁺¹: turned round, by the sample before.
+        # νᵗ⁺¹ drives λ̃ᵗ: in reverse, the sample before.
         driven = np.zeros_like(nu)
         driven[1:] = nu[:0:-1]
         weights = np.stack([gains.posterior.p12, gains.posterior.p22])
@@ -74,13 +74,13 @@ class KalmanSmoother(Shown):
         return tau, sd
 
     def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
-        """Smooth with gains that follow each step's own sample time. (T, n) each"""
+        """Smoothed with gains for each step's sample time. (T, n) each"""
         samples, n = terms.p.shape
         settled = self.filter.steady(terms.clock.step, n)
         model = self.filter.model(np.broadcast_to(terms.dt, (samples, 1)), n)
         gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
         # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
-        with np.errstate(divide="ignore"):  # a gap of days leaves nothing known: L₁ = 1, S = ∞
+        with np.errstate(divide="ignore"):  # after a gap of days: L₁ = 1, S = ∞
             S = model.r / (1.0 - gains.l1)
         (F, g), d = error_filter(gains, model.a12, model.a22), self.filter.unexplained(terms)
         states = recursion(F, g * d, np.zeros((2, n)))
@@ -93,9 +93,9 @@ class KalmanSmoother(Shown):
         return states[1] - (P.p12 * lam[0] + P.p22 * lam[1]), np.sqrt(variance)
 
     def tuning(self, step: float, joints: int) -> Tuning:
-        """What the parameters mean: no delay, −3 dB where |H_KFO|² has fallen to 1/√2.
+        """Meaning of the parameters: no delay, −3 dB at |H_KFO|² = 1/√2.
 
-        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities, ω_n and ζ those of the filter.
+        Q_τ/(Q_τ + Q_pω² + Rω⁴) = 1/√2 at the effective densities, with the filter's ω_n and ζ.
         """
         causal = self.filter.tuning(step, joints)
         # In units of ω_n: x⁴ + c x² + 1 = √2 with c = Q_p/√(Q_τR) = 4ζ² − 2.
@@ -111,7 +111,7 @@ class KalmanSmoother(Shown):
         )
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Gain of the two-sided filter in the middle of a log: real, without delay. (F, n)"""
+        """Two-sided gain in the middle of a log: real, no delay. (F, n)"""
         causal = self.filter.tuning(step, joints)
         x = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None] / causal.omega_n
         c = 4.0 * causal.zeta**2 - 2.0
@@ -120,14 +120,14 @@ class KalmanSmoother(Shown):
 
 
 def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
-    """√P₂₂ of the smoother from a log's last sample backwards, until it has settled. (≤ T, n)"""
+    """√P₂₂ from a log's last sample backwards until settled. (≤ T, n)"""
     step = information_step(gains, model.a12, model.a22)
     missing = missing_information(step, information_gain(model.a12, S), samples)
     return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
 
 
 def innovations(tau: Array, l2: Array, a22: Array) -> Array:
-    """ν of the steady filter, read off its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
+    """ν of the steady filter from its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
 
     Args:
         tau: τ̂. (T, n)
@@ -141,7 +141,7 @@ def innovations(tau: Array, l2: Array, a22: Array) -> Array:
 
 
 def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
-    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ of the backward recursion. (2, 2, …), (2, …)"""
+    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ, backwards. (2, 2, …), (2, …)"""
     return closed_loop(gains, a12, a22).swapaxes(0, 1), np.array([-np.ones_like(a12), -a12])
 
 
@@ -158,12 +158,12 @@ def information_step(gains: Gains, a12: Array, a22: Array) -> Array:
 
 
 def information_gain(a12: Array, S: Array) -> Array:
-    """AᵀCᵀCA/S, what one sample tells of the one before, as (Λ₁₁, Λ₁₂, Λ₂₂). (3, …)"""
+    """AᵀCᵀCA/S, a sample's information on the one before. (3, …)"""
     return np.array([1.0 / S, a12 / S, a12**2 / S])
 
 
 def smoothed_variance(P: Covariance, information: Array) -> Array:
-    """Variance of the smoothed torque, P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ. Like P₂₂ [(N·m)²]"""
+    """Smoothed torque's variance P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ, like P₂₂. [(N·m)²]"""
     l11, l12, l22 = information
     gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
     variance: Array = P.p22 - gained
@@ -171,10 +171,10 @@ def smoothed_variance(P: Covariance, information: Array) -> Array:
 
 
 def missing_information(step: Array, gain: Array, samples: int) -> Array:
-    """What Λ̃ lacks of its settled value, 0, 1, 2 … samples from the end of a log. (N, 3, n)
+    """Λ̃ less its settled value, 0, 1, 2 … samples from a log's end. (N, 3, n)
 
-    Λ̃ ← SΛ̃ + g settles at Λ̃∞ = (I − S)⁻¹g, from which it is Sᵏ Λ̃∞ away after k samples. The
-    powers come by doubling, until nothing is missing or the log ends.
+    Λ̃ ← SΛ̃ + g settles at Λ̃∞ = (I − S)⁻¹g; k samples later Sᵏ Λ̃∞ is missing. The powers
+    come by doubling, until nothing is missing or the log ends.
     """
     S, g = np.moveaxis(step, -1, 0), np.moveaxis(gain, -1, 0)
     settled = np.linalg.solve(np.eye(3) - S, g[..., None])[..., 0]
@@ -189,6 +189,6 @@ def missing_information(step: Array, gain: Array, samples: int) -> Array:
 
 
 def from_the_end(F: Array, x: Array) -> Array:
-    """Run y_t = F_t y_{t+1} + x_t from a log's end; what comes of the samples behind each one."""
+    """y_t = F_t y_{t+1} + x_t from a log's end, at each sample."""
     y = recursion(F[:, :, ::-1], x[:, ::-1], np.zeros_like(x[:, 0]))[:, ::-1]
     return np.concatenate([y[:, 1:], np.zeros_like(y[:, :1])], axis=1)

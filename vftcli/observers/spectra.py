@@ -1,4 +1,4 @@
-"""Spectra of what the model leaves unexplained, over the free and the loaded part of a log.
+"""Spectra of the model's rest over the free and the loaded part of a log.
 
 The raw disturbance d = (pᵗ − pᵗ⁻¹)/Ts − ½(μᵗ + μᵗ⁻¹) is the external torque, averaged over a
 sample, plus everything else: noise, friction and model error. Its spectrum over the free part, S_n,
@@ -33,7 +33,7 @@ LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded par
 IMPACT = 1.0  #: A loaded part of which nothing lasts longer is one of impacts. [s]
 #: How far the average of neighbouring frequencies reaches, as a share of the frequency.
 NEIGHBOURS = 0.2
-SLOW = 5.0  #: Up to here the spectrum of the external torque is taken as it is measured. [Hz]
+SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [Hz]
 #: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
 #: and the 4 of one that has no jumps and no corners.
 FALL = 2.5
@@ -44,7 +44,7 @@ FALL = 2.5
 #: all the time 0.82 and less.
 QUIETER = 0.85
 
-CONTACT_BAND = 5.0  #: Where contacts are told from noise: below this frequency. [Hz]
+CONTACT_BAND = 5.0  #: Contacts are separated from noise below this. [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,7 @@ class Spectra:
 
     @property
     def floor(self) -> Array:
-        """Noise alone: S_n from its quietest octave up, below it that octave's level. (F, n)
+        """Noise S_n from its quietest octave up, below at that octave's level. (F, n)
 
         Friction and model error make the rest of S_n at low frequencies.
         """
@@ -132,7 +132,7 @@ class Spectra:
 
 
 def neighbour_mean(spectrum: Array) -> Array:
-    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of its frequency. (F, n)"""
+    """Mean of each bin and its neighbours within ±`NEIGHBOURS` of it. (F, n)"""
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)
@@ -142,7 +142,7 @@ def neighbour_mean(spectrum: Array) -> Array:
 
 
 def around_impacts(t: Array, inside: Mask) -> Mask:
-    """A part as it is, or half of `IMPACT` more on either side if none of it lasts that long. (T,)
+    """A part, or half of `IMPACT` more on either side if it is too short. (T,)
 
     Args:
         t: Clock. (T,) [s]
@@ -152,7 +152,7 @@ def around_impacts(t: Array, inside: Mask) -> Mask:
 
 
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
-    """The spectra of a loaded part and a free one, by the same estimator.
+    """Spectra of a loaded part and a free one, by one estimator.
 
     Short impacts are widened to a second in a row, and their excess, thinned by that, set right.
     """
@@ -182,7 +182,7 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
 
 
 def looks_free(spectra: Spectra) -> bool:
-    """Whether most joints have clearly less slow power in the free part than in the loaded one."""
+    """Whether most joints have clearly less slow power free than loaded."""
     slow = spectra.frequency < CONTACT_BAND
     power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)

@@ -1,4 +1,4 @@
-"""The table of observers: their parameters and where these come from, and how each is built."""
+"""The table of observers: parameters, their sources and builders."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -31,7 +31,7 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
 }
 #: What an assignment of ``--set`` looks like.
 FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
-WORDS = {"noise_convention"}  #: Parameters whose value is a word.
+WORDS = {"noise_convention"}  #: Parameters with words as values.
 #: Parameters that are rates: no log resolves a microsecond. [1/s]
 LARGEST = {"omega": 1e6, "gain": 1e6, "decay": 1e6}
 #: Every other number is a variance: 3·10⁷ N·m, or of its momentum, or gained in a second.
@@ -41,7 +41,7 @@ SMALLEST = 1e-15
 
 
 def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
-    """Read ``observer.parameter=VALUE`` assignments; a value is a number or one a joint."""
+    """Assignments ``observer.parameter=VALUE``; a number or one a joint."""
     settings: Settings = {}
     for text in assignments:
         name, value = assignment(text, "--set", FORM)
@@ -79,7 +79,7 @@ def check_range(parameter: str, values: float | list[float], where: str) -> None
 
 
 def check_gains(gains: Gains, sections: Mapping[str, Sequence[str]], where: str) -> None:
-    """Raise a ParameterError unless a file's gains are of observers and parameters there are.
+    """Raise a ParameterError on a file's gains of unknown names.
 
     Args:
         gains: The ``[observers.*]`` tables.
@@ -126,7 +126,7 @@ def overlay_gains(under: Gains, over: Gains) -> Gains:
 def parameters_given(
     section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]
 ) -> dict[str, Any]:
-    """Parameters of one observer: later sources win, its own section over the shared one."""
+    """Parameters of one observer: later sources win, its section over the shared."""
     found: dict[str, Any] = {}
     for source in sources:
         found |= source.get(section, {})
@@ -141,10 +141,10 @@ BEST = "best"  #: The most accurate estimate that a log allows.
 
 
 class LogSpectra(NamedTuple):
-    """What a complete log shows of noise and contact, None where its free part is not known."""
+    """Noise and contact of a complete log, None without a free part."""
 
     plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
-    #: Of those that `best` runs on, the bias of the whole log taken off.
+    #: Of `best`'s, less the bias of the whole log.
     best: "Spectra | None" = None
     gains: Gains | None = None  #: The gains that `plain` calls for, as a gains file holds them.
 
@@ -158,7 +158,7 @@ NOT_SHOWN = LogSpectra()
 
 
 class Setup(NamedTuple):
-    """What an observer is built from."""
+    """Parts of an observer before its build."""
 
     gains: Gains  #: The robot file's ``[observers.*]``.
     settings: Settings  #: The user's ``--set``.
@@ -184,7 +184,7 @@ class Entry(NamedTuple):
 
 
 def build_fdo(setup: Setup) -> Built:
-    """The filtered dynamics observer, its cutoff given or left over from the Kalman filter."""
+    """Filtered dynamics observer, cutoff given or from the Kalman filter."""
     omega, origin = first_order_gain(setup, "fdo", "omega")
     if origin:
         # One cutoff for all joints: the one with the joints' mean delay.
@@ -208,7 +208,7 @@ def build_gmo(setup: Setup) -> Built:
 
 
 def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
-    """A first-order observer's gain (n,) [1/s], and where it was not given its remark's code.
+    """A first-order observer's gain (n,) [1/s], and a remark's code if not given.
 
     It is then the inverse of the Kalman filter's delay, a file's R and Q read as densities;
     `FALLBACK_RATE` where no gains are given at all; and on a slow clock at most 2/Ts, which takes
@@ -268,7 +268,7 @@ def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Buil
 
 
 def build_rts(setup: Setup) -> Built:
-    """The smoother on the zero-order-hold filter, whose process noise leaves no bias on a ramp."""
+    """Smoother on the zero-order-hold filter: its noise leaves no bias on a ramp."""
     from vftcli.observers.smoother import KalmanSmoother
 
     kalman, remarks = build_kfo("zoh", "kfo-rts")(setup)
@@ -362,7 +362,7 @@ DEFAULT = (BEST, *PAPER)  #: What runs where nobody chooses.
 
 
 def sections() -> dict[str, Sequence[str]]:
-    """The ``--set`` sections and their parameters: shared ones, then each observer's own name."""
+    """The ``--set`` sections with parameters: shared, then each observer's."""
     own = {name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()}
     return {**PARAMETERS, **own}
 
@@ -378,7 +378,7 @@ def build_observers(
     for name in names:
         check_known(name, OBSERVERS, f"no observer {name!r}")
     made = [OBSERVERS[name].build(setup) for name in dict.fromkeys(names)]
-    # Several observers may miss one and the same gain: that is remarked on once.
+    # Several observers may miss one gain: remark on it once.
     remarks: list[Remark] = []
     for _, own in made:
         remarks += [remark for remark in own if remark not in remarks]

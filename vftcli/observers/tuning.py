@@ -1,4 +1,4 @@
-"""Gains for a stated goal: smallest error, one delay or bandwidth, or few false alarms."""
+"""Gains for a goal: least error, one delay or bandwidth, few false alarms."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
@@ -44,7 +44,7 @@ KNOBS: dict[type, tuple[str, float, float]] = {
 
 
 class Goal(NamedTuple):
-    """What gains are for."""
+    """A goal of gains."""
 
     name: str  #: A key of `GOALS`.
     value: float = float("nan")  #: Its number, NaN for the smallest error. [s], [Hz] or [1/h]
@@ -129,7 +129,7 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
 
 
 def excess(observer: Observer, goal: Goal, step: float, joints: int) -> Array:
-    """How far an observer's delay, or its share of a sinusoid at a bandwidth, is above the goal.
+    """An observer's delay, or share of a sinusoid at a bandwidth, over the goal.
 
     (n,) [s] or [1]
     """
@@ -232,7 +232,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
 
 
 def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
-    """Observer → its expected error over its rate; one curve for both first-order observers."""
+    """Observer → expected error over rate; both first-order ones share a curve."""
     kinds: dict[str, Kind] = {
         "fdo, gmo": momentum,
         "kfo-zoh": kalman_filter,
@@ -279,7 +279,7 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
 
 
 def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
-    """Whether a rate of the grid raises at most so many false alarms an hour on a joint. (G, n)"""
+    """Whether a rate raises at most so many false alarms an hour. (G, n)"""
     response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
     columns = range(len(grid))
     few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])
@@ -307,7 +307,7 @@ def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
 
 
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
-    """How often an hour a Gaussian signal of this power spectrum leaves ±threshold. (n,)
+    """Crossings of ±threshold an hour by a Gaussian signal of this spectrum. (n,)
 
     Rice's formula, ν = (σ̇/2πσ) e^{−(h∓m)²/2σ²} for each side, the power at 0 Hz a constant offset
     m: an estimate, as friction is no Gaussian noise.

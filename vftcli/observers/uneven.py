@@ -1,4 +1,4 @@
-r"""Observers on a clock that jitters: recursions whose coefficients change with every sample.
+r"""Observers on a clock that jitters: recursions with changing coefficients.
 
 y_t = F_t y_{t−1} + x_t with a small state for each joint. The log is cut into blocks that are run
 side by side, each from zero; the states at the blocks' ends obey the same kind of recursion, once a
@@ -86,13 +86,13 @@ class Fold(NamedTuple):
 
 
 def spans(samples: int, *, begins: bool) -> list[slice]:
-    """The pieces of a block of a log: they end at multiples of their length, wherever it begins."""
+    """Pieces of a log's block: they end at multiples of their length."""
     edges = [int(begins), *range(PIECE, samples, PIECE), samples]
     return [slice(a, b) for a, b in pairwise(edges) if a < b]
 
 
 def recursion(F: Array, x: Array, start: Array) -> Array:
-    """Run y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces that carry their state.
+    """y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces with a state.
 
     Args:
         F: Transitions of an m-state filter for each of n joints. (m, m, T, n)
@@ -189,7 +189,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
 
 
 class Response(NamedTuple):
-    """What blocks make of the covariance that they start from."""
+    """Blocks' maps of their start covariance."""
 
     #: Posterior at the end, from the start that was tried, as P₁₁, P₁₂, P₂₂. (3, n, blocks)
     end: Array
@@ -197,7 +197,7 @@ class Response(NamedTuple):
     information: Array  #: O. (2, 2, n, blocks)
 
     def of(self, change: Array) -> Array:
-        """Posterior at the end from a start that is changed by Δ: X = Δ(I + OΔ)⁻¹ written out."""
+        """Posterior after a start changed by Δ: X = Δ(I + OΔ)⁻¹ in full."""
         a, b, c = change
         (o11, o12), (_, o22) = self.information
         delta = a * c - b * b
@@ -237,7 +237,7 @@ def predict(p11: Array, p12: Array, p22: Array, model: Discrete, i: int) -> Cova
 
 
 def gains_from(model: Discrete, starts: Covariance) -> Gains:
-    """The gains of all blocks side by side, from where each starts. (length, n, blocks) each"""
+    """Gains of all blocks side by side, from their starts. (length, n, blocks) each"""
     (p11, p12, p22), r = starts, model.r
     l1, l2, torque = np.empty((3, *r.shape))
     for i in range(len(r)):
@@ -262,7 +262,7 @@ def kalman_steps(
     *,
     begins: bool,
 ) -> tuple[Array, Array, KalmanState]:
-    """τ̂ and √P₂₂ of a block with gains that follow each step's own sample time. (T, n) each
+    """τ̂ and √P₂₂ of a block, gains by each step's sample time. (T, n) each
 
     Args:
         terms: The block.
@@ -278,7 +278,7 @@ def kalman_steps(
     dt, (error, posterior, _) = np.broadcast_to(terms.dt, (samples, 1)), state
     if begins:
         tau[0], sd[0] = 0.0, np.sqrt(posterior.p22)
-    # Joints with the same numbers have the same gains: one of each kind is computed.
+    # Joints with equal numbers have equal gains: compute one of each kind.
     numbers = np.stack([*densities, *posterior])
     _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
     kind = kind.ravel()

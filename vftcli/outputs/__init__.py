@@ -1,1 +1,1 @@
-"""Outputs: show what the analysis made; nothing here computes an estimate or an error."""
+"""Outputs: files and screens of an analysis; no estimate is computed here."""

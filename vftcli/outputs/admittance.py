@@ -58,7 +58,7 @@ UNITS = {"x": ("m", "rad"), "v": ("m/s", "rad/s"), "force": ("N", "N·m"), "ener
 
 
 def files_of_replay(form: str | None) -> list[str]:
-    """Every file that a replay's folder may hold; `form` is what figures are written as."""
+    """Files of a replay's folder; `form` is the figures' format."""
     return [*FILES, *figure_files(form, REPLAY_FIGURES)]
 
 
@@ -156,7 +156,7 @@ def admittance_record(
 
 
 def loop_record(run: ClosedLoop) -> dict[str, Any]:
-    """What a closed loop was and how fast it was."""
+    """A closed loop's run, stability and latencies, for the record."""
     about: dict[str, Any] = {
         "controller": run.controller.name,
         "stable": run.stable,
@@ -169,7 +169,7 @@ def loop_record(run: ClosedLoop) -> dict[str, Any]:
 
 
 def deviations_from_paper() -> dict[str, str]:
-    """What is done otherwise than in the paper → why, from the table beside this file."""
+    """Differences from the paper → reasons, from the table beside this file."""
     text = Path(__file__).with_name("deviations_from_paper.toml").read_text(encoding="utf-8")
     return {entry["what"]: entry["why"] for entry in tomllib.loads(text)["difference"]}
 
@@ -248,7 +248,7 @@ def closed_loop_section(run: ClosedLoop | None) -> str:
 
 
 def comparison_section(replay: Replay) -> str:
-    """Every controller on the same force, axis by axis (Figs 7 and 10)."""
+    """Every controller on one force, axis by axis (Figs 7 and 10)."""
     if not replay.rows:
         return "<h2>Comparison</h2><p>No axis was dragged.</p>"
 

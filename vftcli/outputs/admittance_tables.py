@@ -69,7 +69,7 @@ def comparison_grid(
     name_of: Callable[[Mapping[str, Any]], str] = lambda row: str(row["controller"]),
     title: str = "",
 ) -> Grid:
-    """Every controller on the same force; by axis and drag, so that they stand under each other.
+    """Every controller on one force, below each other by axis and drag.
 
     `name_of` tells what a row's controller is called.
     """
@@ -150,7 +150,7 @@ def parameter_text(replay: Replay) -> str:
 
 
 def position_rotation(values: Array | float) -> str:
-    """Six numbers as position / rotation, three equal ones told once."""
+    """Six numbers as position / rotation, three equal ones once."""
     texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
     halves = (texts[:3], texts[3:])
     return " / ".join(half[0] if len(set(half)) == 1 else ",".join(half) for half in halves)

@@ -1,4 +1,4 @@
-"""The answer: what touched the arm, in the words that screen, page, index and batch share."""
+"""The answer: contacts in the words of screen, page, index and batch."""
 
 import numpy as np
 
@@ -22,18 +22,18 @@ def headline(analysis: Analysis) -> str:
 
 
 def load_doubt(analysis: Analysis) -> str:
-    """What is said where rows may be the weight of a load that the doctor found; else ""."""
+    """A sentence on rows that may be a found load's weight; else ""."""
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
     found = {f.code for one in analysis.examinations[:1] for f in one.warnings}
     if analysis.contacts is not None and analysis.contacts.load is not None:
         return ""
     if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
         return ""
-    return "But the arm bears a load that nobody told: they may be its weight."
+    return "But the arm carries an unknown load: they may be its weight."
 
 
 def otherwise(found: ContactList) -> str:
-    """What can be said of the rest of the log, where no contact is listed; "" for nothing.
+    """A sentence on the rest of the log without contacts; "" for nothing.
 
     A load leaves no rest, and an arm of few joints tells no force.
     """
@@ -55,7 +55,7 @@ def otherwise(found: ContactList) -> str:
 
 
 def answer(found: ContactList) -> str:
-    """What the arm carries and what touched it, in a few sentences."""
+    """The arm's load and contacts in a few sentences."""
     if (load := found.load) is None:
         return list_words(found)
     mass, (start, stop) = banded(load.mass, load.sd, ".2f", " kg"), load.span
@@ -67,7 +67,7 @@ def answer(found: ContactList) -> str:
 
 
 def list_words(found: ContactList) -> str:
-    """What touched the arm, in one or two sentences."""
+    """The contacts in one or two sentences."""
     if found.unexplained is not None:
         torque, joint, at = found.unexplained
         return (
@@ -101,7 +101,7 @@ def list_words(found: ContactList) -> str:
 
 
 def none_words(found: ContactList) -> str:
-    """What is said of a log in which no contact is listed."""
+    """Sentences on a log without contacts."""
     if found.false_on_free:
         return (
             "No contact stands out from the free part, which itself shows "
@@ -152,7 +152,7 @@ def direction(force: Array) -> str:
 
 
 def place_words(contact: Contact) -> str:
-    """The part of the arm, and the links where it cannot be told."""
+    """The part of the arm, and the links where it is unknown."""
     links = [link for link in contact.places if link]
     if contact.where != "cannot tell" or not links:
         return contact.where
@@ -162,7 +162,7 @@ def place_words(contact: Contact) -> str:
 
 
 def reason(contact: Contact) -> str:
-    """What a contact's trust rests on, the worst first."""
+    """Grounds of a contact's trust, the worst first."""
     if contact.is_load:
         return "lasts for most of the log"
     if contact.remarks:
@@ -170,7 +170,7 @@ def reason(contact: Contact) -> str:
     if contact.evidence is None or contact.evidence < SURE_NATS:
         return "little evidence: friction explains nearly as much"
     if contact.peak_force is None or contact.peak_band is None:
-        return "no force can be told with so few joints"
+        return "too few joints to know the force"
     share = contact.peak_band / max(contact.peak_force, 1e-9)
     text = f"the band is {share:.0%} of the force"
     if contact.trust == "good" and share <= TIGHT and contact.anywhere is not None:
@@ -181,12 +181,12 @@ def reason(contact: Contact) -> str:
 
 
 def free_words(found: ContactList) -> str:
-    """What is known of free motion, in words; "" where nothing is."""
+    """Known free motion in words; "" without any."""
     return "; ".join(sentence(remark) for remark in found.free)
 
 
 def beginning(contact: Contact) -> str:
-    """What is said where a contact begins: when, for how long, how hard, in which direction, where.
+    """Text at a contact's begin: time, duration, force, direction, place.
 
     As ``4.70 s: contact 1 begins, for 0.89 s: 86 ± 10 N, +x, up, wrist (good)``.
     """
@@ -201,5 +201,5 @@ def beginning(contact: Contact) -> str:
 
 
 def contact_name(contact: Contact) -> str:
-    """What a row of the list is called."""
+    """Name of a row of the list."""
     return f"{'load' if contact.is_load else 'contact'} {contact.number}"

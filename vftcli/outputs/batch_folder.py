@@ -25,7 +25,7 @@ MARKER = "batch.json"
 TABLE, FAILURES, PAGE = "batch.parquet", "failures.parquet", "index.html"
 
 GATHERED = (TABLE, FAILURES, PAGE, SEAL)  #: Files that are made anew by every run.
-PIECE = 500  #: Logs whose rows are in memory at a time.
+PIECE = 500  #: Logs with rows in memory at a time.
 
 
 class BatchFolder:
@@ -36,16 +36,16 @@ class BatchFolder:
         self.rows = self.path / "rows"
 
     def row_file(self, key: str) -> Path:
-        """Where the rows of a log are."""
+        """Place of a log's rows."""
         return self.rows / key[:2] / f"{key}.parquet"
 
     def result(self, key: str) -> Path:
-        """Where what else is made of a log is."""
+        """Place of a log's other results."""
         return self.path / self.place(key)
 
     @staticmethod
     def place(key: str) -> str:
-        """The same relative to the folder."""
+        """Place of a log's result, relative to the folder."""
         return f"logs/{key[:2]}/{key}"
 
     @contextmanager

@@ -1,6 +1,6 @@
 """Can it be believed? What supports an answer and what limits it, each with its remedy.
 
-Everything is told from the analysis' data: the examinations, the contact list, the robot's
+Everything comes from the analysis' data: the examinations, the contact list, the robot's
 friction, the clock, which joints rest, and whether anything measures the force independently. The
 terminal, the page and ``run.json`` show the same items.
 """
@@ -35,7 +35,7 @@ from vftcli.signals.rest import slower
 
 #: How far an item lets the answer be believed.
 Standing = Literal["good", "caution", "bad", "unknown"]
-#: The sign of each standing; the page and the terminal use the same.
+#: The sign of each standing, on page and terminal.
 MARKS = {"good": "✓", "caution": "△", "bad": "✗", "unknown": "–"}
 #: The standings, the worst first.
 SEVERITY: tuple[Standing, ...] = ("bad", "caution", "unknown", "good")
@@ -67,7 +67,7 @@ class LogSummary(NamedTuple):
     contacts: str  #: How many, or that they are a load, or a dash.
     hardest: str  #: The hardest contact in words, or a dash.
     force: float  #: Its force, 0 without one. [N]
-    least: float | None  #: The force below which nothing is told, None where that is not known. [N]
+    least: float | None  #: Least visible force, None if unknown. [N]
     standing: Standing  #: How healthy the log is.
     words: str  #: Why.
     page: str = ""  #: Its own page, relative to that of all logs; "" without one.
@@ -75,7 +75,7 @@ class LogSummary(NamedTuple):
 
     @property
     def rank(self) -> tuple[int, float]:
-        """Where it stands: the worst health first, then the hardest contact."""
+        """Sort key: the worst health first, then the hardest contact."""
         return SEVERITY.index(self.standing), -self.force
 
 
@@ -111,7 +111,7 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
         reference_ground(analysis),
     ]
     found.sort(key=lambda ground: ground.standing != "bad")
-    # One remedy stands where it is first needed.
+    # A remedy goes where it is first needed.
     said = [ground.remedy for ground in found]
     return tuple(
         ground._replace(remedy=None) if ground.remedy in said[:k] else ground
@@ -135,7 +135,7 @@ MOST_UNEXPLAINED = 0.5
 
 
 def robot_ground(analysis: Analysis) -> Ground:
-    """How well the arm's model explains the log."""
+    """Fit of the arm's model to the log."""
     subject, name, own = "robot, gravity", analysis.robot.name, own_match(analysis)
     if own is None:
         return Ground("unknown", subject, "the log does not let the model be checked")
@@ -154,13 +154,13 @@ def robot_ground(analysis: Analysis) -> Ground:
 
 
 def own_match(analysis: Analysis) -> RobotMatch | None:
-    """How well the arm of an analysis fits its log, None where that could not be checked."""
+    """Fit of an analysis' arm to its log, None if unchecked."""
     matches = analysis.examinations[0].robots if analysis.examinations else ()
     return next((match for match in matches if match.robot == analysis.robot.name), None)
 
 
 def finding_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """What the examinations of the log and of its free runs warn of, and the wrench's warnings."""
+    """Warnings on the log, on its free runs, and on the wrench."""
     for k, examination in enumerate(analysis.examinations):
         log = examination.recording
         other = f"{log.name}: " if k else ""
@@ -196,7 +196,7 @@ def clock_ground(recording: Recording) -> Ground:
 
 
 def list_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """What the list of contacts rests on."""
+    """Grounds of the list of contacts."""
     found, subject = analysis.contacts, "free motion"
     if found is None:
         told = [r for r in analysis.remarks if r.code == "contacts-not-told"]
@@ -238,22 +238,22 @@ LIST_SUBJECTS = {
 
 
 def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
-    """What rests, where the friction model comes from, and at which temperature it is taken."""
+    """Joints at rest, the friction model's source and its temperature."""
     robot, rests = analysis.robot, resting(analysis.recording)
     if rests.any():
         dry, joints = dry_friction(robot.friction, robot.joints), np.flatnonzero(rests).tolist()
         sizes = ", ".join(f"{dry[j]:.2g}" for j in joints)
-        words = f"friction holds {joint_words(joints)} against what touches"
+        words = f"{joint_words(joints)}: friction hides pushes"
         if robot.friction:
-            words = f"friction hides up to {sizes} N·m on {joint_words(joints)}"
+            words = f"{joint_words(joints)}: pushes below {sizes} N·m do not show"
         subject = "the arm is still" if rests.all() else "joints at rest"
         yield Ground("caution", subject, words, of_log=False)
     name, own = robot_option(analysis), f"my_{robot.name}.toml"
     if not robot.friction or is_profile(analysis):
         free = next((path_of(run.recording) for run in analysis.motion.runs), "free.csv")
-        where = "the profile's" if robot.friction else "none is modelled"
+        where = "a typical arm's" if robot.friction else "none is modelled"
         remedy = shlex.join(["vftcli", "identify", free, "--robot", name, "-o", own])
-        words = f"{where}; your own arm's from one free minute:"
+        words = f"{where}. Measure yours (1 min contact-free):"
         yield Ground("caution", "friction", words, remedy, of_log=False)
     else:
         yield Ground("good", "friction", f"from {name}", of_log=False)
@@ -289,7 +289,7 @@ def reference_ground(analysis: Analysis) -> Ground:
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
     standing: Standing = "unknown"
-    words, remedy = "nothing here measures the force; sizes are checked by nothing", None
+    words, remedy = "no force sensor in the log: sizes are unchecked", None
     for kind, name in (("vendor", "the vendor's own estimate"), ("sensor", "the log's own sensor")):
         forces = [getattr(contact, f"{kind}_force") for contact in contacts]
         own = kind == "vendor" and not contacts and analysis.recording.tau_ext is not None

@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 NARROWEST, WIDEST = 72, 100  #: Columns that a screen uses at least, and at most.
 #: Style → ANSI code.
 STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
-#: What stands for a letter where a terminal has ASCII only.
+#: ASCII for a letter on a terminal without it.
 PLAIN = {
     "·": "-", "–": "-", "−": "-", "…": "...", "±": "+/-", "≤": "<=", "→": "->", "°": " deg",
     "✓": "+", "△": "!", "✗": "x", "┤": "|", "ω": "w", "τ": "tau", "×": "x", "≥": ">=", "√": "sqrt",
@@ -15,7 +15,7 @@ PLAIN = {
 
 
 class Canvas(NamedTuple):
-    """What a terminal can show."""
+    """Abilities of a terminal."""
 
     width: int = 80  #: Columns that are used.
     unicode: bool = True  #: Whether it has more letters than ASCII.

@@ -46,7 +46,7 @@ def contacts_record(found: ContactList) -> dict[str, Any]:
 
 
 def contacts_csv(lists: Sequence[ContactList]) -> str:
-    """One row a contact of every log, vectors taken apart."""
+    """One row a contact of every log, vectors split."""
     rows = [
         {"recording": found.recording} | contact.row()
         for found in lists

@@ -51,7 +51,7 @@ def decimated(t: Array, values: Array, stretches: int) -> list[Line]:
 def level_rows(
     t: Array, values: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
 ) -> Index | None:
-    """Sample numbers of a plot whose lines share one clock, None for all of them. (P,)
+    """Sample numbers of a plot with one clock for all lines, None for all. (P,)
 
     Of every stretch the lowest and highest sample of every line stay, and the first unknown one,
     so that no spike is lost and no gap closed. A log of which that would leave out nothing is kept

@@ -1,4 +1,4 @@
-"""What the log doctor found, for people and for machines."""
+"""Findings of the log doctor, for people and for machines."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict
@@ -74,7 +74,7 @@ def examination_text(examination: Examination) -> str:
     if recording.wrench_frame:
         lines.append(f"  wrench    {recording.wrench_frame}")
     if recording.payload_mass is not None:
-        lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller was told")
+        lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller assumes")
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
     lines += [
         f"  fit       {fit}{'' if fit.fits else ': does not fit'}"
@@ -102,7 +102,7 @@ def warnings_of(examination: Examination) -> tuple[Remark, ...]:
 
 
 def health_line(examination: Examination, *, named: bool = False) -> str:
-    """What is wrong with a log, on one line: how much, the first of it, the others' names."""
+    """Faults of a log on one line: number, the first, names of the others."""
     recording, found = examination.recording, warnings_of(examination)
     head = f"{recording.name}: log health" if named else "log health"
     if not found:
@@ -120,7 +120,7 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
 def health_record(
     examinations: Iterable[Examination], *, fitting: bool = True
 ) -> list[dict[str, Any]]:
-    """What was found in the logs of a run, as `run.json` holds it: the log's first, then others'.
+    """Findings of a run's logs for `run.json`: the log's first, then others'.
 
     `overridden` are the codes with which results mean little, though they were wanted anyway;
     `fitting` is whether the robot had to be the log's.
@@ -138,7 +138,7 @@ def health_record(
 
 
 def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = True) -> list[str]:
-    """What stands at the top of outputs that were wanted though a finding makes them meaningless.
+    """Warning at the top of outputs that a finding makes meaningless.
 
     One line a finding; none where there is no such finding.
     """

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all, never over an input, never over something without being told.
+"""Files written whole or not at all, never over an input, nor unasked.
 
 New files are made in a temporary folder beside their places and renamed in the end. Several files
 that belong together have a seal: `run.json`, with the digest of every other one. It goes before
@@ -87,7 +87,7 @@ def write_text(path: Path, text: str, force: bool = False) -> None:
 
 
 def put_text(path: Path, text: str) -> None:
-    """Write a text with the same bytes on every system, also with half a letter from a file."""
+    """Write a text, equal bytes on every system, even with half a letter."""
     # On Windows the same bytes as elsewhere: digests of outputs can be compared. A file name may
     # hold bytes that are no letter, which UTF-8 refuses.
     path.write_text(text, encoding="utf-8", errors="backslashreplace", newline="\n")
@@ -99,7 +99,7 @@ EARLIER = "earlier"  #: Folder, in the temporary one, of the files that make roo
 class OutputFolder:
     """A folder that gets all of its files at once, when the block ends well.
 
-    Until then they are in a temporary folder on the same file system; if the block fails, it goes,
+    Until then they are in a temporary folder on its file system; if the block fails, it goes,
     and with it every folder that was made for it. ``folder / "name"`` is where to write a file.
     With `force`, those of `names` that an earlier run left and this one does not write are removed,
     and every file that the earlier run's seal lists, so that all files of the folder belong
@@ -115,7 +115,7 @@ class OutputFolder:
         self._partial = ExitStack()
 
     def __truediv__(self, name: str) -> Path:
-        """Where to write the file `name`, its folder made if need be."""
+        """Path for the file `name`, with its folder."""
         path = self.temporary / name
         path.parent.mkdir(parents=True, exist_ok=True)
         return path
@@ -288,7 +288,7 @@ def check_letters(path: Path) -> None:
 
 
 def left_out(names: Iterable[str]) -> list[str]:
-    """What of these files is not written for want of a package, a line each."""
+    """Files not written for want of a package, a line each."""
     lines = []
     for name in dict.fromkeys(names):
         if name.endswith(".rrd") and not installed("rerun"):
@@ -299,7 +299,7 @@ def left_out(names: Iterable[str]) -> list[str]:
 
 
 def numbered(names: Iterable[str]) -> list[str]:
-    """Names that all differ: one that is taken already gets the next number behind it."""
+    """Names that all differ: a repeated one gets the next number."""
     found: list[str] = []
     for name in names:
         free, number = name, 2

@@ -33,7 +33,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
     Args:
         t: Time. (T,) [s]
         force: |F|. (T,) [N]
-        contacts: Those whose number is shown.
+        contacts: Those with a number.
         canvas: What the terminal can show.
     """
     top = float(force.max())
@@ -60,7 +60,7 @@ def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canv
 def column_peaks(t: Array, force: Array, columns: int) -> Array:
     """The largest |F| in each of so many equal spans of time. (columns,) [N]"""
     edges = np.linspace(t[0], t[-1], columns + 1)
-    # Where a span holds no sample, the line between its neighbours stands for them.
+    # A span without a sample gets the line between its neighbours.
     peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)
     place = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, columns - 1)
     np.maximum.at(peaks, place, force)

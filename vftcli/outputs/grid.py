@@ -21,14 +21,14 @@ from vftcli.signals.letters import printable
 
 #: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")
-#: What stands, unseen, where a number has fewer decimals than others of its column.
+#: Unseen filler where a number has fewer decimals than others of its column.
 DECIMALS = "." + 20 * "0"
 #: Width of a column of the IEEE, of a letter and of the gap between two columns. [in]
 COLUMN_WIDTH, LETTER_WIDTH, COLUMN_GAP = 3.5, 0.058, 0.111
 
 
 class GridCell(NamedTuple):
-    """An entry that stands out, or that the page shows otherwise than the terminal."""
+    """An entry with emphasis, or with another text on the page."""
 
     text: str  #: Its text.
     best: bool = False  #: Whether it is the best of its column: bold wherever type can be bold.
@@ -74,7 +74,7 @@ class Column(NamedTuple):
 class Grid:
     """A table."""
 
-    columns: tuple[Column, ...]  #: What stands in each column.
+    columns: tuple[Column, ...]  #: The columns.
     rows: tuple[Sequence[Entry], ...]  #: One entry a column.
     title: str = ""  #: What the table is about, "" for none.
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
@@ -145,7 +145,7 @@ def markdown(grid: Grid) -> str:
 
 
 def latex(*grids: Grid) -> str:
-    r"""Tables of the same columns as one ``table``, or ``table*``, of the package booktabs.
+    r"""Tables of equal columns as one ``table``, or ``table*``, of the package booktabs.
 
     Caption, label and footnotes stand inside; decimal points stand below one another without a
     further package. Of several grids each has its title above its rows.
@@ -237,7 +237,7 @@ def escape_markdown(text: str) -> str:
     return text
 
 
-#: What LaTeX would not print as it stands, or not in every font encoding.
+#: Letters that LaTeX does not print as they are, or not in every encoding.
 LATEX_LETTERS = {
     "\\": r"\textbackslash{}",
     "&": r"\&",

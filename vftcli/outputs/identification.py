@@ -247,7 +247,7 @@ def tables_text(found: Identification) -> str:
 
 def residual_grid(found: Identification) -> Grid:
     """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
-    # Two logs of one label are told apart by their place in the command.
+    # The place in the command distinguishes two logs of one label.
     keys = ("log_index", "log", "role", "model")
     rows: list[tuple[Entry, ...]] = []
     for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
@@ -288,7 +288,7 @@ def parameter_grid(found: Identification) -> Grid:
 
 
 def shape_choice_grid(choices: pl.DataFrame) -> Grid:
-    """How the friction models competed on what was left out of the fit."""
+    """Friction models' errors on stretches left out of the fit."""
     return Grid(
         title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
         columns=(Column("friction", words=True), *map(Column, ("joint", "RMS [N·m]", ""))),

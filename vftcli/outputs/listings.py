@@ -111,7 +111,7 @@ def robot_text(robot: "Robot") -> str:
 
 
 def bench_grid(result: Mapping[str, Any]) -> Grid:
-    """How long dynamics and observers took, with the paper's times on its laptop beside them."""
+    """Times of dynamics and observers, beside the paper's on its laptop."""
     rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"]]
     return Grid(
         columns=(

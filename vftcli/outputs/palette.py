@@ -1,4 +1,4 @@
-"""Colours of the observers and of the reference, the same in the page and in the recording."""
+"""Colours of observers and reference, for page and recording."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ COLOURS = {
 }
 #: For estimates that have no colour of their own, in turn.
 SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
-#: The reference in a viewer whose background is not known; the page uses the colour of its ink.
+#: The reference on an unknown background; the page uses the colour of its ink.
 REFERENCE = "#8a929a"
 #: The part of the arm that was touched, in words → its colour.
 PLACES = {
@@ -27,7 +27,7 @@ PLACES = {
 
 
 def colours_of_names(names: Sequence[str]) -> dict[str, str]:
-    """One colour for each estimate's name; two get the same only when there are no more."""
+    """One colour for each estimate's name; two share one only if none is left."""
     taken = {COLOURS[name] for name in names if name in COLOURS}
     # An estimate without a colour of its own does not get one that another has.
     free = [colour for colour in SPARE if colour not in taken] or list(SPARE)

@@ -38,7 +38,7 @@ def partial_folder(parent: Path) -> Iterator[Path]:
 
 
 def clear_leftovers(parent: Path) -> None:
-    """Remove the temporary folders in `parent` whose processes are gone."""
+    """Remove temporary folders in `parent` of processes that are gone."""
     for path in parent.glob(PARTIAL):
         found = NAME.fullmatch(path.name)
         if found is None or path.is_symlink() or not path.is_dir():
@@ -49,7 +49,7 @@ def clear_leftovers(parent: Path) -> None:
 
 
 def is_running(process: int) -> bool:
-    """Whether a process has this number on this machine, as far as that can be told."""
+    """Whether a process has this number on this machine, if visible."""
     if sys.platform == "win32":
         return True  # asking would end it
     try:

@@ -1,10 +1,10 @@
-"""Quantity: a number with its unit as text, the same on the screen, in tables and on the page."""
+"""Quantity: a number with its unit as text, for screen, tables and page."""
 
 from collections.abc import Iterable
 
 import numpy as np
 
-DASH = "–"  #: What stands where nothing is known.
+DASH = "–"  #: Sign for an unknown number.
 
 
 def significant(value: float, digits: int = 3) -> str:

@@ -31,7 +31,7 @@ LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | 
 
 
 def subject_of(code: str) -> str:
-    """What a finding is about, in a word or two."""
+    """Subject of a finding, in a word or two."""
     return next((subject for subject, codes in SUBJECTS.items() if code in codes), "effort")
 
 
@@ -68,7 +68,7 @@ def path_of(log: Recording) -> str:
 
 
 def robot_option(analysis: Analysis) -> str:
-    """What ``--robot`` is given for an analysis' arm: its profile's name, or its file."""
+    """Value of ``--robot`` for an analysis' arm: profile name, or file."""
     robot = analysis.robot
     return robot.name if is_profile(analysis) or robot.path is None else str(robot.path)
 

@@ -17,7 +17,7 @@ from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
 Stream = rr.RecordingStream  #: A recording that is being made.
 
-ROBOT = "/robot"  #: Below it stands the arm.
+ROBOT = "/robot"  #: Root of the arm.
 #: Radius of the first and of the last link, as a share of the arm's length.
 THICKNESS = (0.048, 0.030)
 RATE = 50.0  #: Poses a second that are drawn. [Hz]
@@ -38,7 +38,7 @@ class Capsule(NamedTuple):
     start: Array  #: Centre of one end. (3,) [m]
     direction: Array  #: From one end's centre to the other's. (3,) [m]
     radius: float  #: Radius. [m]
-    joint: bool  #: Whether it stands for a joint rather than for a link.
+    joint: bool  #: Whether it is a joint, not a link.
 
 
 class ArmPoses(NamedTuple):
@@ -57,7 +57,7 @@ def arm_length(chain: Chain) -> float:
 
 
 def capsules(chain: Chain) -> list[list[Capsule]]:
-    """What moves with the base and with each link: n + 1 lists, base first."""
+    """Parts on the base and on each link: n + 1 lists, base first."""
     n, length = chain.joints, arm_length(chain)
     offsets = np.vstack([chain.translation, chain.flange_translation])
     radii = length * np.linspace(*THICKNESS, n + 1)

@@ -88,10 +88,10 @@ def rerun_file(
         tabs: The plots.
         words: Name of a document → its Markdown.
         poses: Where the arm has been, so that the eye sees all of it.
-        space: What the space is called in which it stands.
+        space: Name of its space.
         marked: The span that the time panel marks, None if there is none. [s]
     """
-    # The same data make the same recording: no random id, and no time at which it was made.
+    # Equal data make equal recordings: no random id, no time of writing.
     identity = recording_id(title, tabs, words)
     # Nor rows put together by how much time has gone by.
     untimed = rr.ChunkBatcherConfig.NEVER()
@@ -121,7 +121,7 @@ def rerun_file(
 def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> UUID:
     """The identity of a recording: equal for equal data and words, which hold the logs' sha256.
 
-    A viewer puts recordings of one identity into one; other gains on the same log make another.
+    A viewer puts recordings of one identity into one; other gains on the log make another.
     """
     found = hashlib.sha256("\0".join([title, *words, *words.values()]).encode("utf-8", "replace"))
     for tab in tabs:
@@ -141,7 +141,7 @@ def blueprint(
     """How the recording opens: the arm's space and words to the left, plots to the right, paused.
 
     Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
-    span stands out in the time panel, and a click on a time of the text log goes there.
+    span is visible in the time panel, and a click on a time of the text log goes there.
     """
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
@@ -160,7 +160,7 @@ def blueprint(
 def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
     """The time panel, paused on the log's own clock, with a span selected in it."""
     span: dict[str, Any] = {}
-    # An unstable part of the viewer's: a version without it opens the recording all the same.
+    # An unstable part of the viewer's: a version without it opens the recording too.
     if marked is not None and hasattr(rrb.components, "AbsoluteTimeRange"):
         first, last = (round(1e9 * end) for end in marked)
         span = {"time_selection": rrb.components.AbsoluteTimeRange(min=first, max=last)}
@@ -170,7 +170,7 @@ def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
 def arm_view(poses: ArmPoses, name: str) -> rrb.Spatial3DView:
     """The space with an eye that sees the base and all places where the links have been."""
     corners = poses.translation.reshape(-1, 3)
-    # The base stands at the origin and shall be seen too.
+    # The base at the origin must be visible too.
     low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
     centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
     eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
@@ -252,7 +252,7 @@ def send_plot(stream: Stream, plot: Chart) -> None:
 
 
 def width_of(line: ChartLine) -> float:
-    """How broad a line is drawn. [px]"""
+    """Width of a line. [px]"""
     if line.name.endswith(EDGES):
         return 0.6
     if line.name.startswith(BAR):

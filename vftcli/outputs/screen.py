@@ -1,4 +1,4 @@
-"""What a command shows of its logs on the terminal: the answer on one screen.
+"""A command's screen on its logs: the answer.
 
 Facts, the answer in a sentence, |F| over time, the contacts, whether it can be believed, the errors
 against a reference, and what was written: forty lines at most, whatever the number of logs.
@@ -86,12 +86,12 @@ def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
 
 
 def facts(analysis: Analysis) -> str:
-    """Which log, which arm and how well it fits, how long, how fast."""
+    """Log, arm and its fit, duration, rate."""
     recording, match = analysis.recording, own_match(analysis)
     fit = ""
     if match is not None:
         left = percent(match.misfit)
-        fit = f" (fits {left})" if match.fits else f" (does not fit: {left} unexplained)"
+        fit = f" (model error {left})" if match.fits else f" (does not fit: model error {left})"
     span = f"{recording.duration:.1f} s"
     if recording.samples > 1:
         rate = 1.0 / recording.median_step
@@ -100,7 +100,7 @@ def facts(analysis: Analysis) -> str:
 
 
 def doubt_lines(analysis: Analysis) -> list[str]:
-    """What is said where results mean nothing and are made anyway."""
+    """Warning on meaningless results that are made anyway."""
     codes = [f.code for one in analysis.examinations for f in one.refusals()]
     if not codes:
         return []
@@ -115,7 +115,7 @@ def written_lines(
     *,
     several: bool = False,
 ) -> list[str]:
-    """What was written, as far as it is there, and how to open it."""
+    """Written files, if present, and the way to open them."""
     there = [name for name in names if (folder / name).exists()]
     there += ["one folder a log"] * several
     lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
@@ -263,7 +263,7 @@ def logs_screen(
 
 
 def logs_facts(analyses: Sequence[Analysis], failed: int) -> str:
-    """How many logs, of which arms, and what free motion the sizes rest on."""
+    """Number of logs, their arms, and the free motion behind the sizes."""
     arms = list(dict.fromkeys(analysis.robot.name for analysis in analyses))
     free = list(dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs))
     parts = [f"{len(analyses) + failed} logs", " and ".join(arms)]
@@ -298,7 +298,7 @@ def log_table(
 
 
 def log_row(analysis: Analysis, line: LogSummary) -> list[str]:
-    """What one line tells of a log, its health left out."""
+    """Text of a log's line, without its health."""
     found, rest, error = analysis.contacts, DASH, DASH
     if found is not None and found.told_force is not None and found.tells_untouched:
         rest = f"{found.told_force:.0f} N"

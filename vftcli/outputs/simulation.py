@@ -14,7 +14,7 @@ from vftcli.simulation.load import to_toml
 
 
 def free_path(path: Path) -> Path:
-    """Where the free run of a pair goes: ``log.csv`` → ``log.free.csv``."""
+    """Path of a pair's free run: ``log.csv`` → ``log.free.csv``."""
     return path.with_name(f"{path.stem}.free{path.suffix}")
 
 
@@ -71,7 +71,7 @@ def save(
 
 
 def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
-    """Write one log and what stands beside it into a folder."""
+    """Write one log and its companions into a folder."""
     from vftcli.simulation.writers import WRITERS
     from vftcli.simulation.writers.tables import write_truth
 
@@ -87,7 +87,7 @@ def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, co
 
 
 def run_record(run: Simulation, format: str, command: str) -> dict[str, Any]:
-    """What was simulated; the scenario file says all of it."""
+    """Record of a simulation; the scenario file says all of it."""
     return {
         "command": command,
         "versions": versions(),

@@ -30,7 +30,7 @@ def thresholds_text(
 def thresholds_grid(thresholds: Thresholds) -> Grid:
     """Every threshold with its interval, and the tail it comes from."""
     return Grid(
-        title=f"passed untouched by any joint, or any axis, {thresholds.rate:g} × an hour",
+        title=f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis",
         columns=(
             Column("", words=True, width=3),
             Column("threshold"),
@@ -85,9 +85,9 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
 
 
 def check_grid(check: ContactCheck) -> Grid:
-    """The contacts of a log, and what told them."""
+    """The contacts of a log, and their evidence."""
     return Grid(
-        title=f"{check.log}: what they would have caught",
+        title=f"{check.log}: what they would have detected",
         columns=(
             Column("#"),
             Column("from", unit="s", form=".2f"),
@@ -104,7 +104,7 @@ def check_grid(check: ContactCheck) -> Grid:
 
 
 def verdict(contact: CheckedContact) -> str:
-    """What raised the alarm, or why there is none."""
+    """Cause of the alarm, or reason for none."""
     return contact.by or ("on already" if contact.was_on else "missed")
 
 
@@ -115,12 +115,12 @@ def check_line(check: ContactCheck) -> str:
         least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
         return f"{check.log}: {counted(count, 'alarm')}{least}"
     caught, all_of_them = len(check.caught), len(check.contacts)
-    words = [f"{check.log}: {caught} of {all_of_them} contacts caught"]
+    words = [f"{check.log}: {caught} of {all_of_them} contacts detected"]
     if caught:
         words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
         words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
     if not isnan(check.smallest_caught):
-        words.append(f"the weakest caught {significant(check.smallest_caught)} N")
+        words.append(f"the weakest detected {significant(check.smallest_caught)} N")
     if not isnan(check.largest_missed):
         words.append(f"the hardest missed {significant(check.largest_missed)} N")
     if on := sum(contact.was_on for contact in check.contacts):
@@ -202,7 +202,7 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
 
 
 class Interface(NamedTuple):
-    """How one robot's interface is told thresholds."""
+    """Thresholds in one robot's interface."""
 
     joints: int | None  #: How many joint torques it takes, None for any number.
     write: Callable[[Thresholds], str]  #: Makes the text of it.
@@ -216,7 +216,7 @@ def calls(thresholds: Thresholds) -> dict[str, str]:
         for name, interface in INTERFACES.items()
         if interface.joints in (None, count)
     }
-    # An interface that needs what is not known here has nothing to be told.
+    # An interface that needs an unknown number gets no text.
     return {name: text for name, text in written.items() if text}
 
 
@@ -248,7 +248,7 @@ def doubt(thresholds: Thresholds) -> str:
 
 
 def libfranka_call(thresholds: Thresholds) -> str:
-    """`set_collision_behavior` of pylibfranka; the C++ call takes the same four lists."""
+    """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
     if not are_known(thresholds.axes):
         return ""
     lists = {
@@ -311,7 +311,7 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Name → how it is told thresholds.
+#: Name → its thresholds.
 INTERFACES = {
     "libfranka": Interface(7, libfranka_call),
     "franka_ros": Interface(7, franka_ros_parameters),

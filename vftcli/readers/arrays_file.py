@@ -3,6 +3,7 @@
 import zipfile
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from io import BytesIO
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.opening import check_unpacked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
+from vftcli.readers.reader import Episodes, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, check_npy_header, from_table, numpy_array, read_layout
 from vftcli.signals.errors import LogError, NoLogError
@@ -42,7 +43,7 @@ def npz_arrays(file: LogFile) -> dict[str, Column]:
 
 
 def read_arrays(
-    file: LogFile, arrays: Mapping[str, Column], remarks: tuple[Remark, ...], request: ReadChoice
+    file: LogFile, arrays: Mapping[str, Column], request: ReadChoice, *remarks: Remark
 ) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias."""
     shaped = {name: _shaped(array) for name, array in arrays.items() if array.ndim in {1, 2, 3}}
@@ -86,37 +87,30 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     return arrays
 
 
-def read_dictionary(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    """Read a dictionary of arrays or lists: panda-py's get_log(), frankapy's skills, or others."""
-    numbers = episodes_of_skills(log)
-    number, part, remarks = episode_of(file.path, request, numbers)
-    if skills := skills_of(log):
-        log = skills[numbers.index(number)]
-        if "time_since_skill_started" in log:
-            arrays = arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
-            usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
-            items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
-            request = replace(request, columns=request.columns or ",".join(items))
-            log = {name: arrays[name] for name in usual if name in arrays}
-    elif len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
-        log = inner
-    raw = read_arrays(file, arrays_of_lists(file, log), remarks, request)
-    return replace(raw, part=part)
+def dictionary_episodes(file: LogFile, log: Mapping[Any, Any]) -> Episodes:
+    """The logs of a dictionary of arrays or lists: frankapy's skills, else the one.
 
-
-def skills_of(log: Any) -> list[dict[Any, Any]]:  # noqa: ANN401 - whatever the file holds
-    """The states that frankapy recorded, one dictionary a skill: {0: {skill_state_dict: {…}}}."""
-    if not isinstance(log, Mapping):
-        return []
+    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's get_log() is one.
+    """
     held = [value.get(SKILL) for value in log.values() if isinstance(value, dict)]
-    return [states for states in held if isinstance(states, dict)]
+    if skills := [states for states in held if isinstance(states, dict)]:
+        return {k: partial(read_skill, file, states) for k, states in enumerate(skills)}
+    if len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
+        log = inner
+    return {0: lambda request: read_arrays(file, arrays_of_lists(file, log), request)}
 
 
-def episodes_of_skills(log: Any) -> tuple[int, ...]:  # noqa: ANN401 - whatever the file holds
-    """The numbers of a log's episodes: its skills counted from 0, 0 alone for any other log."""
-    return tuple(range(len(skills_of(log)))) or (0,)
+def read_skill(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
+    """Read the states of one of frankapy's skills."""
+    if "time_since_skill_started" in log:
+        arrays = arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
+        usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
+        items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
+        request = replace(request, columns=request.columns or ",".join(items))
+        log = {name: arrays[name] for name in usual if name in arrays}
+    return read_arrays(file, arrays_of_lists(file, log), request)
 
 
 def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read an .npz file."""
-    return read_arrays(file, npz_arrays(file), (), request)
+    return read_arrays(file, npz_arrays(file), request)

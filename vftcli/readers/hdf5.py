@@ -1,21 +1,41 @@
-"""HDF5 files as tables: their datasets of numbers by path, read within bounds by h5py."""
+"""HDF5 logs, read within bounds by h5py: ALOHA's and DROID's layouts, and any other by its paths.
 
+DROID's raw release is a folder of episodes, each a trajectory.h5 with its metadata beside it.
+"""
+
+import json
+import os
 import re
 import zlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
+from functools import partial
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import numpy as np
-
+from vftcli.readers.aliases import ALIASES
+from vftcli.readers.columns import parse_columns
+from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.opening import check_unpacked, unpacked_limit
-from vftcli.readers.reader import LogFile
+from vftcli.readers.picking import rate_words
+from vftcli.readers.reader import (
+    ARMS,
+    Episodes,
+    LogFile,
+    RawLog,
+    ReadChoice,
+    arm_of,
+    open_log,
+    refuse_arm,
+)
 from vftcli.readers.table import Column, listed
-from vftcli.signals.errors import LogError
+from vftcli.readers.tables import ArrayTable, described, from_table
+from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import fact
 
 #: Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders.
 DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
@@ -81,66 +101,35 @@ def opened(file: LogFile) -> Iterator[Any]:
         raise LogError(f"{file.path}: a damaged HDF5 file ({reason})") from None
 
 
-class Hdf5Table:
+class Hdf5Table(ArrayTable):
     """The datasets of numbers in an open HDF5 file, or in one group of it, each a column.
 
     Images, texts, references, links to other files and what claims more than it stores are left
     out; nothing is read before it is asked for.
-
-    Attributes:
-        path: The file.
     """
 
-    remarks: tuple[Remark, ...] = ()  #: Nothing: whoever reads it knows what there is to say.
-
-    def __init__(self, path: Path, datasets: Mapping[str, Any]) -> None:
-        self.path: Path | str = path
-        self._datasets = dict(datasets)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The datasets' paths."""
-        return tuple(self._datasets)
-
-    @property
-    def width(self) -> int:
-        """Number of datasets."""
-        return len(self._datasets)
-
-    @property
-    def lists(self) -> Mapping[int, int]:
-        """Datasets of rows, and the length of a row."""
-        kinds = enumerate(self._datasets.values())
-        return {k: data.shape[1] for k, data in kinds if data.ndim == 2 and data.shape[1] != 1}
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.lists = {k: width for k, width in self.lists.items() if width != 1}
 
     def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
         """The datasets below a group, by their paths from there on, and others by theirs."""
-        below = {n.removeprefix(group): d for n, d in self._datasets.items() if n.startswith(group)}
-        return Hdf5Table(Path(self.path), {name: self._datasets[name] for name in also} | below)
+        below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
+        return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
-        names, datasets = list(self._datasets), list(self._datasets.values())
-        if len({datasets[c].shape[0] for c in columns}) > 1:
-            lengths = ", ".join(f"{names[c]} {datasets[c].shape[0]}" for c in columns)
-            raise LogError(f"{self.path}: the datasets differ in length: {lengths} rows.")
-        return {c: self._numbers(datasets[c], c == clock) for c in columns}
+        return super().load(columns, clock)
 
     def check_size(self, columns: Sequence[int]) -> None:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
-        names, datasets = list(self._datasets), list(self._datasets.values())
+        names, datasets = list(self.columns), list(self.columns.values())
         stored = sum(datasets[c].id.get_storage_size() for c in columns)
         what = f"{self.path}: {listed([names[c] for c in columns])}"
         check_unpacked(what, 8 * sum(datasets[c].size for c in columns), stored)
         for c in columns:
             check_chunks(f"{self.path}: {names[c]}", datasets[c], unpacked_limit(stored))
-
-    def _numbers(self, dataset: Any, is_clock: bool) -> Column:  # noqa: ANN401 - h5py
-        """One dataset. (T,) or (T, k)"""
-        whole = is_clock and dataset.dtype.kind in "iu" and dataset.dtype.itemsize == 8
-        numbers: Column = np.asarray(dataset[()]).astype(np.int64 if whole else np.float64)
-        return numbers[:, 0] if numbers.ndim == 2 and numbers.shape[1] == 1 else numbers
 
 
 def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # noqa: ANN401 - h5py
@@ -189,3 +178,212 @@ def natural(name: str) -> list[tuple[int, int, str]]:
     """A key that puts demo_2 before demo_10."""
     parts = re.split(r"(\d{1,9})", name)
     return [(1, int(p), "") if p.isdecimal() else (0, 0, p) for p in parts]
+
+
+ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
+ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
+ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
+
+DROID_STATE = "observation/robot_state/"
+#: What DROID's controller commands, without gravity; what it measures includes it.
+DROID_COMPUTED = "joint_torques_computed"
+DROID_TIME = "observation/timestamp/robot_state/robot_timestamp_"
+DROID_USUAL = (
+    f"t={DROID_TIME}seconds|{DROID_TIME}nanos,q[rad]={DROID_STATE}joint_positions,"
+    f"dq={DROID_STATE}joint_velocities,tau={DROID_STATE}motor_torques_measured"
+)
+#: Where projects that record no torque keep their positions → the project.
+TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
+#: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
+FRANKA = ("panda", "fr3")
+TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
+
+TRAJECTORY = "trajectory.h5"
+DEEPEST_FOLDER = 8  #: Folders inside folders; DROID has five: version, lab, success, date, episode.
+MOST_LOOKED_AT = 2000  #: Folders that are looked at to recognise a release.
+
+
+class Layout(NamedTuple):
+    """How a project lays its episodes out."""
+
+    name: str  #: The project.
+    anchor: str  #: Path of the positions, below the group of an episode.
+    read: Callable[[Hdf5Table, ReadChoice], RawLog]  #: Reads one episode of an open file.
+
+    def groups(self, names: Sequence[str]) -> tuple[str, ...]:
+        """The groups of its episodes, in their order; none where the file is laid out otherwise."""
+        ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
+        return tuple(sorted((e for e in ends if not e or e.endswith("/")), key=natural))
+
+
+def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
+    """ALOHA: two arms of six joints and a gripper side by side, no clock, efforts in mA."""
+    names = table.names
+    if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
+        return read_any(table, request)
+    if stated := request.spec.item("q") is not None:
+        refuse_arm(table.path, request)
+    places = "left: columns 0-5, right: columns 7-12"
+    arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, places)
+    first = ALOHA_ARM * ARMS.index(arm)
+    span = f"[{first}:{first + ALOHA_ARM - 1}]"
+    usual = f"t@{ALOHA_RATE:g}Hz,q[rad]={ALOHA}{span},dq=observations/qvel{span}"
+    usual += f",current[mA]={DYNAMIXEL}{span}"
+    if DYNAMIXEL in names and not stated:
+        remarks = (*remarks, fact("effort-of-dynamixel"))
+    raw = described(table, usual, request, remarks=remarks)
+    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
+    own = raw.clock == rate_words(ALOHA_RATE)
+    return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
+
+
+def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
+    """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
+    refuse_arm(table.path, request)
+    if request.spec.item("q"):
+        return from_table(table, request)
+    names = table.names
+    remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
+    clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
+    raw = described(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
+    return replace(raw, robot_hint=robot_of(Path(table.path).parent))
+
+
+def robot_of(folder: Path) -> str | None:
+    """The profile that the serial number in a DROID episode's metadata settles."""
+    for path in sorted(folder.glob("metadata_*.json"))[:1]:
+        try:
+            with path.open("rb") as metadata:
+                about = json.loads(metadata.read(TOLD_LIMIT))
+            serial = str(about.get("robot_serial", "")).lower()
+        except (OSError, ValueError, RecursionError, AttributeError):
+            return None
+        return next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
+    return None
+
+
+def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
+    """Any other file: by --columns, or by alias among the datasets of one group."""
+    refuse_arm(table.path, request)
+    if request.spec.item("q"):
+        return from_table(table, request)
+    if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names)]) > 1:
+        raise UnknownFormatError(
+            f"{table.path}: laid out as {' and as '.join(fitting)}. Say what is what with "
+            "--columns, as in t=…,q=PATH/OF/POSITIONS."
+        )
+    names = table.names
+    for path, project in TORQUELESS.items():
+        if any(f"/{name}".endswith(f"/{path}") for name in names):
+            raise LogError(
+                f"{table.path}: laid out as {project}'s, which hold no torque, so no force can be "
+                "estimated. Where you added torques, name all with --columns, as in "
+                "t@20Hz,q=PATH/OF/POSITIONS,tau=PATH/OF/TORQUES."
+            )
+    # The datasets of the one group that has positions by name, and those at the top.
+    top = [name for name in names if "/" not in name]
+    return from_table(table.within(level_of(table.path, names, "/"), top), request)
+
+
+def level_of(path: Path | str, names: Sequence[str], separator: str) -> str:
+    """The beginning that the names of one group share, the one with positions; "" for the top."""
+    levels: dict[str, str] = {}
+    for name in names:
+        prefix, found, last = name.rpartition(separator)
+        if re.sub(r"[_.\[]?\d{1,9}\]?$", "", last.lower()) in ALIASES["q"]:
+            levels.setdefault(prefix + found, name)
+    if len(levels) > 1 and "" not in levels:
+        raise LogError(
+            f"{path}: {listed(list(levels.values()))} could each be the positions. Say which with "
+            f"--columns, as in t=…,q={next(iter(levels.values()))}."
+        )
+    return "" if "" in levels or not levels else next(iter(levels))
+
+
+#: The layouts that are known.
+LAYOUTS = (
+    Layout("ALOHA", ALOHA, read_aloha),
+    Layout("DROID", f"{DROID_STATE}joint_positions", read_droid),
+)
+
+ANY = Layout("HDF5", "", read_any)
+
+
+def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
+    """How a file is laid out, and the groups of its episodes; as any other where two ways fit."""
+    found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names))]
+    return found[0] if len(found) == 1 else (ANY, ("",))
+
+
+def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
+    """The episodes' numbers: those their groups' names end with, else counted from 0."""
+    ends = [re.search(r"(\d{1,9})\D*$", group) for group in groups]
+    numbers = [int(end[1]) for end in ends if end]
+    rising = all(a < b for a, b in pairwise(numbers))
+    return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
+
+
+def trajectories(folder: Path) -> Iterator[Path | None]:
+    """Every episode below a folder in the order of their names; None for a folder without one."""
+    for place, below, names in os.walk(folder):
+        below.sort()
+        if len(Path(place).relative_to(folder).parts) >= DEEPEST_FOLDER:
+            below.clear()
+        yield Path(place) / TRAJECTORY if TRAJECTORY in names else None
+
+
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder holds DROID's episodes, at any depth."""
+    is_lerobot = (file.path / "meta" / "info.json").is_file()
+    if "metadata.yaml" in file.entries or is_lerobot:
+        return False
+    looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
+    return any(path is not None for _, path in looked_at)
+
+
+@contextmanager
+def episodes(file: LogFile) -> Iterator[Episodes]:
+    """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
+    if file.is_folder:
+        paths = [path for path in trajectories(file.path) if path is not None]
+        if not paths:
+            raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
+        places = [str(path.parent.relative_to(file.path)) for path in paths]
+        yield placed(range(len(paths)), places, [partial(read_trajectory, path) for path in paths])
+        return
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        layout, groups = layout_of(table)
+        each = [partial(layout.read, table.within(group)) for group in groups]
+        yield placed(numbers_of(groups), [group.rstrip("/") for group in groups], each)
+
+
+def placed(
+    numbers: Sequence[int], places: Sequence[str], each: Sequence[Callable[[ReadChoice], RawLog]]
+) -> Episodes:
+    """Episodes by number; the place of one of several is said."""
+
+    def read(k: int, request: ReadChoice) -> RawLog:
+        raw = each[k](request)
+        said = (fact("episode-place", place=places[k]),) if len(places) > 1 else ()
+        return replace(raw, remarks=(*said, *raw.remarks))
+
+    return {number: partial(read, k) for k, number in enumerate(numbers)}
+
+
+def read_trajectory(path: Path, request: ReadChoice) -> RawLog:
+    """Read the file of one of DROID's episodes."""
+    raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
+    return replace(raw, part="", files=(path,))
+
+
+def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
+    """The group, as "observations/", in which each episode of an HDF5 file has its positions."""
+    stated = parse_columns(columns).item("q") if columns is not None else None
+    with opened(file) as content:
+        table = table_of(file.path, content)
+        layout, groups = layout_of(table)
+        anchor = (stated.pattern if stated is not None else None) or layout.anchor
+        anchor = anchor or level_of(file.path, table.names, "/")
+    below = anchor[: anchor.rfind("/") + 1]
+    return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))

@@ -1,24 +1,20 @@
 """JSON logs: an object a line, a list of objects, or one object of arrays (panda-py, frankapy)."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.arrays_file import (
-    arrays_of_lists,
-    episodes_of_skills,
-    read_arrays,
-    read_dictionary,
-)
-from vftcli.readers.formats import LogFormat
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
+from vftcli.readers.arrays_file import arrays_of_lists, dictionary_episodes, read_arrays
+from vftcli.readers.reader import Episodes, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.letters import printable
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 
 #: Bytes of objects that a document may be parsed into; one a line may be of any length.
 MEMORY_LIMIT = 768 * 1024 * 1024
@@ -30,21 +26,21 @@ CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
 Objects = list[dict[str, Any]]
 
 
-def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
-    """Read a JSON log, of whichever of the shapes."""
+@contextmanager
+def episodes(file: LogFile) -> Iterator[Episodes]:
+    """The logs of a JSON file: the skills of frankapy's, or the one of whichever of the shapes."""
     if is_lines(file):
-        episode_of(file.path, request, (0,))
-        return read_arrays(file, *columns_of_lines(file), request)
-    return read_document(file, parsed(file), request)
+        yield {0: partial(read_lines, file)}
+    elif isinstance(log := parsed(file), dict):
+        yield dictionary_episodes(file, log)
+    else:
+        yield {0: partial(read_list, file, log)}
 
 
-def read_document(file: LogFile, log: Any, request: ReadChoice) -> RawLog:  # noqa: ANN401
-    """Read one JSON value: an object of arrays, a list of objects, or a list of rows."""
-    if isinstance(log, dict):
-        return read_dictionary(file, log, request)
-    episode_of(file.path, request, (0,))
+def read_list(file: LogFile, log: list[Any], request: ReadChoice) -> RawLog:
+    """Read a list of objects, or a list of rows."""
     if log and all(isinstance(row, dict) for row in log):
-        return read_arrays(file, columns_of(file, log, 1), (), request)
+        return read_arrays(file, columns_of(file, log, 1), request)
     rows = arrays_of_lists(file, {"rows": log})["rows"]
     if rows.ndim != 2:
         raise NoLogError(
@@ -60,8 +56,8 @@ def is_lines(file: LogFile) -> bool:
     return len(file.lines) > 1 and first.startswith(b"{") and first.endswith(b"}")
 
 
-def columns_of_lines(file: LogFile) -> tuple[dict[str, Column], tuple[Remark, ...]]:
-    """The fields of the objects, one a line, and what is to be said of the last one."""
+def read_lines(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read objects, one a line; a last one that is cut is left out and said."""
     blocks: list[dict[str, Column]] = []
     objects: Objects = []
     waiting: int | None = None
@@ -86,7 +82,8 @@ def columns_of_lines(file: LogFile) -> tuple[dict[str, Column], tuple[Remark, ..
         columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
     except ValueError:
         raise LogError(f"{file.path}: a field differs in length from line to line.") from None
-    return columns, (fact("line-cut"),) if waiting is not None else ()
+    cut = (fact("line-cut"),) if waiting is not None else ()
+    return read_arrays(file, columns, request, *cut)
 
 
 def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
@@ -160,8 +157,3 @@ def parsed(file: LogFile) -> Any:  # noqa: ANN401 - of JSON
     except ValueError as error:
         reason = printable(str(error).split("\n")[0][:120])
         raise LogError(f"{file.path}: looks like JSON and is not ({reason}).") from None
-
-
-def episodes_in(file: LogFile) -> Sequence[int]:
-    """The numbers of the skills in frankapy's log, 0 alone elsewhere."""
-    return (0,) if is_lines(file) else episodes_of_skills(parsed(file))

@@ -2,9 +2,10 @@
 
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,11 +18,11 @@ from vftcli.readers.joints import kinematic_order
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.reader import (
     ARMS,
+    Episodes,
     LogFile,
     RawLog,
     ReadChoice,
     arm_of,
-    episode_of,
     open_log,
     refuse_arm,
 )
@@ -84,15 +85,21 @@ class Element(NamedTuple):
     side: str  #: left, right, or "" for neither.
 
 
-def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
-    """Read an episode of a dataset."""
-    info = info_of(file.path)
-    episodes = episodes_told(file.path)
-    number, part, remarks = episode_of(file.path, request, [e.number for e in episodes])
-    episode = next(e for e in episodes if e.number == number)
+@contextmanager
+def episodes(file: LogFile) -> Iterator[Episodes]:
+    """The episodes of a dataset."""
+    read = partial(read_episode, file, info_of(file.path))
+    yield {each.number: partial(read, each) for each in episodes_told(file.path)}
+
+
+def read_episode(
+    file: LogFile, info: Mapping[str, Any], episode: Episode, request: ReadChoice
+) -> RawLog:
+    """Read an episode of a dataset, of which meta/info.json says this."""
     path = data_file(file.path, episode)
     table = rows_of(open_log(path), episode)
     names: tuple[str, ...] = ()
+    remarks: tuple[Remark, ...] = ()
     if request.spec.item("q"):
         refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
@@ -100,13 +107,12 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         each_of = info.get("features")
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
-        usual, names, side, more = columns_of(file.path, table, features, request)
-        remarks = (*remarks, *more)
+        usual, names, side, remarks = columns_of(file.path, table, features, request)
     raw = described(table, usual, request, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         by_frames(raw, table, info.get("fps")),
-        part=" ".join(word for word in (part, f"{side} arm" if side else "") if word),
+        part=f"{side} arm" if side else "",
         files=(file.path / "meta" / "info.json", path),
         robot_hint=robot if robot in ROBOTS else None,
     )
@@ -114,7 +120,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
 
 def columns_of(
     path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
-) -> tuple[str, tuple[str, ...], str, tuple[Any, ...]]:
+) -> tuple[str, tuple[str, ...], str, tuple[Remark, ...]]:
     """Which columns hold which signals of which arm, by the names of features and their elements.
 
     Returns:
@@ -325,8 +331,3 @@ def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
 def recognises(file: LogFile, _: LogFormat) -> bool:
     """Whether a folder is a dataset."""
     return "meta" in file.entries and (file.path / "meta" / "info.json").is_file()
-
-
-def episodes_in(file: LogFile) -> list[int]:
-    """The numbers of its episodes."""
-    return [episode.number for episode in episodes_told(file.path)]

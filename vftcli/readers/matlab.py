@@ -10,8 +10,7 @@ import numpy as np
 
 from vftcli.readers.aliases import CLOCKS
 from vftcli.readers.formats import LogFormat
-from vftcli.readers.hdf5 import opened, table_of
-from vftcli.readers.hdf5_layouts import level_of
+from vftcli.readers.hdf5 import level_of, opened, table_of
 from vftcli.readers.opening import check_unpacked, unpacked_limit
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column, listed

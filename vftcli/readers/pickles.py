@@ -5,14 +5,14 @@ import pickle
 import pickletools
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.arrays_file import episodes_of_skills, read_dictionary
-from vftcli.readers.formats import LogFormat
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.arrays_file import dictionary_episodes
+from vftcli.readers.reader import Episodes, LogFile
 from vftcli.signals.errors import LogError
 
 #: Numbers that a pickle of any size may build; a larger one as many as it has bytes.
@@ -238,17 +238,13 @@ def _check_opcodes(content: bytes) -> None:
             raise Refused("a memo larger than the file")
 
 
-def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
-    """Read a pickled dictionary of arrays: panda-py's get_log() or frankapy's trajectory."""
+@contextmanager
+def episodes(file: LogFile) -> Iterator[Episodes]:
+    """The logs of a pickled dictionary: panda-py's get_log(), frankapy's skills."""
     log = load_arrays_only(file)
     if not isinstance(log, dict):
         raise LogError(
             f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of arrays. "
             "Save the log with np.savez."
         )
-    return read_dictionary(file, log, request)
-
-
-def episodes_in(file: LogFile) -> tuple[int, ...]:
-    """The numbers of the skills in frankapy's log, 0 alone elsewhere."""
-    return episodes_of_skills(load_arrays_only(file))
+    yield dictionary_episodes(file, log)

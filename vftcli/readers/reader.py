@@ -2,11 +2,11 @@
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError, ParameterError
@@ -161,7 +161,7 @@ class ReadChoice(Choice):
         ParameterError: If the effort, the derived signal or the arm is none of these.
     """
 
-    GROUP: ClassVar[str] = LOG
+    GROUP = LOG
 
     #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: Annotated[
@@ -308,6 +308,10 @@ def open_log(path: Path) -> LogFile:
 
     head, wrapping = head_of(path)
     return LogFile(path=path, head=head, wrapping=wrapping)
+
+
+#: The number of each episode of a file, rising, and the function that reads it.
+Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 
 
 def episode_of(

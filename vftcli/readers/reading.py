@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
-from vftcli.readers.formats import FORMATS, LogFormat
+from vftcli.readers.formats import FORMATS, LogFormat, description, known_kind
 from vftcli.readers.opening import Digest
 from vftcli.readers.reader import (
     LogFile,
@@ -152,8 +152,6 @@ def _reader(file: LogFile, name: str | None, columns: str | None) -> LogFormat:
 
 def _recognise(file: LogFile) -> LogFormat:
     """The one format that knows the content; a general one only where no other does."""
-    from vftcli.readers.unrecognised import description, known_kind
-
     # A general format would take nearly any text, also that of a vendor: it is asked last.
     found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:

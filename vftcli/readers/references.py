@@ -10,7 +10,7 @@ from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.picking import picked
-from vftcli.readers.reader import LogFile, ReadChoice, open_log
+from vftcli.readers.reader import ReadChoice, open_log
 from vftcli.readers.table import Pick, Picks, Table, listed, picks_of
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import LogError
@@ -33,7 +33,8 @@ class ReferenceTable:
 def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     """Read a reference file: text, compressed text or Parquet."""
     file = open_log(path)
-    table = opened(file)
+    is_parquet = file.head.startswith(b"PAR1")
+    table: Table = ParquetTable(file) if is_parquet else TextTable(file)
     spec = parse_columns(columns, log=False) if columns else None
     picks = found(table) if spec is None else picks_of(table, spec, as_given)
     raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
@@ -50,17 +51,6 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
         wrench=raw.signals.get("wrench"),
         wrench_frame=raw.wrench_frame,
     )
-
-
-def opened(file: LogFile) -> Table:
-    """The file as a table."""
-    if file.head.startswith(b"PAR1"):
-        return ParquetTable(file)
-    if not file.lines:
-        raise LogError(
-            f"{file.path}: not a text table or Parquet file; a reference is one of them."
-        )
-    return TextTable(file)
 
 
 def as_given(table: Table, picks: Picks) -> Picks:

@@ -116,7 +116,7 @@ def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> Raw
     stated = request.spec
     if stated.items and not stated.named:
         return from_table(table, request, **more)
-    items = {item.signal: item for item in parse_columns(usual).items}
+    items = {item.signal: item for item in parse_columns(usual).items if there(table, item)}
     if stated.item("q") is not None:
         items = {signal: item for signal, item in items.items() if signal == "t"}
     for item in stated.items:
@@ -125,6 +125,12 @@ def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> Raw
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
     return picked(table, picks_of(table, spec), request, **more)
+
+
+def there(table: Table, item: Item) -> bool:
+    """Whether a table has the columns of an item; its clock and positions are always looked for."""
+    columns = (item.pattern or "").split("|")
+    return item.signal in {"t", "q"} or any(c.partition("[")[0] in table.names for c in columns)
 
 
 def restated(table: Table, item: Item, usual: Item | None) -> Item:
@@ -162,10 +168,10 @@ def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  #
 
 @dataclass
 class ArrayTable:
-    """A table whose columns are in memory already: arrays of numbers or of lists."""
+    """A table of arrays of numbers or of lists, in memory or an open file's."""
 
     path: Path | str  #: What messages call it: the file, and in a bag the topic.
-    columns: Mapping[str, Column]  #: Name → (T,) or (T, k).
+    columns: Mapping[str, Any]  #: Name → (T,) or (T, k).
     headed: bool = True  #: Whether the names are the file's own.
     remarks: tuple[Remark, ...] = ()  #: What had to be done to the arrays.
     lists: Mapping[int, int] = field(init=False)
@@ -197,7 +203,8 @@ class ArrayTable:
             if arrays[c].dtype.kind not in "fiub":
                 raise LogError(f"{self.path}: {names[c]} holds {arrays[c].dtype}, not numbers.")
             whole = c == clock and arrays[c].dtype.kind in "iu" and arrays[c].dtype.itemsize == 8
-            loaded[c] = arrays[c].astype(np.int64 if whole else np.float64, copy=False)
+            values = np.asarray(arrays[c]).astype(np.int64 if whole else np.float64, copy=False)
+            loaded[c] = values[:, 0] if values.ndim == 2 and c not in self.lists else values
         return loaded
 
 

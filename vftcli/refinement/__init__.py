@@ -1,1 +1,1 @@
-"""Estimates only a complete log allows: its free part tells noise, bias, bands and best gains."""
+"""Estimates of a complete log: its free part gives noise, bias, bands, gains."""

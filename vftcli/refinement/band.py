@@ -1,4 +1,4 @@
-"""Bands: how far each estimate may be off, drawn from the log's own free samples and spectra."""
+"""Bands: error of each estimate by the log's own free samples and spectra."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from vftcli.signals.series import resample_columns
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
-    """The estimate with its band, and marked where joints move; itself where nothing is known.
+    """The estimate with its band, marked in motion; itself if nothing is known.
 
     The band is `vftcli.observers.error_band`'s: a filter's own covariance, `sd`, knows no lag.
     """
@@ -41,7 +41,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
 
 
 def stated_band(found: Baseline, reading: FreeReading) -> Array:
-    """The band of `best` where the log has no spectra, from what the robot's own numbers state.
+    """Band of `best` without spectra, by the robot's own numbers.
 
     Friction is as wrong as is usual, by a fifth (`model_error.expected_error`); where a bias was
     fitted it is what that leaves of it, and what is read where its fit sees no contact. What the
@@ -71,7 +71,7 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
 
 
 def known_error(found: Baseline, reading: FreeReading) -> FreeError:
-    """What an estimator reads where nothing touches the arm, as far as the log shows it.
+    """An estimator's reading without contact, as far as the log shows it.
 
     Samples that a fitted bias calls free speak too, as a stated part is short and often at rest:
     the larger of both counts.
@@ -89,7 +89,7 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
 
 
 def fitted_error(found: Baseline, reading: FreeReading, friction: Array) -> FreeError | None:
-    """What is read in the samples that the fit of a correction calls free; None in too few.
+    """Readings in the correction fit's free samples; None in too few.
 
     Slow loads that the fit believes in are no error of who reads them, nor is a load that the free
     part carries where it believes in none.
@@ -105,7 +105,7 @@ def fitted_error(found: Baseline, reading: FreeReading, friction: Array) -> Free
 
 
 def band_remarks(found: Baseline) -> tuple[Remark, ...]:
-    """What the bands are, and where friction is not known."""
+    """Meaning of the bands, and joints without known friction."""
     if found.spectra is None:
         return (caution("no-band"),) if found.part is None else ()
     stuck = tuple(int(j) + 1 for j in np.flatnonzero(found.stuck))

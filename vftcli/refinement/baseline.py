@@ -1,4 +1,4 @@
-"""A log's free part and spectra, and what the observers run on once the bias is off.
+"""A log's free part and spectra, and its observers' input less the bias.
 
 The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
 `best` runs on what is left, tuned on the spectra of that; the other observers do where
@@ -26,18 +26,18 @@ from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.rest import standing
 
-STANDS = 0.5  #: A joint that stands in more than this share of the samples is limited by stiction.
+STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
 
 
 @dataclass(frozen=True, kw_only=True)
 class Baseline:
-    """What a log shows of itself before any observer has run."""
+    """Evidence of a log before any observer runs."""
 
     motion: FreeMotion  #: The log and its free motion, without samples that stand alone.
     part: FreePart | None = None  #: Its free part, None where there is none.
     #: Spectra of the raw disturbance, None where the free part is too short or not free.
     spectra: Spectra | None = None
-    standing: Mask  #: Where a joint stands still. (T, n)
+    standing: Mask  #: Where a joint rests. (T, n)
     #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
     #: A load that the free part carries and the model lacks, None where none shows.
@@ -48,7 +48,7 @@ class Baseline:
     #: Whether the free part is what the fit of that bias takes for free: no contact that comes and
     #: goes, though a load that stays may be in it.
     by_fit: bool = False
-    #: What was applied of it and what was not, and what stands in for a free part.
+    #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
 
@@ -77,7 +77,7 @@ class Baseline:
 
     @property
     def tunable(self) -> Spectra | None:
-        """The spectra where gains may be taken from them, else None.
+        """The spectra if gains may come from them, else None.
 
         Not from a free part by the fit with a load in it: of 2.8 kg on a UR10e, gains ran to the
         slowest.
@@ -116,7 +116,7 @@ class Baseline:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What was found, and what was not and why."""
+        """Findings, and the missing ones with reasons."""
         found = self.part.remarks if self.part is not None else ()
         load = () if self.load is None else (self.load.remark,)
         missing = () if self.missing is None else (self.missing,)
@@ -146,23 +146,23 @@ def baseline_of(motion: FreeMotion) -> Baseline:
 
 @dataclass(frozen=True, kw_only=True)
 class Baselines:
-    """What the observers of a log run on."""
+    """Input of a log's observers."""
 
     plain: Baseline  #: What all but `best` run on.
     best: Baseline  #: What `best` runs on: less the bias of the whole log, where that was fitted.
 
     def of(self, name: str) -> Baseline:
-        """What the observer of this name runs on."""
+        """Input of the observer of this name."""
         return self.best if name == BEST else self.plain
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What was found, and what was not and why."""
+        """Findings, and the missing ones with reasons."""
         apart = () if self.best is self.plain else self.best.on_correction
         return (*self.plain.remarks, *apart)
 
     def spectra(self, *, gains: bool) -> LogSpectra:
-        """What the observers that are built for the log are tuned to."""
+        """Spectra for the observers built for the log."""
         plain = self.plain.tunable
         called_for = None
         if gains and plain is not None:
@@ -172,7 +172,7 @@ class Baselines:
 
 
 class FreeReading(NamedTuple):
-    """What one observer reads of a log, and where nothing touches the arm."""
+    """One observer's reading of a log, and its free samples."""
 
     observer: Observer  #: The observer.
     estimate: ExternalTorque  #: Its estimate of the log.
@@ -183,7 +183,7 @@ class FreeReading(NamedTuple):
 
     @property
     def rms(self) -> Array:
-        """Root mean square over the free samples, bias included; NaN where none is known. (n,)"""
+        """Root mean square of free samples, with bias; NaN without any. (n,)"""
         known = np.isfinite(self.samples)
         square = np.sum(np.where(known, self.samples, 0.0) ** 2, axis=0)
         count = np.count_nonzero(known, axis=0)
@@ -191,7 +191,7 @@ class FreeReading(NamedTuple):
 
 
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
-    """Run an observer along the free pieces; along the log itself that is its estimate."""
+    """An observer's run along the free pieces; on the log it is its estimate."""
     log = found.motion.log
     read = [
         estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
@@ -213,7 +213,7 @@ def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) 
 
 
 def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:
-    """What the observers of a log run on: `best` and, where it is asked, all less the bias."""
+    """Input of a log's observers: `best` and, if asked, all less the bias."""
     motion, as_read = motion.steadied, motion.log
     found = baseline_of(motion)
     if not (choice.corrects_all or (best and choice.corrects_best)):
@@ -234,11 +234,11 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline whose free part is what the fit of the bias takes for free, where that will do.
+    """A baseline with the bias fit's free part, where that is enough.
 
     Args:
         found: A baseline without spectra.
-        quiet: The samples that are taken for free. (T,)
+        quiet: The samples assumed free. (T,)
     """
     log = found.motion.log
     share = float(quiet.mean())
@@ -251,7 +251,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
     made = replace(found, part=part, load=free_load(part.pieces), by_fit=True, missing=None)
     try:
         return replace(made, spectra=spectra_of(RunSamples(log, ~quiet), made.samples))
-    except ParameterError:  # all of it or nothing is taken for free, or never for long enough
+    except ParameterError:  # all of it or nothing is assumed free, or never long enough
         return found
 
 

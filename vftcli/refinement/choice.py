@@ -1,27 +1,27 @@
-"""What a user may choose of what only a complete log allows: which bias is taken off."""
+"""A user's choice for a complete log: the bias to subtract."""
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from vftcli.signals.option import ESTIMATE, Choice, Option
 from vftcli.signals.parsing import check_known
 
 #: The word for what the log allows: the whole log's bias for `best`, none for the others.
 AUTOMATIC = "auto"
-#: The word for the bias that is fitted to the whole log and taken off before observers run.
+#: The word for the bias fitted to the whole log and subtracted before observers run.
 WHOLE_LOG = "whole-log"
 REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``--remove-bias`` takes.
 
 
 @dataclass(frozen=True, kw_only=True)
 class RefinementChoice(Choice):
-    """What is done with the estimates once the whole log is known.
+    """A user's choice for the estimates of a whole log.
 
     Raises:
         ParameterError: If there is no such way to remove a bias.
     """
 
-    GROUP: ClassVar[str] = ESTIMATE
+    GROUP = ESTIMATE
 
     remove_bias: Annotated[
         str,

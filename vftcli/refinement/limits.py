@@ -1,4 +1,4 @@
-"""What limits a log, cause by cause, and how far the paper's gains are off the best on it.
+"""Limits of a log, cause by cause, and the paper's gains against the best.
 
 Without a reference the bands tell what an estimate's error is expected to be: the root mean square
 of their standard deviation over the log, the mean over the joints.
@@ -31,7 +31,7 @@ AHEAD = 1.05  #: The best is ahead where the paper's gains make this many times 
 
 
 class Budget(NamedTuple):
-    """Where one observer's error comes from, estimated on the log itself."""
+    """Sources of one observer's error, estimated on the log itself."""
 
     name: str  #: The observer.
     parts: dict[str, Array]  #: Cause → root mean square. (n,) [N·m]
@@ -49,7 +49,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     Noise is the flat floor of S_n through |H|²; bandwidth ∫|1−H|²S_τ df. What else the observer
     reads on the free part is model error: friction as far as sign and size of a joint's own
     velocity explain it, the rest of the model otherwise. Stiction at rest is the dry friction a
-    standing joint may hide, F_c/√3, times the share of the time that it stands.
+    resting joint may hide, F_c/√3, times the share of its time at rest.
     """
     observer = reading.observer
     response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
@@ -72,7 +72,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
 
 
 def friction_share(dq: Array, tau: Array) -> Array:
-    """Share of a torque's power that sign and size of a joint's own velocity explain. (n,)
+    """Share of a torque's power by a joint's own velocity, sign and size. (n,)
 
     Args:
         dq: Joint velocities. (S, n) [rad/s]
@@ -88,7 +88,7 @@ def friction_share(dq: Array, tau: Array) -> Array:
 
 
 def limits_remark(found: Budget, stuck: Mask) -> Remark:
-    """What limits a log: the largest cause of each joint, and how much of the error it makes.
+    """Limits of a log: each joint's largest cause, and its part of the error.
 
     What stiction may hide is added to the error of a standing joint.
 
@@ -111,7 +111,7 @@ def limits_remark(found: Budget, stuck: Mask) -> Remark:
 def expected_gap(
     found: Baseline, estimates: Sequence[ExternalTorque], *, gains_of_file: bool
 ) -> Remark | None:
-    """Expected error with the paper's gains over that of `best`; None where either is unknown."""
+    """Expected error of the paper's gains over `best`'s; None if unknown."""
     known = {estimate.name: estimate for estimate in estimates}
     if BEST not in known or known[BEST].error_sd is None:
         return None
@@ -133,7 +133,7 @@ def expected_gap(
 def gap_remark(
     codes: tuple[str, str], errors: Mapping[str, float], delays: Mapping[str, Array]
 ) -> Remark | None:
-    """How far the paper's gains are off the best; None where an error is not known, or is none.
+    """Distance of the paper's gains from the best; None without errors.
 
     Args:
         codes: `MEASURED` or `EXPECTED`.

@@ -1,4 +1,4 @@
-"""What may be wrong with a robot's model: columns, how wrong each may be, and the torque they make.
+"""Possible errors of a robot's model: columns, their sizes, their torque.
 
 The raw disturbance d is the external torque less the model's error, d = τ_ext − A δx. The columns A
 are the inertial parameters of every link, the rotor inertias, the drive constants and the friction
@@ -16,7 +16,6 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.disturbance import GAP
 from vftcli.robots.friction import dry_friction, steady_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
-from vftcli.robots.presliding import play
 from vftcli.robots.regressor import (
     LINK,
     TENSOR,
@@ -26,6 +25,7 @@ from vftcli.robots.regressor import (
 )
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
+from vftcli.robots.running_friction import play
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step
@@ -41,7 +41,7 @@ USUAL_SPEED = np.pi
 
 
 class SmoothMotion(NamedTuple):
-    """A log's motion without what is faster than `CUTOFF`, and the rigid body's torque of it."""
+    """A log's motion below `CUTOFF`, and the rigid body's torque of it."""
 
     t: Array  #: Clock without long waits. (T,) [s]
     q: Array  #: Positions. (T, n) [rad]
@@ -73,13 +73,13 @@ def without_waits(t: Array) -> Array:
 
 
 def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Array]:
-    """Torque of a chain's motion with its rotors, ṗ − Cᵀq̇ + g, and g alone. (T, n) each [N·m]"""
+    """Torque of a chain with rotors, ṗ − Cᵀq̇ + g, and g. (T, n) each [N·m]"""
     found = momentum_terms(chain, q, dq)
     return derivative(t, found.p) - found.coriolis_transpose_dq + found.gravity, found.gravity
 
 
 def friction_shapes(run: Run, gravity: Array) -> list[Array]:
-    """What each joint's friction may be wrong by, from the motion as it was measured.
+    """Possible errors of each joint's friction, from the measured motion.
 
     The smoothed sign, how far the presliding deflection is from it, the sign times the load, the
     velocity and its signed square. (T, n) each
@@ -98,7 +98,7 @@ class UsualFriction(NamedTuple):
 
 
 def usual_friction(robot: Robot) -> UsualFriction:
-    """Dry, viscous and quadratic friction of a robot; of another model's curve, as fitted to it.
+    """Dry, viscous and quadratic friction of a robot; other curves are fitted.
 
     A sigmoid has neither slope nor bend of its own: seven tenths of its amplitude count as dry.
     """
@@ -154,7 +154,7 @@ class ModelError:
 
 
 def error_of(values: Array, joints: int) -> ModelError:
-    """The model error whose columns have these values, in the order of `column_numbers`."""
+    """The model error with these values, in the order of `column_numbers`."""
     inertial, own = values[: LINK * joints], values[LINK * joints :].reshape(joints, -1)
     return ModelError(
         inertial=inertial,

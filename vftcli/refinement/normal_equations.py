@@ -1,13 +1,13 @@
-"""Weighted normal equations of a model's error and slow external loads, and their solution.
+"""Weighted normal equations of a model's error and slow loads; solution.
 
-All columns are times their standard deviations, so the prior is the unit matrix: the solution
-minimises Σ w (d + A u)² + Σ u². Each joint's row has columns of its own, and a slow load only those
-of the two knots about a sample, so the matrix is summed block by block.
+All columns are times their standard deviations: the prior is the unit matrix and the solution
+minimises Σ w (d + A u)² + Σ u². A joint's row has its own columns, a slow load only its two
+knots about a sample: sums go block by block.
 
-A hand that leans on the arm all the time looks like mass. Beside the model's columns therefore
-stand those of external loads that change slowly: a wrench at the flange, and forces at the elbow
-and the wrist on the links before them, which by the lever rule make up a force anywhere along the
-arm. What falls to them is left in the estimate: in doubt a torque is a push.
+A hand that leans on the arm all the time looks like mass. So beside the model's columns there
+are those of external loads that change slowly: a wrench at the flange, forces at elbow and
+wrist on the links before them. By the lever rule these make a force anywhere along the arm.
+The estimate keeps their torque: in doubt a torque is a push.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,20 +25,20 @@ from vftcli.signals.least_squares import NormalEquations
 
 FORCE = 50.0  #: Standard deviation of an external force. [N]
 MOMENT = 10.0  #: Standard deviation of an external moment. [N·m]
-KNOTS = 10.0  #: Time between two knots of a load, which runs straight from one to the next. [s]
-CONSTANT = 15.0  #: In a log shorter than this a load is one constant. [s]
-MOST_KNOTS = 61  #: Knots of a log of ten minutes; in a longer one they lie farther apart.
-WRENCH = 6  #: Components of the wrench at the flange, the first group of loads.
+KNOTS = 10.0  #: Time between two knots of a load, straight between. [s]
+CONSTANT = 15.0  #: In a shorter log a load is constant. [s]
+MOST_KNOTS = 61  #: Knots of ten minutes; a longer log spreads them.
+WRENCH = 6  #: Components of the flange's wrench, the first loads.
 
 
 class SlowLoads(NamedTuple):
     """Columns of slow external loads along the samples of a fit."""
 
-    #: External torque, with its sign turned, of one standard deviation of every component: the
-    #: wrench at the flange, then the forces along the arm. (S, n, m) [N·m]
+    #: External torque, sign reversed, of one standard deviation of every component: the flange's
+    #: wrench, then forces along the arm. (S, n, m) [N·m]
     torque: Array
     knot: NDArray[np.intp]  #: The knot before each sample. (S,)
-    share: Array  #: How far a sample is on the way to the next one, 0 … 1. (S,)
+    share: Array  #: A sample's way to the next one, 0 … 1. (S,)
     knots: int  #: Number of knots.
 
     @property
@@ -48,18 +48,18 @@ class SlowLoads(NamedTuple):
 
     @property
     def sizes(self) -> tuple[int, ...]:
-        """Columns of no load, of the wrench at the flange, and with the forces along the arm."""
+        """Columns without loads, with the wrench, and with the forces."""
         return tuple(sorted({0, WRENCH * self.knots, self.components * self.knots}))
 
     @property
     def numbers(self) -> NDArray[np.intp]:
-        """Column of each knot's and component's load, the flange's wrench first. (knots, m)"""
+        """Columns of each knot's components, the wrench first. (knots, m)"""
         flange = np.arange(WRENCH * self.knots).reshape(self.knots, WRENCH)
         along = np.arange(WRENCH * self.knots, self.components * self.knots)
         return np.hstack([flange, along.reshape(self.knots, -1)])
 
     def made_by(self, values: Array) -> Array:
-        """The columns times their values, in the order of `numbers`. (S, n) [N·m]"""
+        """Columns times values in the order of `numbers`. (S, n) [N·m]"""
         levels = np.zeros((self.knots, self.components))
         given = self.numbers < len(values)
         levels[given] = values[self.numbers[given]]
@@ -70,7 +70,7 @@ class SlowLoads(NamedTuple):
 
 
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
-    """The columns of slow external loads on an arm in motion.
+    """Columns of slow external loads on a moving arm.
 
     Args:
         chain: The arm.
@@ -87,17 +87,17 @@ def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
 
 
 def points_along(joints: int) -> tuple[int, ...]:
-    """The joints, from 0, at whose origins a force acts on the link before: elbow and wrist."""
+    """Joints, from 0, with a force on the link before: elbow and wrist."""
     return tuple(sorted({j for j in ((joints + 1) // 2 - 1, joints - 3) if j > 0}))
 
 
 def force_torque(chain: Chain, q: Array, joint: int) -> Array:
-    """Joint torques of a force, in base axes, at a joint's origin on the link before it. (S, n, 3)
+    """Torques of a base-axes force at a joint, on the link before. (S, n, 3)
 
     Args:
         chain: The arm.
         q: Positions. (S, n) [rad]
-        joint: The joint, from 0: those from it on feel nothing.
+        joint: The joint, from 0; it and later ones feel nothing.
     """
     poses = link_poses(chain, q)
     torque = np.zeros((*q.shape, 3))
@@ -106,17 +106,17 @@ def force_torque(chain: Chain, q: Array, joint: int) -> Array:
     return torque
 
 
-BLOCK = 64  #: Rows that are substituted at a time.
-PENALTY = 2.0  #: What a column of a load has to gain before it is believed (Akaike's criterion).
+BLOCK = 64  #: Rows to substitute at once.
+PENALTY = 2.0  #: Least gain of a load's column (Akaike's criterion).
 
 
 class FittedError(NamedTuple):
-    """What the rows say of the unknowns."""
+    """Solution of the rows."""
 
-    model: Array  #: Of the model's error, in standard deviations. (P,)
-    loads: Array  #: Of the slow loads that are believed, in standard deviations. (L,)
-    scale: float  #: What the model's standard deviations were multiplied with.
-    factor: Array  #: Lower Cholesky factor of the matrix of both. (P + L, P + L)
+    model: Array  #: The model's error, in standard deviations. (P,)
+    loads: Array  #: Slow loads in use, in standard deviations. (L,)
+    scale: float  #: Factor on the model's standard deviations.
+    factor: Array  #: Lower Cholesky factor of both's matrix. (P + L, P + L)
 
     @property
     def covariance(self) -> Array:
@@ -132,7 +132,7 @@ class Rows:
     #: The model's columns of every joint, as in `column_numbers`. (S, p) each
     columns: Sequence[Array]
     loads: SlowLoads  #: The columns of slow loads.
-    d: Array  #: What is fitted. (S, n) [N·m]
+    d: Array  #: The fitted torque. (S, n) [N·m]
 
     @property
     def joints(self) -> int:
@@ -160,7 +160,7 @@ class Rows:
         return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
 
     def model_sums(self, weight: Array) -> NormalEquations:
-        """Sums over all rows of the model's columns alone.
+        """Sums over all rows, model's columns only.
 
         Args:
             weight: Of every row. (S, n)
@@ -172,7 +172,7 @@ class Rows:
         return finished(sums)
 
     def all_sums(self, weight: Array, taken: Mask, parts: Sequence[Mask]) -> list[NormalEquations]:
-        """Sums of all columns, of the model's and of the loads', over some samples.
+        """Sums of all columns, model's and loads', over some samples.
 
         Args:
             weight: Of every row. (S, n)
@@ -180,7 +180,7 @@ class Rows:
             parts: Some of them, which may overlap. (S,) each
 
         Returns:
-            The sums over all that are taken, then over each part.
+            The sums over all these samples, then over each part.
         """
         sums = [self._empty(self.loads.sizes[-1]) for _ in range(1 + len(parts))]
         for block, member in self._blocks(taken, parts):
@@ -199,7 +199,7 @@ class Rows:
     def _blocks(
         self, taken: Mask, parts: Sequence[Mask]
     ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.bool_]]]:
-        """The samples in blocks that lie between two knots and in the same parts, and in which."""
+        """Samples in blocks between two knots and in one set of parts."""
         kind = np.column_stack([self.loads.knot, *parts])[taken]
         where = np.flatnonzero(taken)
         edges = np.flatnonzero(np.any(np.diff(kind, axis=0) != 0, axis=1)) + 1
@@ -208,13 +208,13 @@ class Rows:
                 yield block, np.array([part[block[0]] for part in parts], dtype=bool)
 
     def _empty(self, loads: int) -> Array:
-        """Room for the sums, those with d in the last row and column."""
+        """Zeros for the sums, those with d in the last row and column."""
         size = self.unknowns + loads + 1
         return np.zeros((size, size))
 
 
 def add(total: Array, X: Array, numbers: NDArray[np.intp], also: Sequence[Array] = ()) -> None:
-    """Add the products of some rows' columns, d the last, to sums at these columns' places."""
+    """Add products of rows' columns, d the last, to sums at these places."""
     product = X.T @ X
     places = np.append(numbers, len(total) - 1)
     for sums in (total, *also):
@@ -222,17 +222,17 @@ def add(total: Array, X: Array, numbers: NDArray[np.intp], also: Sequence[Array]
 
 
 def finished(total: Array) -> NormalEquations:
-    """The sums in a matrix that has those with d in its last row and column."""
+    """The sums in a matrix with d's in the last row and column."""
     return NormalEquations(total[:-1, :-1], total[:-1, -1], float(total[-1, -1]))
 
 
 def solve(
     sums: NormalEquations, unknowns: int, sizes: Sequence[int], scale: float = 1.0
 ) -> FittedError:
-    """The most likely model error, with the slow loads that make the rows likely enough.
+    """The most likely model error, with loads that make the rows likely.
 
-    The loads' groups are nested, and so are the Cholesky factors with and without them: one factor
-    gives the objective of every group, c − Σ z² over its columns, z = L⁻¹AᵀWd.
+    The loads' groups are nested, and so are their Cholesky factors: one factor gives every
+    group's objective, c − Σ z² over its columns, z = L⁻¹AᵀWd.
     """
     scales = np.ones(len(sums.right))
     scales[:unknowns] = scale
@@ -249,7 +249,7 @@ def solve(
 
 
 def forward_solved(factor: Array, right: Array) -> Array:
-    """L⁻¹ times the right-hand sides, by forward substitution in blocks. (N,) or (N, k)
+    """L⁻¹ times right-hand sides, forward substitution in blocks. (N,) or (N, k)
 
     Args:
         factor: Lower triangular L. (N, N)

@@ -1,7 +1,7 @@
 """From a log's baseline to finished estimates: bands drawn, limits named.
 
 Gains from a log's spectra and a clock with gaps may together be more than numbers can hold. On such
-a joint the momentum observer, which adds up what it is given, stands in.
+a joint the momentum observer, which adds up its input, replaces it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -54,7 +54,7 @@ class SparedObserver(Shown):
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from external torque to estimate at `frequency` [Hz]. (F, n)"""
-        with np.errstate(all="ignore"):  # what is no number is not taken
+        with np.errstate(all="ignore"):  # skip what is no number
             own, spare = (
                 o.frequency_response(frequency, step, joints) for o in (self.observer, self.spare)
             )
@@ -107,11 +107,11 @@ def refine(
     Args:
         found: What the observers run on.
         observers: The observers.
-        estimates: Their estimates, in the same order.
+        estimates: Their estimates, in this order.
         removed: What ``--remove-bias`` asked for.
         gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
     """
-    # Not every observer need run on the same terms: each is measured on those that it runs on.
+    # Observers may run on different terms: each is measured on its own.
     under = [found.of(observer.name) for observer in observers]
     spared = [with_spare(*each) for each in zip(under, observers, estimates, strict=True)]
     readings = [free_reading(on, *each[:2]) for on, each in zip(under, spared, strict=True)]

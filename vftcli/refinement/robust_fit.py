@@ -1,12 +1,12 @@
-"""The model's error from a whole log, contacts and all: a fit that rejects what it cannot explain.
+"""The model's error from a whole log: a robust fit that rejects contacts.
 
-A first fit weighs samples down as a whole, all joints together: a contact is felt in several. A
-second one tells contact from free motion by a threshold, fits the free samples alone, and beside
-the model's error fits slow external loads.
+The first fit weighs samples down for all joints together: several feel a contact. The second
+separates contact from free motion by a threshold and fits the free samples alone, with slow
+external loads beside the model's error.
 
-A correction is worth having where it predicts; what only fits is left alone. The free samples are
-cut into contiguous folds; each is predicted from the others, with the model held back more or less.
-A joint is judged by the samples in which it moves: at rest stiction rules, which no model predicts.
+A correction must predict, not only fit. The free samples are cut into contiguous folds; the
+others predict each, with the model free in several degrees.
+Samples in motion judge a joint: at rest stiction rules, which no model predicts.
 """
 
 from dataclasses import dataclass
@@ -20,35 +20,35 @@ from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
 
-CORRELATED = 0.3  #: Residuals this close in time count as one. [s]
-LEAST_SCALE = 0.08  #: The residual's scale is at least this share of a joint's dry friction. [1]
-LEAST_TORQUE = 0.02  #: And at least this. [N·m]
-#: At first the residual's scale comes from so large a quietest share of the samples, …
+CORRELATED = 0.3  #: Residuals so close in time are one. [s]
+LEAST_SCALE = 0.08  #: Least scale of the residual, by dry friction. [1]
+LEAST_TORQUE = 0.02  #: And by torque. [N·m]
+#: Quietest share of the samples for the first scale, …
 QUIET_SHARE = 0.35
-#: … whose largest is this share of the median where the samples are normal noise.
+#: … its largest is this share of the median in normal noise.
 QUIET_QUANTILE = 0.66
-REACH = 0.15  #: A sample is as suspicious as the worst within this time. [s]
+REACH = 0.15  #: Samples share the worst suspicion within this time. [s]
 PASSES = 8  #: Passes of the first fit.
-FIRST = 0.6  #: Its threshold at first: this quantile of how suspicious the samples are, …
-NARROWED = 1.6  #: … divided by this after every pass, …
+FIRST = 0.6  #: Its first threshold: this quantile of suspicion, …
+NARROWED = 1.6  #: … divided by this after a pass, …
 NARROWEST = 3.0  #: … down to this many scales.
-TRUSTED = 0.25  #: Samples that weigh more than this set the residual's scale.
+TRUSTED = 0.25  #: Least weight of samples that set the scale.
 FREE_PASSES = 3  #: Passes of the second fit.
-CONTACT = 5.0  #: A sample is contact if a joint's residual is larger than this many scales, …
-LASTS = 0.08  #: … for at least so long. [s]
-GROWN = 0.25  #: A contact begins so long before, and ends so long after. [s]
-FEWEST = 30  #: With fewer free samples nothing is called contact.
+CONTACT = 5.0  #: Scales of a joint's residual in contact, …
+LASTS = 0.08  #: … for at least this time. [s]
+GROWN = 0.25  #: Time of a contact before and after. [s]
+FEWEST = 30  #: Fewer free samples: no contact is named.
 
 
 @dataclass(frozen=True, kw_only=True)
 class WholeLogFit:
-    """What a log says of the model's error."""
+    """A log's fit of the model's error."""
 
     rows: Rows  #: What was fitted.
-    step: float  #: Time between two of its samples. [s]
+    step: float  #: Its sample time. [s]
     free: Mask  #: Samples free of contact. (S,)
-    scale: Array  #: Size of what neither model nor loads explain. (n,) [N·m]
-    weight: Array  #: Weight of every row, its scale and its correlation with others in it. (S, n)
+    scale: Array  #: Residual beside model and loads. (n,) [N·m]
+    weight: Array  #: Weight of every row, by scale and correlation. (S, n)
 
     def solved(self, sums: NormalEquations, scale: float = 1.0) -> FittedError:
         """The solution for some of its rows."""
@@ -56,7 +56,7 @@ class WholeLogFit:
 
 
 def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
-    """Fit the model's error, and find where the log is free of contact.
+    """The fit of a model's error, and the log's contact-free samples.
 
     Args:
         rows: What is fitted.
@@ -76,7 +76,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
 
 
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:
-    """The residual of a fit that weighs suspicious samples down, and its scale. (S, n), (n,)
+    """Residual of a fit that weighs suspicious samples down, its scale. (S, n), (n,)
 
     Args:
         rows: What is fitted.
@@ -104,13 +104,13 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
 
 
 def free_samples(worst: Array, step: float) -> Mask:
-    """Samples free of contact; all if hardly any would be. (S,)
+    """Samples free of contact; all if few would be. (S,)
 
     Args:
         worst: Largest residual of any joint, in its scale. (S,)
         step: Time between two samples. [s]
     """
-    # the rounding of a step must not make a run of just that length too short
+    # rounding of a step must not shorten such a run
     runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
     contact = covered(runs, len(worst), margin=round(GROWN / step))
     if np.count_nonzero(~contact) < FEWEST:
@@ -119,36 +119,36 @@ def free_samples(worst: Array, step: float) -> Mask:
 
 
 def largest_around(values: Array, reach: int) -> Array:
-    """The largest of each value's neighbours up to `reach` samples away, and itself. (S,)"""
+    """Largest of each value and its neighbours within `reach` samples. (S,)"""
     padded = np.pad(values, reach, mode="edge")
     windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * reach + 1)
     return np.asarray(windows.max(axis=1))
 
 
-MARGIN = 0.5  #: Left out at both ends of a fold: neighbours in time know each other. [s]
-SCALES = (0.0, 0.1, 0.3, 1.0)  #: How far the model is let go: factors on its standard deviations.
-LARGEST = 6.0  #: A residual counts at most so many scales.
-#: A joint that moves in less than this share of the free samples is judged by all of them.
+MARGIN = 0.5  #: Cut at both ends of a fold: neighbours know each other. [s]
+SCALES = (0.0, 0.1, 0.3, 1.0)  #: Freedom of the model: factors on its standard deviations.
+LARGEST = 6.0  #: Most scales of a residual.
+#: A joint with less motion than this share is judged by all free samples.
 SELDOM = 0.2
-WORTH = 0.9  #: A joint is corrected in full if at most this share of its unseen error is left, …
-#: … not at all if so much is left, and between the two in part: no sample switches it. A load of
-#: 2.8 kg that the fit cannot hold apart from the model leaves .95.
+WORTH = 0.9  #: Most of the unseen error left for a full correction, …
+#: … and least for none; partly between: no sample switches it. A load of 2.8 kg that the fit
+#: cannot separate from the model leaves .95.
 WORTHLESS = 0.95
 
 
 class Guarded(NamedTuple):
-    """A model error that has been tried on what it had not seen."""
+    """A model error tested on unseen samples."""
 
-    #: From all free samples, held back as far as predicts best; None if not at all.
+    #: From all free samples, at the freedom of the best prediction; None if not at all.
     solution: FittedError | None
-    share: Array  #: Unseen error with it over that without, while the joint moves. (n,)
-    #: How much of it each joint gets: 0 where it is not worth having, 1 where it clearly is. (n,)
+    share: Array  #: Unseen error with over without it, in motion. (n,)
+    #: Each joint's part: 0 if not worth having, 1 if clearly worth it. (n,)
     weight: Array
-    loads: Array  #: Slow loads that are believed beside it, in standard deviations. (L,)
+    loads: Array  #: Slow loads that are believed too, in standard deviations. (L,)
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
-    """Try a fit on folds of its free samples, and keep what predicts.
+    """A fit tested on folds of its free samples, as far as it predicts.
 
     Args:
         fit: The fit.
@@ -180,5 +180,5 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
 
 
 def faded(value: Array, full: float, none: float) -> Array:
-    """How much of something is used: 1 up to a value, 0 from another on, straight between."""
+    """Part in use: 1 up to a value, 0 from another on, straight between."""
     return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))

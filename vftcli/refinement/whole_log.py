@@ -2,7 +2,7 @@
 
 No free part is needed. The model's error δx is fitted to the raw disturbance d = τ_ext − A δx of
 all of the log, with contacts rejected and slow external loads left in; where it predicts motion
-that it has not seen, b = A δx is taken off μ, μ ← μ − b, and any observer runs on what is left.
+that it has not seen, b = A δx is subtracted, μ ← μ − b, and any observer runs on the rest.
 """
 
 from dataclasses import dataclass, field, replace
@@ -60,10 +60,10 @@ MOST_SAMPLES = 36_000  #: Samples that are fitted at most: an hour's.
 class WholeLogBias:
     """The model's bias along a log."""
 
-    #: How much of the model's error is taken off each joint: 0 on joints left alone, 1 where it
+    #: How much of the model's error each joint loses: 0 on joints left alone, 1 where it
     #: clearly predicts what it had not seen. (n,)
     weight: Array
-    bias: Array  #: Torque that is taken off, zero on joints left alone. (T, n) [N·m]
+    bias: Array  #: Subtracted torque, zero on joints left alone. (T, n) [N·m]
     #: Standard deviation of the model's error as it was fitted, and of what is taken off where that
     #: is a part of it: taken off or left alone, by chance. (T, n) [N·m]
     sd: Array
@@ -90,7 +90,7 @@ class WholeLogBias:
         return log.less(-self.bias) if self.applied.any() else log
 
     def of(self, other: Run) -> Run:
-        """Another run of the arm without the same model error."""
+        """Another run of the arm without this model error."""
         if self.error is None or not self.applied.any():
             return other
         return other.less(-self.weight * self.error.torque(other, smooth_motion(other)))

@@ -1,1 +1,1 @@
-"""Ground truth: what the estimates are judged by, each with its own error where it can be known."""
+"""Ground truth: references for the estimates, each with its error if known."""

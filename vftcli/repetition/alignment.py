@@ -1,4 +1,4 @@
-"""When two logs of one trajectory are at the same place: a time shift found on joint positions."""
+"""Time shift and clock rate between two logs of one path, by positions."""
 
 from typing import NamedTuple
 
@@ -12,48 +12,48 @@ from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import resample_columns
 
-LEAST_OVERLAP = 0.3  #: Share of the shorter log that must overlap at an admissible shift.
-#: Positions that differ by more than this after alignment are another trajectory. [rad]
+LEAST_OVERLAP = 0.3  #: Least overlap, by the shorter log.
+#: A larger difference after alignment means another trajectory. [rad]
 SAME_TRAJECTORY = 0.05
-#: Clocks whose rates differ by more than this share are refused, by less corrected.
+#: A larger difference of clock rates is refused, a smaller corrected.
 SAME_RATE = 0.01
-#: A shift is worth refining if the logs lie within this share of the motion's own spread.
+#: Largest distance of a shift to refine, by the motion's own spread.
 SHORTLIST = 0.15
-#: A shift fits as well as the closest if the logs lie no more than so many times farther apart.
+#: Largest ratio of distances of two shifts that fit equally.
 ALIKE = 3.0
-#: Or within this share of the motion's own spread, which no servo repeats better.
+#: Or this distance, by the motion's own spread: no servo repeats better.
 LEAST_ALIKE = 0.001
-RIVALS = 40  #: Shifts with a longer overlap that are tried, at most.
-COARSE = 300  #: Instants at which a recording is compared while the shared part is looked for.
+RIVALS = 40  #: Most shifts of longer overlap to try.
+COARSE = 300  #: Instants compared in the search for a shared part.
 
-#: At another speed or on another clock a motion lies within this share of its own spread.
+#: Largest distance at another speed or clock, by the motion's own spread.
 #:
-#: Of true pairs .003 is left, of other motions that a rate seemed to explain 1.3 and more.
+#: True pairs leave .003, other motions with a rate that seems to fit 1.3 and more.
 SAME_PATH = 0.1
 
-#: Length of the pieces over which logged velocities are compared with the way travelled. [s]
+#: Length of pieces that compare logged velocities with the distance travelled. [s]
 TRAVEL = 1.0
-#: Clock rates tried to explain why two logs do not fit.
+#: Clock rates to try on two logs that do not fit.
 RATES = np.concatenate([np.linspace(0.5, 2.0, 61), [1e-3, 1e3]])
 
 
 class Alignment(NamedTuple):
-    """How one log lies on another."""
+    """One log's alignment with another."""
 
-    shift: float  #: The other log's clock reads rate·t + shift at the same place. [s]
-    rate: float  #: Rate of the other log's clock against this one's, 1 for equal clocks.
-    #: Root mean square of the remaining position difference over all joints. [rad]
+    shift: float  #: The other clock at this place is rate·t + shift. [s]
+    rate: float  #: The other log's clock rate over this one's.
+    #: Root mean square of the position difference left, all joints. [rad]
     deviation: float
-    overlap: Mask  #: Samples of the log whose partner lies within the other. (T,)
+    overlap: Mask  #: Samples with a partner in the other log. (T,)
 
 
 def align(recording: Recording, free: Recording) -> Alignment:
-    """Find the shift at which `free` passes through the recording's joint positions.
+    """Shift at which `free` passes the recording's joint positions.
 
     A coarse shift minimises the mean squared position difference over all overlaps of at least
-    `LEAST_OVERLAP`, by FFT on a common uniform clock; it and the ratio of the clocks' rates are
-    then refined on the logs' own clocks by Gauss–Newton steps, robust against contacts. A motion
-    that repeats fits at every whole period alike: of these shifts the one with most overlap counts.
+    `LEAST_OVERLAP`, by FFT on a common uniform clock. Gauss–Newton steps, robust against contacts,
+    then refine shift and ratio of rates on the logs' own clocks. A motion that repeats fits at
+    every whole period: the shift with most overlap wins.
     """
     check_same_arm(recording, free)
     closest = lying_at(recording, free, *best_fit(recording, free))
@@ -63,7 +63,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
         return found
     found = found or explained_by_rate(recording, free)
     if found is None or not is_same_path(recording, found):
-        # A rate that explains nothing is none: how far they are apart is said of equal clocks.
+        # A useless rate is no rate: report the distance at equal clocks.
         middle = 0.5 * (recording.t[0] + recording.t[-1])
         shift = closest.shift + (closest.rate - 1.0) * middle
         apart_by = lying_at(recording, free, float(shift), 1.0).deviation
@@ -76,15 +76,15 @@ def align(recording: Recording, free: Recording) -> Alignment:
 
 
 def is_same_path(recording: Recording, found: Alignment) -> bool:
-    """Whether what overlaps at some rate is one path, and not two small motions near each other."""
+    """Whether the overlap at a rate is one path, not two small motions nearby."""
     spread = np.sqrt(np.mean(np.var(recording.q[found.overlap], axis=0)))
     return bool(found.deviation <= SAME_PATH * spread)
 
 
 def why_slower(recording: Recording, free: Recording, rate: float) -> str:
-    """Why one motion takes `rate` times as long in the free run: its speed, or a clock; a remedy.
+    """Reason of `rate` times the duration: speed or a clock; a remedy.
 
-    The logged velocities tell: a wrong clock disagrees with them, a slower motion does not.
+    Logged velocities contradict a wrong clock, not a slower motion.
     """
     longer = f"the same motion takes {rate:.4g} times as long in {free.name}"
     speed = f"{100.0 * abs(rate - 1.0):.2g} % {'slower' if rate > 1.0 else 'faster'}"
@@ -115,9 +115,9 @@ def why_slower(recording: Recording, free: Recording, rate: float) -> str:
 
 
 def pace(recording: Recording) -> float | None:
-    """Way by logged velocities over way by positions, 1 on a right clock; None without either.
+    """Distance by velocities over that by positions; None without either.
 
-    Over pieces of `TRAVEL`, in which the noise of neither counts.
+    1 on a right clock; pieces of `TRAVEL` average the noise of both.
     """
     if recording.dq is None or "dq" in recording.source.derived:
         return None
@@ -132,7 +132,7 @@ def pace(recording: Recording) -> float | None:
 
 
 def check_same_arm(recording: Recording, free: Recording) -> None:
-    """Raise a ReferenceTorqueError if two logs cannot be of the same arm."""
+    """Raise a ReferenceTorqueError if two logs cannot be of one arm."""
     if free.joints != recording.joints:
         raise ReferenceTorqueError(
             f"{free.name} has {free.joints} joints, {recording.name} has {recording.joints}: "
@@ -147,10 +147,10 @@ def check_same_arm(recording: Recording, free: Recording) -> None:
 
 
 def shared_part(recording: Recording, free: Recording) -> Alignment | None:
-    """Where two logs share only a part of their motion: that part, None if it is too short.
+    """The shared part of two logs' motions, None if too short.
 
-    The shift is the one at which most of the recording's motion is within `SAME_TRAJECTORY`; it
-    must be at least `LEAST_OVERLAP` of it. The partners are the unbroken stretches of a second or
+    At the shift most of the recording's motion is within `SAME_TRAJECTORY`; this must be at
+    least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or
     more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
@@ -171,7 +171,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 
 def apart(t: Array, q: Array, free: Recording) -> Array:
-    """How far the free run is from positions q at instants t of its clock. (T, n) [rad]
+    """Free run less positions q at instants t of its clock. (T, n) [rad]
 
     NaN before its first sample and after its last.
     """
@@ -179,14 +179,14 @@ def apart(t: Array, q: Array, free: Recording) -> Array:
 
 
 def near(t: Array, q: Array, free: Recording) -> Mask:
-    """Whether the free run lies within `SAME_TRAJECTORY` of positions q at its instants t. (T,)"""
+    """Whether the free run is within `SAME_TRAJECTORY` of q at its instants t. (T,)"""
     return np.asarray(np.max(np.abs(apart(t, q, free)), axis=1) <= SAME_TRAJECTORY)
 
 
 def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None:
-    """How the two logs lie at the ratio of rates that makes them one trajectory, if there is one.
+    """Alignment at a ratio of rates that makes two logs one path, if any.
 
-    The first of `RATES` that leaves half of what two trajectories may be apart.
+    The first of `RATES` that leaves half of the limit of two trajectories.
     """
     for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
         lengths = (recording.duration * rate, free.duration)
@@ -208,12 +208,12 @@ def uniform(recording: Recording, step: float) -> Array:
 
 
 def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
-    """Shift [s] and clock rate at which two logs lie closest; of equal fits the longest overlap."""
+    """Shift [s] and clock rate of the closest fit; of equals the longest overlap."""
     step = max(recording.median_step, free.median_step)
     offset = float(free.t[0] - recording.t[0])
     q = uniform(free, step)
     fit = lag_fit(q, uniform(recording, step), LEAST_OVERLAP)
-    # The rate starts at that of equal clocks; the steps below find it wherever they start from.
+    # Start from equal clocks; the steps below converge anyway.
     best = refined(recording, free, fit.closest * step + offset, 1.0)
     spread = float(np.sqrt(np.sum(np.var(q, axis=0))))
     limit = max(ALIKE * distance_moving(recording, free, *best), LEAST_ALIKE * spread)
@@ -225,9 +225,9 @@ def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
 
 
 def distance_moving(recording: Recording, free: Recording, shift: float, rate: float) -> float:
-    """Lower quartile of the distance of two logs over the samples that move fast. [rad]
+    """Lower quartile of two logs' distance over fast samples. [rad]
 
-    A quarter, because contacts push an arm off its path; fast, because any two rests lie alike.
+    A quarter: contacts push an arm off its path. Fast: any two rests are alike.
     """
     distance = np.linalg.norm(apart(rate * recording.t + shift, recording.q, free), axis=1)
     speed = np.linalg.norm(np.gradient(recording.q, recording.t, axis=0), axis=1)
@@ -240,10 +240,10 @@ def distance_moving(recording: Recording, free: Recording, shift: float, rate: f
 def refined(
     recording: Recording, free: Recording, shift: float, rate: float
 ) -> tuple[float, float]:
-    """Refine shift [s] and clock rate on the logs' own clocks.
+    """Shift [s] and clock rate, refined on the logs' own clocks.
 
-    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its own spread, samples
-    by Cauchy's weight, so that contacts do not pull.
+    Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its spread, samples
+    by Cauchy's weight against contacts.
     """
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):
@@ -257,7 +257,7 @@ def refined(
 def gauss_newton_step(
     recording: Recording, free: Recording, t: Array, slope: Array
 ) -> tuple[float, float]:
-    """How far shift [s] and rate are off, to first order; zeros where nothing tells.
+    """Errors of shift [s] and rate, first order; zeros without information.
 
     Args:
         recording: The log.
@@ -287,9 +287,9 @@ def gauss_newton_step(
 def lying_at(
     recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
 ) -> Alignment:
-    """How two logs lie at a shift [s] and rate, over what overlaps, or only `within` of it. (T,)
+    """Alignment of two logs at a shift [s] and rate, in the overlap or `within`. (T,)
 
-    The deviation is infinite where fewer than two samples are left.
+    The deviation is infinite for fewer than two samples.
     """
     distance = apart(rate * recording.t + shift, recording.q, free)
     overlap = np.isfinite(distance[:, 0])

@@ -1,9 +1,9 @@
-"""What a user may choose of free motion, read from the command line and checked once."""
+"""A user's choice of free motion, read from the command line, checked once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, Self
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.option import LOG, Choice, Option
@@ -35,7 +35,7 @@ def cycle_numbers(text: str) -> tuple[int, ...]:
 
 
 def cutoff(text: str) -> float | str | None:
-    """Cutoff of ``--low-pass``: a number [Hz], None for "none", any other word as it is."""
+    """Cutoff of ``--low-pass``: a number [Hz], None for "none", else the word."""
     if text == "none":
         return None
     try:
@@ -46,7 +46,7 @@ def cutoff(text: str) -> float | str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class FreeChoice(Choice):
-    """The motion that nobody touched, and how the two-cycle difference lays it under the log.
+    """Free motion, and its use in the two-cycle difference.
 
     With nothing chosen the free cycles of a repeated motion are found.
 
@@ -55,7 +55,7 @@ class FreeChoice(Choice):
             is not positive, or cycles are named beside other logs.
     """
 
-    GROUP: ClassVar[str] = LOG
+    GROUP = LOG
 
     #: Free runs in other logs.
     logs: Annotated[

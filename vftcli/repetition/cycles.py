@@ -42,7 +42,7 @@ class Cycles(NamedTuple):
 def segment(recording: Recording, period: Period) -> Cycles:
     """Find where the repeated path begins and ends; the log may start amid a cycle.
 
-    A sample is on the path if one period later or earlier the arm is at the same place, or if the
+    A sample is on the path if one period later or earlier the arm is at this place, or if the
     log is so short that neither is in it. Contacts push it off for a moment only, so the path
     begins with the first sample after which at least three quarters of a cycle are on it, and ends
     likewise.
@@ -63,13 +63,13 @@ def segment(recording: Recording, period: Period) -> Cycles:
 
 
 def comes_back(t: Array, q: Array, shift: float) -> Mask:
-    """Whether the arm is at the same place `shift` seconds away. (T,)"""
+    """Whether the arm is at this place `shift` seconds away. (T,)"""
     distance = np.abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1)
     return np.asarray(distance <= ON_PATH)
 
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:
-    """The first instant from which three quarters of the next cycle are on the path. [s]"""
+    """First instant with three quarters of the next cycle on the path. [s]"""
     count = np.concatenate([[0], np.cumsum(on_path)])
     stop = np.searchsorted(t, t + seconds)
     here = np.arange(len(t))

@@ -1,4 +1,4 @@
-"""What a two-cycle difference cannot know: its own error, sample by sample and joint by joint."""
+"""Errors of a two-cycle difference, by sample and joint."""
 
 from functools import cache
 from typing import NamedTuple
@@ -11,27 +11,27 @@ from vftcli.robots.run import band
 from vftcli.signals.arrays import Array, Mask, at, empty_series
 from vftcli.signals.filters import band_pass, low_pass, noise_passed
 
-#: Noise is not measured in a band about less than this: contacts live there. [Hz]
+#: Least band of a noise estimate: contacts fill lower ones. [Hz]
 LEAST_BAND = 12.0
-#: Share of the correction that is wrong even where the model is as good as it gets.
+#: Share of the correction that is wrong even with the best model.
 LEAST_SHARE = 0.05
-PIECE = 0.4  #: Length of the pieces in which noise is told from slow loads. [s]
-#: Fewest pieces of which the quietest speak for the noise: one short cycle may be pushed in all.
+PIECE = 0.4  #: Length of pieces that separate noise from slow loads. [s]
+#: Fewest pieces for a noise estimate: a short cycle may hold contact throughout.
 LEAST_PIECES = 20
-QUIET = 0.1  #: Share of the pieces that are without a fast contact.
-SEED = 15  #: Of the white noise that the quietest pieces are compared with.
-TRUSTED_SHARE = 0.5  #: A joint is trusted if it moves in at least this share of the samples.
+QUIET = 0.1  #: Share of the pieces without a fast contact.
+SEED = 15  #: Of the white noise beside the quietest pieces.
+TRUSTED_SHARE = 0.5  #: Least share of samples in motion of a joint to trust.
 
 
 class ErrorModel(NamedTuple):
-    """Expected error of a difference, from what the logs themselves show."""
+    """Expected error of a difference, from the logs themselves."""
 
-    sd: Array  #: Standard deviation of each sample, NaN where there is no reference. (T, n) [N·m]
-    standing: Mask  #: Where the joint stands in the log or in the free run. (T, n)
+    sd: Array  #: Deviation of each sample, NaN without a reference. (T, n) [N·m]
+    standing: Mask  #: Where the joint rests in either log. (T, n)
 
     @property
     def standing_share(self) -> Array:
-        """Share of the paired samples in which the joint stands. (n,)"""
+        """Share of paired samples at rest. (n,)"""
         return np.asarray(np.mean(self.standing[self.known], axis=0))
 
     @property
@@ -41,29 +41,29 @@ class ErrorModel(NamedTuple):
 
     @property
     def trusted_joints(self) -> Mask:
-        """Joints that move enough for friction to cancel; all if none does. (n,)"""
+        """Joints with motion enough to cancel friction; all if none has. (n,)"""
         trusted = np.asarray(self.standing_share <= 1.0 - TRUSTED_SHARE)
         return trusted if np.any(trusted) else np.ones_like(trusted)
 
     @property
     def floor(self) -> Array:
-        """Root mean square of `sd` over the samples with a reference. (n,) [N·m]"""
+        """Root mean square of `sd` over samples with a reference. (n,) [N·m]"""
         return rms(self.sd[self.known], np.ones_like(self.standing[self.known]))
 
     @property
     def floor_moving(self) -> Array:
-        """The same while the joint moves; over all samples if it mostly stands. (n,) [N·m]"""
+        """Root mean square of `sd` in motion; of all samples if mostly at rest. (n,) [N·m]"""
         return self.rms_moving(self.sd)
 
     def rms_moving(self, x: Array) -> Array:
-        """Root mean square of a signal over the samples of `floor_moving`. (n,)"""
+        """Root mean square of a signal over `floor_moving`'s samples. (n,)"""
         moving = ~self.standing[self.known]
         used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
         return rms(x[self.known], used)
 
     @property
     def floor_standing(self) -> Array:
-        """Root mean square of `sd` while the joint stands, NaN where it never does. (n,) [N·m]"""
+        """Root mean square of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
         standing = self.standing[self.known]
         return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
 
@@ -71,23 +71,23 @@ class ErrorModel(NamedTuple):
 def error_model(
     laid: LaidOver, signal: Array, smooth: Array, *, corrected: bool, cutoff: float | None
 ) -> ErrorModel:
-    """Estimate the error of a difference.
+    """The error of a difference.
 
     Its square is the sum of
-    - noise: √2·K·σ_i where nothing repeats, measured on the difference itself, so that ripple
-      which does repeat does not count and what the correction adds does; the larger of what the
-      band about the cutoff says, as if it were white, and what the quietest seconds do;
-    - motion: the model's torque of the motion difference, Coulomb friction that turns over at
-      another instant included; all of it without the correction, with it the share by which the
-      model misses the free run's own torque;
-    - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after a
-      stop shorter than `STUCK` by its share, and by `REPEATED_STOP` where the whole arm rests.
+    - noise: √2·K·σ_i without repetition, measured on the difference itself: ripple that repeats
+      does not count, the correction's noise does; the larger of the band about the cutoff, as if
+      white, and the quietest seconds;
+    - motion: the model's torque of the motion difference, with Coulomb friction that reverses at
+      another instant; all of it without the correction, else the model's relative error on
+      the free run's own torque;
+    - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
+      a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
 
     Args:
         laid: The log over its free runs.
-        signal: The difference where it is known. (S, n) [N·m]
-        smooth: The same behind its low-pass. (S, n) [N·m]
-        corrected: Whether the difference is corrected by the model's torque.
+        signal: The difference where known. (S, n) [N·m]
+        smooth: The low-passed difference. (S, n) [N·m]
+        corrected: Whether the model's torque corrects it.
         cutoff: Cutoff of its low-pass, None without. [Hz]
     """
     motion, known = laid.motion, laid.known
@@ -101,7 +101,7 @@ def error_model(
     )
     missed, own = np.maximum(LEAST_SHARE, laid.misfit), np.zeros(len(noise))
     if not corrected:
-        # The model's torque differentiates momenta: their noise is no difference of the motions.
+        # The model's torque differentiates momenta: their noise is no motion.
         missed = np.ones(len(noise))
         own = laid.once(
             "slope", low, lambda: slope_noise(t, at(known, laid.momentum), moving, step, low)
@@ -118,7 +118,7 @@ def error_model(
 
 
 def less_noise(size: Array, noise: Array) -> Array:
-    """Standard deviations without that of an independent noise in them, 0 where it is larger."""
+    """Deviations less that of independent noise in them, 0 if it is larger."""
     return np.sqrt(np.maximum(size**2 - noise**2, 0.0))
 
 
@@ -126,8 +126,8 @@ def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
     """Noise of a difference. (n,) [N·m]
 
     Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
-    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, or about
-    `LEAST_BAND` if that is higher, because contacts fill what is below; taken to be as dense
+    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, at least
+    `LEAST_BAND`, as contacts fill lower ones; assumed as dense
     throughout.
     """
     if cutoff is None:
@@ -139,12 +139,12 @@ def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None
 
 
 def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
-    """Noise of a difference as its quietest pieces show it, coloured as it is. (n,) [N·m]
+    """Coloured noise of a difference from its quietest pieces. (n,) [N·m]
 
-    Real noise is denser at low frequencies than where contacts leave it alone. In a piece of
-    `PIECE` it is what departs from a straight line, which a slow load would make; `QUIET` of the
-    pieces are taken to be without a fast contact. What wanders more slowly counts for nothing, so
-    this errs to the low side. Zero where there are fewer than `LEAST_PIECES`.
+    Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it is the
+    deviation from a straight line, a slow load's course; `QUIET` of the pieces are assumed without
+    a fast contact. Slower wander does not count: this errs low. Zero for fewer than
+    `LEAST_PIECES`.
 
     Args:
         t: Clock of the paired samples. (S,) [s]
@@ -169,7 +169,7 @@ def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: floa
 
 
 def off_line(x: Array, size: int) -> Array:
-    """Mean square departure from a straight line, piece by piece of so many samples. (pieces, n)"""
+    """Mean square deviation from a line in pieces of so many samples. (pieces, n)"""
     count = len(x) // size
     pieces = x[: count * size].reshape(count, size, -1)
     along = np.linspace(-1.0, 1.0, size)
@@ -181,7 +181,7 @@ def off_line(x: Array, size: int) -> Array:
 
 @cache
 def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
-    """What `noise_when_quiet` takes the root of for white noise, over its variance, drawn once."""
+    """Square of `noise_when_quiet` for white noise over its variance, drawn once."""
     noise: Array = np.random.default_rng(SEED).standard_normal((400 * size, 1))
     clock = step * np.arange(len(noise), dtype=np.float64)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
@@ -189,7 +189,7 @@ def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
 
 
 def slope_noise(t: Array, momentum: Array, moving: Mask, step: float, cutoff: float) -> Array:
-    """Noise that differentiated momenta put into the model's low-passed torque. (n,) [N·m]"""
+    """Noise of differentiated momenta in the low-passed model torque. (n,) [N·m]"""
     limits = band(step, cutoff)
     dense = rms(band_pass(t, momentum, *limits), moving) / np.sqrt(
         noise_passed(step, limits, "bandpass")
@@ -198,14 +198,14 @@ def slope_noise(t: Array, momentum: Array, moving: Mask, step: float, cutoff: fl
 
 
 def white(x: Array, moving: Mask) -> Array:
-    """Standard deviation of the white part of a signal, from second differences. (n,)"""
+    """Deviation of a signal's white part, from second differences. (n,)"""
     curvature = x[:-2] - 2.0 * x[1:-1] + x[2:]
     return np.asarray(rms(curvature, moving[1:-1]) / np.sqrt(6.0))
 
 
 def rms(x: Array, where: Mask) -> Array:
-    """Root mean square of each column over the chosen samples, over all if none is. (n,)"""
-    # Column by column: whole copies of a long log take longer than the sums.
+    """Root mean square per column over chosen samples, over all if none. (n,)"""
+    # Column by column: copies of a long log take longer.
     chosen = (c[w] if w.any() else c for c, w in zip(x.T, where.T, strict=True))
     return np.asarray(np.sqrt([np.dot(column, column) / len(column) for column in chosen]))
 

@@ -1,4 +1,4 @@
-"""Which cycles of a repeated motion were free of contact: given, or found by what they show."""
+"""Contact-free cycles of a repeated motion: given, or found by their residuals."""
 
 from typing import NamedTuple
 
@@ -17,11 +17,11 @@ from vftcli.signals.remarks import Remark, fact
 #: A cycle is free too if its difference from the freest is within this many expected errors.
 ALIKE = 1.5
 MOST_LAID = 8  #: Free cycles that are laid under the others, at most.
-SETTLES = 2.0  #: A cycle is taken with what is around it, in which filters settle. [s]
+SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
 
 
 class FreeCycles(NamedTuple):
-    """Cycles taken to be free."""
+    """Cycles assumed free."""
 
     numbers: tuple[int, ...]  #: Counted from 0.
     #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of one that
@@ -40,7 +40,7 @@ class FreeCycles(NamedTuple):
         return tuple(self.numbers[k] for k in at)
 
     def remark(self, whole: int) -> Remark:
-        """Which of so many whole cycles they are, and how they were found."""
+        """Their numbers among so many whole cycles, and their origin."""
         code = "free-cycle" if len(self.numbers) == 1 else "free-cycles"
         named = [number + 1 for number in self.numbers]
         if self.residuals is None:
@@ -63,7 +63,7 @@ class FreeCycles(NamedTuple):
 
 
 def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
-    """The cycle whose residual is smallest, and those that differ from it by noise alone.
+    """The cycle of smallest residual, and those that differ by noise alone.
 
     The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
     each joint relative to that joint's smallest, averaged over the joints.
@@ -97,7 +97,7 @@ def residuals(motion: Run, cycles: Cycles) -> Array:
 
     A cycle of which a gap takes more than half has none: ∞.
     """
-    # Below 5 Hz a push stands out from the drives' ripple.
+    # Below 5 Hz a push exceeds the drives' ripple.
     cutoff = min(5.0, band(motion.step, None)[0])
     gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
     number = cycles.number(motion.t)
@@ -110,7 +110,7 @@ def residuals(motion: Run, cycles: Cycles) -> Array:
 
 
 def differs_by_noise(motion: Run, pairing: Pairing) -> bool:
-    """Whether a cycle differs from its partner by no more than the difference's own error."""
+    """Whether a cycle is within the difference's error of its partner."""
     laid = LaidOver(motion=motion, pairings=[pairing])
     found = difference(laid, "model", band(motion.step, None)[0])
     shown = found.error.rms_moving(found.tau)

@@ -1,4 +1,4 @@
-"""A load that nobody told of: the free part is weighed before its noise is learned.
+"""An unknown load: the free part is weighed before its noise is learned.
 
 A payload that the model lacks pulls in the free part too. Taken for noise it makes every tuned
 gain slow and every band wide; it is an external torque, and stays in the estimates. The free
@@ -55,7 +55,7 @@ class FreeLoad:
 
     @property
     def remark(self) -> Remark:
-        """What the free part carries, and what to do about it."""
+        """The free part's load, and its remedy."""
         return caution(
             "free-part-loaded",
             load_kg=self.mass,
@@ -101,7 +101,7 @@ class Weighing(NamedTuple):
 
 
 def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
-    """The load that explains much of the free part's disturbance, None where none does."""
+    """The load behind much of the free part's disturbance, or None."""
     parts = [part for piece in pieces if (part := columns(piece)) is not None]
     if not parts:
         return None
@@ -137,7 +137,7 @@ def weighed(piece: RunSamples) -> Indices:
 
 
 def columns(piece: RunSamples) -> tuple[Array, Array] | None:
-    """The disturbance of a piece, and the columns that explain it; None of a piece too short.
+    """Disturbance of a piece, and its columns; None of a short piece.
 
     Returns:
         (S, n) [N·m] and (S, n, 4 + 2n).

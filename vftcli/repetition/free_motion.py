@@ -1,4 +1,4 @@
-"""All that is known to be free of contact beside a log: its own spans and cycles, other runs."""
+"""Contact-free motion beside a log: its own spans and cycles, other runs."""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -72,7 +72,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def cycles_given(self) -> tuple[int, ...]:
-        """Cycles the user says are free, counted from 0: named, or whole inside a free span."""
+        """Cycles that you name free, from 0: named, or whole inside a free span."""
         cycles, whole = self.cycles, self.cycles.whole
         for number in self.choice.cycles:
             if not 1 <= number <= whole:
@@ -91,7 +91,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def free_cycles(self) -> "FreeCycles":
-        """The free cycles of the log: those the user says, else those found by what they show."""
+        """Free cycles of the log: the user's, else those found."""
         from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
 
         if self.cycles_given:

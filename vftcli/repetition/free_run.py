@@ -47,14 +47,14 @@ class FreeRun:
 
     @property
     def alignment(self) -> "Alignment":
-        """How it lies on the log."""
+        """Its alignment with the log."""
         if isinstance(self._alignment, ReferenceTorqueError):
             raise self._alignment
         return self._alignment
 
     @cached_property
     def pairing(self) -> "Pairing":
-        """Where in the free run each sample of the log belongs."""
+        """Instant in the free run of each sample of the log."""
         from vftcli.repetition.pairing import pair_with_run
 
         found = self.alignment

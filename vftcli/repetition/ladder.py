@@ -1,4 +1,4 @@
-"""The alignment ladder: ways to lay a free run under a log, each a rung better than the last."""
+"""The alignment ladder: ways to pair a free run with a log, best last."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ class Rung(NamedTuple):
 
     clock: str  #: The pairing it starts from: "commanded" or "found".
     phase: bool  #: Whether partners are moved to the nearest place on the joint-space path.
-    corrected: bool  #: Whether the model's torque of the remaining motion difference is taken off.
+    corrected: bool  #: Whether the motion difference's model torque is subtracted.
     title: str  #: What it does, in words.
 
 
@@ -64,12 +64,12 @@ def differences(
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],
 ) -> Iterator[Difference]:
-    """Make the difference on every rung asked for, with and without the low-pass, one by one.
+    """The difference on every rung, with and without the low-pass, one by one.
 
     Args:
         motion: The log.
         clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
-        rungs: Names in `RUNGS`; those whose clock is not there are left out.
+        rungs: Names in `RUNGS`; those without their clock are left out.
         cutoffs: Cutoffs of the low-pass to try, None for none. [Hz]
     """
     laid: dict[tuple[str, bool], LaidOver] = {}
@@ -90,10 +90,10 @@ def differences(
 
 
 def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
-    """τ_ext = τ_free − τ (+ model − model_free) at paired instants, low-passed if asked.
+    """τ_ext = τ_free − τ (+ model − model_free) at pairs, low-passed if asked.
 
     With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
-    bracket is exact; without it the two motions are taken to be the same.
+    bracket is exact; without it the two motions are assumed equal.
     """
     motion, known = laid.motion, laid.known
     if np.count_nonzero(known) < 16:
@@ -114,14 +114,14 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
 
 
 class Climbed(NamedTuple):
-    """What the rungs brought."""
+    """Results of the rungs."""
 
     chosen: Difference  #: The difference that is most certain.
     floors: tuple[Remark, ...]  #: The floor of each rung.
 
 
 def most_certain(made: Iterable[Difference]) -> Climbed:
-    """The difference with the smallest expected error, the simpler one where they are alike.
+    """The difference with the least expected error, the simpler of equals.
 
     Compared is the mean over trusted joints of expected error in motion, relative to the lowest
     rung's. Only the best so far is kept: of a long log not all have room at once.

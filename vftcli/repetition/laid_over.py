@@ -1,4 +1,4 @@
-"""A log with its free runs laid under it: what differs between them, whatever is made of that."""
+"""A log with its free runs below it, and their difference."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ STUCK = 0.3
 #: Of what lies farther away a filter of 3 Hz, that of a log at 15 Hz, lets
 #: e^(−2π 3 Hz · sin(π/4) · 2 s) = 3e-12 through. [s]
 HEARD = 2.0
-#: Share of the stiction that cancels between two stops of the same length at the same place.
+#: Share of the stiction that cancels between two equal stops at one place.
 REPEATED = 0.5
 
 
@@ -32,14 +32,14 @@ class LaidOver:
     found: dict[tuple[str, float], Array] = field(default_factory=dict, repr=False)
 
     def once(self, what: str, cutoff: float, find: Callable[[], Array]) -> Array:
-        """What was found before for a cutoff [Hz], or else is found now."""
+        """An earlier result for a cutoff [Hz], else a new one."""
         if (what, cutoff) not in self.found:
             self.found[what, cutoff] = find()
         return self.found[what, cutoff]
 
     @cached_property
     def torque(self) -> Array:
-        """Torque difference, not corrected, not filtered; NaN without partner. (T, n) [N·m]"""
+        """Raw torque difference, not corrected; NaN without partner. (T, n) [N·m]"""
         return (
             mean_of(self.pairings, [p.free.drive_torque for p in self.pairings])
             - self.motion.drive_torque
@@ -65,7 +65,7 @@ class LaidOver:
 
     @cached_property
     def standing(self) -> Mask:
-        """Where a joint stands in the log or in any free run. (T, n)"""
+        """Rest of a joint in the log or in any free run. (T, n)"""
         found = self.motion.standing.copy()
         for p in self.pairings:
             found |= p.there(p.free.standing.astype(np.float64)) > 0.0
@@ -73,7 +73,7 @@ class LaidOver:
 
     @cached_property
     def stopped(self) -> Array:
-        """Share of the dry friction a stop leaves open, in the log or a free run, 0 to 1. (T, n)"""
+        """Share of dry friction that a stop leaves open, log or free run, 0–1. (T, n)"""
         longest = self.motion.standstill.copy()
         shortest = longest.copy()
         for p in self.pairings:
@@ -86,7 +86,7 @@ class LaidOver:
 
     @cached_property
     def misfit(self) -> Array:
-        """How much of its torque's variation the model misses in the free run, at most 1. (n,)"""
+        """Share of torque variation missed by the model in the free run, ≤ 1. (n,)"""
         missed = total = np.zeros(self.motion.drive_torque.shape[1])
         for p in self.pairings:
             used = np.searchsorted(p.free.t, p.times[p.known])

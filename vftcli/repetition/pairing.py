@@ -1,4 +1,4 @@
-"""Which instant of a free run belongs to each sample of a log: by clock, or by joint positions."""
+"""Instants of a free run for a log's samples: by clock, or by positions."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -28,7 +28,7 @@ class Pairing(NamedTuple):
         return np.isfinite(self.times)
 
     def there(self, x: Array) -> Array:
-        """Columns of a signal of the free run at the paired instants, NaN where there is none."""
+        """Columns of a free run's signal at paired instants, NaN without."""
         return resample_columns(self.times, self.free.t, x)
 
 
@@ -52,7 +52,7 @@ def pair_with_cycle(motion: Run, cycles: Cycles, free: int, period: float) -> Pa
 
 
 def pair_with_run(t: Array, free: Run, shift: float, rate: float = 1.0) -> Pairing:
-    """Pair samples at times t (T,) with a free run, at rate·t + shift on the free run's clock."""
+    """Samples at t (T,) paired with a free run at rate·t + shift of its clock."""
     times = rate * t + shift
     inside = (times >= free.t[0]) & (times <= free.t[-1]) & ~in_gap(free.t, times)
     return Pairing(free, np.where(inside, times, np.nan))
@@ -69,7 +69,7 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
     """Move each sample's partner to the nearest place on the free run's path.
 
     The shift along the path minimises the distance of the joint positions, by Gauss–Newton; where
-    the path stands still there is nothing to go by and the clock's word stays. The shift is
+    the path rests it shows nothing and the clock decides. The shift is
     smoothed along time.
     """
     known = pairing.known
@@ -94,7 +94,7 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
 
 
 def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
-    """Mean over free runs of a signal at the paired instants, over those that are known. (T, n)"""
+    """Mean of a signal over free runs at paired instants, known ones. (T, n)"""
     if len(pairings) == 1:
         return pairings[0].there(signals[0])
     count = np.zeros(len(pairings[0].times), dtype=np.intp)[:, None]

@@ -120,7 +120,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
 
 
 def distances(x: Array) -> Array:
-    """Mean squared distance between x and itself `lag` samples later, for every lag. (N,)"""
+    """Mean squared distance of x and x `lag` samples later, every lag. (N,)"""
     x = x - x.mean(axis=0)
     samples = len(x)
     size = 1 << int(np.ceil(np.log2(2 * samples)))
@@ -133,7 +133,7 @@ def distances(x: Array) -> Array:
 
 
 def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
-    """Lags at local minima of the distance that leave enough overlap, shortest first. [samples]"""
+    """Lags at the distance's minima with overlap, shortest first. [samples]"""
     low, high = 4, int((1.0 - LEAST_REPEATED) * len(distance))
     if stated is not None:
         low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
@@ -151,7 +151,7 @@ def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
 
 
 def returned(t: Array, q: Array, seconds: float) -> float:
-    """Lower quartile over time of the distance between q and itself `seconds` later. [rad]"""
+    """Lower quartile of the distance of q and q `seconds` later. [rad]"""
     inside = t + seconds <= t[-1]
     distance = resample_columns(t[inside] + seconds, t, q) - q[inside]
     return float(np.quantile(np.sqrt(np.sum(distance**2, axis=1)), 0.25))
@@ -181,7 +181,7 @@ def refined_period(t: Array, q: Array, period: float) -> float:
 def period_step(
     t: Array, q: Array, dq: Array, period: float, multiples: NDArray[np.int64]
 ) -> float:
-    """How far a period is off, to first order, over some of its multiples. [s]"""
+    """Error of a period, first order, over some of its multiples. [s]"""
     every = -(-len(t) // ENOUGH)
     here, path = t[::every], q[::every]
     move = weight = 0.0

@@ -1,4 +1,4 @@
-"""The two-cycle difference: the paper's ground truth, from repeated cycles or from a free run."""
+"""Two-cycle difference: the paper's truth, from cycles or a free run."""
 
 from collections.abc import Mapping, Sequence
 from itertools import permutations
@@ -21,7 +21,7 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import REST, faster
 
-BLOCK = 1.0  #: Length of the pieces whose scatter tells chance from change. [s]
+BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
 #: Standard errors from which on a change is believed: contacts alone rarely look like one.
 SURE = 3.0
 
@@ -41,7 +41,7 @@ def two_cycle_difference(
     robot: Robot,
     choice: FreeChoice | None = None,
 ) -> ExternalTorque:
-    """τ_ext = τ_free − τ at the same place of a repeated motion, with its own error.
+    """τ_ext = τ_free − τ at one place of a repeated motion, with its error.
 
     Args:
         recording: The log with contact.
@@ -64,8 +64,8 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
 
     Where position and velocity repeat, gravity, inertia and friction cancel and what is left is
     the torque the environment exerts (Sec. IV-A of the paper; sign of (18)). The free run is one
-    or more cycles of the same log, which then have no reference of their own unless there are two,
-    or other logs of the same motion.
+    or more cycles of the log, which then have no reference of their own unless there are two,
+    or other logs of the motion.
     """
     log, choice = motion.log, motion.choice
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
@@ -167,7 +167,7 @@ def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None
 
 
 def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
-    """Measured over expected error where two free runs can be compared, None else. (n,)"""
+    """Measured over expected error of two free runs, None without two. (n,)"""
     pairings = partners.clocks["found"]
     if len(pairings) < 2:
         return None
@@ -196,7 +196,7 @@ def pair_runs(first: Pairing, second: Pairing) -> Pairing:
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:
-    """Root mean square of a difference that should be zero, over its expected error. (n,)
+    """Root mean square of a zero difference over its expected error. (n,)
 
     Held between 0.3 and 3: beyond, something else than the error model is wrong.
     """
@@ -207,7 +207,7 @@ def error_ratio(found: Difference, where: Mask) -> Array:
 
 
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
-    """Change of dry friction from the free run to the log, 0 where it may be chance. (n,) [N·m]
+    """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
     Joints warm up between two logs, and then friction does not cancel. The change is the mean of
     the difference times the sign of the velocity. Contacts do not follow the sign of the velocity
@@ -236,7 +236,7 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
 
 
 def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, ...]:
-    """Where the floor comes from, and which joints it cannot speak for."""
+    """Origin of the floor, and joints without one."""
     origin = fact("floor-propagated")
     if measured is not None:
         origin = fact("floor-measured", ratio=measured.tolist())
@@ -256,7 +256,7 @@ def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, .
 
 
 def change_remarks(change: Array) -> tuple[Remark, ...]:
-    """Joints whose friction changed between the free run and the log."""
+    """Joints with a change of friction between the free run and the log."""
     found = np.flatnonzero(change)
     if not len(found):
         return ()

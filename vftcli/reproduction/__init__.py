@@ -1,1 +1,1 @@
-"""A paper's experiments run again on simulated equivalents, beside what is printed."""
+"""A paper's experiments on simulated equivalents, beside its print."""

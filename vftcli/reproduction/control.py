@@ -1,4 +1,4 @@
-"""Figs. 6, 7, 9, 10 with Tables III and IV: the controller in the loop, and the same force anew."""
+"""Figs. 6, 7, 9, 10, Tables III and IV: the controller in the loop and replayed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -25,7 +25,7 @@ from vftcli.simulation.sensing import log_rate
 
 #: Variant → how the sensor's Kalman filter reads R and Q.
 CONVENTIONS = {AS_PRINTED: "literal", CORRECTED: "discrete", DENSITY: "density"}
-#: Variant → the same with a traditional controller that the whole force always drives.
+#: Variant → its name with a traditional controller, always driven by the whole force.
 UNGATED = {CORRECTED: "no threshold", DENSITY: "no threshold, R density"}
 FORCE, MOMENT = slice(3), slice(3, 6)  #: Axes of force and displacement, of moment and rotation.
 CONTACTS = 2  #: Times that the hand takes hold, in either scenario.
@@ -62,7 +62,7 @@ def closed_loop(
 def looped(
     name: str, variant: str, alphas: Sequence[float], seed: int
 ) -> tuple[ClosedLoop, Replay]:
-    """A scenario with Table III's controller in the loop, and its force through all controllers."""
+    """A scenario with Table III's controller in the loop, and force replays."""
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     alone = ControlChoice(as_printed=variant == AS_PRINTED)
@@ -76,14 +76,14 @@ def looped(
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
-    # The same enters, whoever is driven by it.
+    # One force enters every controller.
     everything = replace(alone, alphas=tuple(alphas)).controllers(parameters)
     source = fact("force-of-loop")
     return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
 
 
 def ungated(found: Replay) -> Replay:
-    """A replay with a traditional controller that has no threshold: (45) under the whole force."""
+    """A replay by a traditional controller without threshold: (45), whole force."""
     force, motion = np.nan_to_num(found.wrench), found.motion
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
     x, v = motion.x.copy(), motion.v.copy()
@@ -106,7 +106,7 @@ def latency_values(held: Sequence[Latency]) -> dict[str, float | None]:
 
 
 def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:
-    """For each contact and α: how much earlier the peak and the turn are, and the time back."""
+    """By contact and α: lead of the peak and the turn, and time back."""
     values: dict[str, float | None] = {}
     for k, one in enumerate(held, start=1):
         rows = [
@@ -140,7 +140,7 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
 
 
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
-    """How late the UR5 turns after a release at most, and how much earlier the variable law is.
+    """Latest turn of the UR5 after a release, and the variable law's lead.
 
     The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance is the
     largest over deviations released at the speed limit, in steps of the control period.
@@ -171,7 +171,7 @@ def released(
 ) -> RunResult:
     """Parameters of the robot's table, and how it returns from rest by the law alone.
 
-    It is let go off by `deviation` [m] along x; without `alphas` α is the table's own.
+    It starts off by `deviation` [m] along x; without `alphas` α is the table's own.
     """
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
@@ -196,7 +196,7 @@ def released(
 
 
 def loop_chart(run: ClosedLoop, found: Replay, part: slice) -> Chart:
-    """Force and motion of the loop: what the sensor says and the law commands, and the truth."""
+    """Force and motion of the loop: sensor, command and truth."""
     true = np.column_stack([run.truth[:, part], run.moved[:, part]])
     ours = np.column_stack([run.estimate[:, part], run.commanded[:, part]])
     lines = (

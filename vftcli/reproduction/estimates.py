@@ -1,4 +1,4 @@
-"""Table I, Figs. 3, 4, 12: observers and virtual sensor beside what is known of the truth."""
+"""Table I, Figs. 3, 4, 12: observers and virtual sensor beside the truth."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -132,7 +132,7 @@ def assembled_bearing(
     phases: Mapping[str, Sequence[float]],
     sampled: float,
 ) -> RunResult:
-    """Zero drift, the bearing's weight, errors by phase, and what the controllers make of it.
+    """Zero drift, the bearing's weight, errors by phase, controllers' results.
 
     The file of the paper explains the arguments.
     """
@@ -179,7 +179,7 @@ def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:
 
 
 def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> None:
-    """The zero drift, and what the bearing weighs before and after it is removed; down is +."""
+    """Zero drift, and the bearing's weight before and after; down is +."""
     for axis, value in zip(AXES, drift, strict=True):
         result.put(variant, {f"drift/{axis}": float(value)})
     weight = -float(hung[2])
@@ -193,7 +193,7 @@ def replay_bearing(
     period: float | None = None,
     as_printed: bool = False,
 ) -> Replay:
-    """The same force through the traditional and the variable controller of Table IV."""
+    """One force through Table IV's traditional and variable controllers."""
     words = [] if period is None else [f"admittance.period={period}"]
     control = ControlChoice(assignments=tuple(words), as_printed=as_printed)
     parameters = control.parameters(made.robot)
@@ -208,7 +208,7 @@ def put_motion(
     found: Replay,
     knocked: Sequence[float],
 ) -> None:
-    """How soon the arm is back from where it was guided, what is left, how far knocks move it."""
+    """Return time of a guided arm, its rest, and its motion under knocks."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):
         x = found.motion.x[:, n, :3]
@@ -283,7 +283,7 @@ def put_errors(result: RunResult, variant: str, made: Analysis, period: float) -
 
 
 def put_facts(result: RunResult, variant: str, made: Analysis) -> None:
-    """What the guidelines go by."""
+    """Numbers of the guidelines."""
     for each in facts(made.observers, made.tunings, made.motion.log, made.errors):
         found = {
             "response": each.response,

@@ -1,4 +1,4 @@
-"""Running a paper's experiments: each once a seed, two at a time, whichever items show them.
+"""Experiments of a paper: each once a seed, two at a time, for all items.
 
 A run has its own seed and nothing in common with another, so that the numbers do not depend on
 how many run beside one another.
@@ -51,7 +51,7 @@ Result = RunResult | str  #: What a job gave, or the one line on why it failed.
 
 
 def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
-    """Every experiment that these items show, once a seed; only the first seed if `fast`.
+    """Experiments of these items, once a seed; only the first seed if `fast`.
 
     They stand in the paper's order of experiments.
     """
@@ -93,7 +93,7 @@ def run_jobs(
 
 
 def pooled(jobs: Sequence[Job], count: int) -> Iterator[tuple[Job, Result]]:
-    """Jobs in the order in which they end, in so many processes; in this one if that is one."""
+    """Jobs in order of their end, in so many processes; one: this one."""
     if count <= 1:
         yield from ((job, perform(job)) for job in jobs)
         return

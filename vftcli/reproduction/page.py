@@ -1,4 +1,4 @@
-"""How a reproduction is shown: one page and one Markdown of the same tables, and figures."""
+"""A reproduction's page and Markdown of its tables, and figures."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
 
-PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and the same in Markdown.
+PAGE, TEXT = "index.html", "reproduction.md"  #: The page, and its Markdown.
 #: What the overview compares.
 RATIOS = (
     "Ours / print: the median of the lines that print a number, in brackets the range, of the "
@@ -37,13 +37,13 @@ RATIOS = (
 
 
 def files_of(paper: Paper, names: Sequence[str], form: str | None) -> list[str]:
-    """Every file that a folder of these items may hold; `form` is what figures are written as."""
+    """Files of a folder of these items; `form` is the figures' format."""
     drawn = [name for name in names if paper.items[name].traces]
     return [PAGE, TEXT, SEAL, *figure_files(form, drawn)]
 
 
 def spread(values: Sequence[float | None]) -> str:
-    """The mean over the seeds and its range, and of how many seeds where not all tell one."""
+    """Mean over the seeds, range, and number of seeds if some have none."""
     known = [value for value in values if value is not None and np.isfinite(value)]
     if not known:
         return DASH
@@ -60,7 +60,7 @@ def signed(value: float) -> str:
 
 
 def item_grid(shown: ShownItem) -> Grid:
-    """What is printed, ours in every variant, and the floor, where there is one."""
+    """The print, ours in every variant, and the floor, if any."""
     item, values = shown.item, shown.values
     floors = any(FLOOR in values.get(line.key, {}) for line in item.lines)
     kinds = (*item.variants, *([FLOOR] if floors else []))
@@ -112,7 +112,7 @@ def overview(found: Mapping[str, ShownItem]) -> Grid:
 
 
 def short_overview(found: Mapping[str, ShownItem]) -> Grid:
-    """The same in rows that fit a terminal: item, ours over the print, what came of it."""
+    """The overview for a terminal: item, ours over the print, verdict."""
     grid = overview(found)
     return replace(grid, columns=grid.columns[::2], rows=tuple(row[::2] for row in grid.rows))
 
@@ -123,7 +123,7 @@ def wrapped(text: str) -> GridCell:
 
 
 def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
-    """Which experiment ran with which seeds."""
+    """Experiments and their seeds."""
     seeds: dict[str, list[int]] = {}
     for job in jobs:
         seeds.setdefault(job.experiment, []).append(job.seed)
@@ -169,7 +169,7 @@ def render_markdown(
     jobs: Sequence[Job],
     command: str,
 ) -> str:
-    """The same in Markdown, with the command that made it."""
+    """Markdown of a reproduction, with its command."""
     parts = [
         f"# {paper.name}, reproduced\n",
         f"{paper.title}. doi {paper.doi}.\n",

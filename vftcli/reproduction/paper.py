@@ -1,4 +1,4 @@
-"""What a paper is here: its tables and figures, what they print, and what measures the same.
+"""A paper: its tables and figures, their print, and their experiments.
 
 A paper is a file of TOML beside this one; how its experiments run, and how they are shown, is the
 same for all.
@@ -23,7 +23,7 @@ Values = dict[str, dict[str, float | None]]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What one run of an experiment gave."""
+    """Results of one run of an experiment."""
 
     values: Values = field(default_factory=dict)  #: Its numbers.
     charts: dict[str, Chart] = field(default_factory=dict)  #: Name of an item → its traces.

@@ -1,6 +1,6 @@
-"""Computing times: Table II by the paper's own way and by this program's, and the benchmark.
+"""Computing times: Table II by the paper's way and by ours, and the benchmark.
 
-All are measured interleaved round by round, so that a machine whose speed drifts drifts for all.
+All are measured interleaved round by round, so that a machine's drift of speed affects all.
 Medians over the rounds are reported.
 """
 
@@ -21,9 +21,8 @@ from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.literal import literal_momentum_terms
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.terms import DynamicsTerms
@@ -77,7 +76,7 @@ class Timings:
 
 @contextmanager
 def one_core() -> Iterator[None]:
-    """Keep this process on one core while it is measured, where the system lets it choose."""
+    """Keep this process on one core in a measurement, if the system allows."""
     if not hasattr(os, "sched_setaffinity"):
         yield
         return
@@ -164,7 +163,7 @@ def work_of(robot: Robot, recording: Recording) -> dict[str, Callable[[], object
 
 
 def computing_time(_seed: int) -> RunResult:
-    """Seconds for the paper's samples by observer, dynamics in each, and the printed ratios."""
+    """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
     with one_core():
         timings = timed()
     result = RunResult()
@@ -247,7 +246,7 @@ def dense_kalman_loop(
     *,
     rebuild: bool = False,
 ) -> Array:
-    """The 2n-state textbook Kalman filter with its covariance, one sample after another.
+    """Textbook Kalman filter of 2n states with covariance, sample by sample.
 
     With `rebuild` its matrices are made anew at every sample.
     """
@@ -275,5 +274,5 @@ def dense_kalman_loop(
 
 
 def in_pairs(*rows: tuple[Array, Array]) -> Array:
-    """The matrix of two states a joint whose four blocks have these diagonals. (2n, 2n)"""
+    """Matrix of two states a joint with these diagonals in four blocks. (2n, 2n)"""
     return np.block([[np.diag(entry) for entry in row] for row in rows])

@@ -1,7 +1,7 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import RobotError
@@ -26,7 +26,7 @@ class RobotChoice(Choice):
         ParameterError: If friction is none of these, or an argument no NAME=VALUE.
     """
 
-    GROUP: ClassVar[str] = LOG
+    GROUP = LOG
 
     #: Profile name, robot file or description, None to take what the log settles.
     name: Annotated[

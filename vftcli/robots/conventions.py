@@ -9,7 +9,7 @@ A chain frame has its origin on the joint's axis, z along it, and turns with the
 - ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF whose axes are all z.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,56 +26,35 @@ class Kinematics(NamedTuple):
     tip: Pose  #: Pose of the tip in chain frame n.
 
 
-Joint = Mapping[str, Any]
+DH = ("a", "d", "alpha", "theta")
+#: Convention → the keys that each joint must have: those of one number, and those of three.
+CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "standard-dh": (DH, ()),
+    "modified-dh": (DH, ()),
+    "xyz-rpy": ((), ("xyz", "rpy")),
+}
 
 
-def standard_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinematics:
-    """Chain frames of a standard (distal) Denavit-Hartenberg table; the tip is frame n's end."""
-    placements, distal = [], []
-    before = IDENTITY
-    for joint in joints:
-        placements.append(before @ Pose(rotation_about("z", joint["theta"]), np.zeros(3)))
-        link = Pose(rotation_about("x", joint["alpha"]), np.array([joint["a"], 0.0, joint["d"]]))
-        distal.append(link)
-        before = link
-    return Kinematics(placements, distal, distal[-1] @ tip_offset(document))
-
-
-def modified_dh(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinematics:
-    """Chain frames of a modified (proximal) Denavit-Hartenberg table; the tip is `flange_d` out."""
-    placements = []
-    for joint in joints:
-        R = rotation_about("x", joint["alpha"])
-        along = Pose(R, np.array([joint["a"], 0.0, 0.0]))
-        screw = Pose(rotation_about("z", joint["theta"]), np.array([0.0, 0.0, joint["d"]]))
-        placements.append(along @ screw)
-    return Kinematics(placements, [IDENTITY] * len(joints), tip_offset(document))
-
-
-def xyz_rpy(joints: Sequence[Joint], document: Mapping[str, Any]) -> Kinematics:
-    """Chain frames stated as positions and fixed-axis angles."""
-    placements = [Pose(rpy_matrix(j["rpy"]), np.asarray(j["xyz"], dtype=float)) for j in joints]
-    return Kinematics(placements, [IDENTITY] * len(joints), tip_offset(document))
-
-
-def tip_offset(document: Mapping[str, Any]) -> Pose:
-    """The flange in the last frame: `flange_d` along z, then `ee_xyz` and `ee_rpy`."""
+def kinematics(
+    convention: str, joints: Sequence[Mapping[str, Any]], document: Mapping[str, Any]
+) -> Kinematics:
+    """Chain frames of a table; the tip is `flange_d` along z, then `ee_xyz` and `ee_rpy`."""
     out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
-    return out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
-
-
-class Convention(NamedTuple):
-    """A convention: the keys each joint must have, and the function that reads them."""
-
-    numbers: tuple[str, ...]
-    vectors: tuple[str, ...]
-    kinematics: Callable[[Sequence[Joint], Mapping[str, Any]], Kinematics]
-
-
-DH = ("a", "d", "alpha", "theta")
-CONVENTIONS: dict[str, Convention] = {
-    "standard-dh": Convention(DH, (), standard_dh),
-    "modified-dh": Convention(DH, (), modified_dh),
-    "xyz-rpy": Convention((), ("xyz", "rpy"), xyz_rpy),
-}
+    tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
+    placements, inertial_frames = [], [IDENTITY] * len(joints)
+    for k, joint in enumerate(joints):
+        if convention == "xyz-rpy":
+            placements.append(Pose(rpy_matrix(joint["rpy"]), np.asarray(joint["xyz"], dtype=float)))
+            continue
+        R, about = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
+        if convention == "modified-dh":
+            along = Pose(R, np.array([joint["a"], 0.0, 0.0]))
+            placements.append(along @ Pose(about, np.array([0.0, 0.0, joint["d"]])))
+        else:  # the table's frame is at the far end of its link
+            before = inertial_frames[k - 1] if k else IDENTITY
+            placements.append(before @ Pose(about, np.zeros(3)))
+            inertial_frames[k] = Pose(R, np.array([joint["a"], 0.0, joint["d"]]))
+    if convention == "standard-dh":
+        tip = inertial_frames[-1] @ tip
+    return Kinematics(placements, inertial_frames, tip)

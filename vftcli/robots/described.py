@@ -24,8 +24,7 @@ from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, robot_text
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
-from vftcli.robots.xacro_text import NAMESPACE, urdf_of_xacro
-from vftcli.robots.xml_text import xml_root
+from vftcli.robots.xml_text import NAMESPACE, urdf_of_xacro, xml_root
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import did_you_mean, shown

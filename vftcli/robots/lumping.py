@@ -65,17 +65,15 @@ class LumpedArm:
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """The arm's links with all that is locked on them, each in its joint's frame."""
-        parts: list[list[Body]] = [[] for _ in self.arm.joints]
+        nothing = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+        parts = [[nothing] for _ in self.arm.joints]
         for link in self.tree.links:
             group, (R, r) = self.groups[link]
             if group != BASE and (body := self.tree.bodies[link]) is not None:
-                moved = Body(body.mass, R @ body.com + r, R @ body.inertia @ R.T)
-                parts[group].append(moved)
+                parts[group].append(Body(body.mass, R @ body.com + r, R @ body.inertia @ R.T))
         merged = []
         for joint, bodies in zip(self.arm.joints, parts, strict=True):
-            body = Body(*merge_bodies(*map(list, zip(*bodies, strict=True)))) if bodies else None
-            if body is None:
-                body = Body(0.0, np.zeros(3), np.zeros((3, 3)))
+            body = Body(*merge_bodies(*map(list, zip(*bodies, strict=True))))
             if why := improper(body.mass, body.inertia):
                 raise RobotError(
                     f"{self.tree.path}: the link of joint {joint.name!r} is unphysical: {why}"

@@ -1,7 +1,9 @@
-"""Pairing a log with its robot: the joints by their names, the motor's side of a gear taken off."""
+"""Pairing a log with its robot: joints by their names, a gear's motor side and turns taken off."""
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +12,7 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
 from vftcli.signals.letters import printable
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Where, fact
 
 NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
 
@@ -37,6 +40,32 @@ def paired(recording: Recording, robot: Robot) -> Recording:
         efficiency = np.ones(robot.joints) if robot.efficiency is None else robot.efficiency
         recording = recording.behind_gear(robot.gear, efficiency)
     return recording
+
+
+def unwound(recording: Recording, robot: Robot) -> Recording:
+    """The recording without the jumps of a turn in the positions of endless joints.
+
+    A position that changes by more than half a turn between two samples has been taken back into
+    one turn by who logged it. The log itself is returned where none does.
+    """
+    columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
+    if recording.joints != robot.joints:
+        return recording
+    changed: dict[str, Any] = {}
+    jumping = set[int]()
+    for signal in ("q", "target_q"):
+        if (values := getattr(recording, signal)) is not None:
+            # A sample that is missing is no number; what is wound up behind it would be none.
+            steps = np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
+            if turns := [j for j in columns if steps[j] > np.pi]:
+                changed[signal] = smooth = values.copy()
+                smooth[:, turns] = np.unwrap(values[:, turns], axis=0)
+                jumping.update(turns)
+    if not changed:
+        return recording
+    said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
+    source = replace(recording.source, remarks=(*recording.source.remarks, said))
+    return replace(recording, source=source, **changed)
 
 
 def listed(names: Sequence[str]) -> str:

@@ -10,11 +10,10 @@ import numpy as np
 
 from vftcli.robots.bounds import weightless
 from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
-from vftcli.robots.conventions import CONVENTIONS, Kinematics
-from vftcli.robots.friction import PRESLIDING, falling_friction
+from vftcli.robots.conventions import CONVENTIONS, kinematics
+from vftcli.robots.friction import PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section
-from vftcli.robots.temperature import lawless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_matrix
@@ -66,7 +65,7 @@ def load_profile(path: Path) -> Robot:
     if isinstance(schema, bool) or schema != SCHEMA:
         root.refuse(f"schema is {shown(schema)}; this version reads schema {SCHEMA}", "schema")
     joints = checked_joints(root)
-    return assemble(root, joints, build_chain(root, joints, checked_kinematics(root, joints)))
+    return assemble(root, joints, build_chain(root, joints))
 
 
 def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
@@ -133,23 +132,19 @@ def joint_names(joints: Sequence[Section]) -> tuple[str, ...]:
     return tuple(joint.text("name", f"joint{i}") for i, joint in enumerate(joints, start=1))
 
 
-def checked_kinematics(root: Section, joints: Sequence[Section]) -> Kinematics:
-    """Return the chain's frames, once every joint has the keys that the file's convention needs."""
-    convention = CONVENTIONS[root.choice("convention", CONVENTIONS)]
-    tables: list[dict[str, Any]] = [
-        {key: joint.number(key) for key in convention.numbers}
-        | {key: joint.vector(key, 3) for key in convention.vectors}
+def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
+    """The chain, each joint with the keys of the file's convention and a body that can be."""
+    convention = root.choice("convention", CONVENTIONS)
+    numbers, vectors = CONVENTIONS[convention]
+    frames: list[dict[str, Any]] = [
+        {key: joint.number(key) for key in numbers} | {key: joint.vector(key, 3) for key in vectors}
         for joint in joints
     ]
-    tip: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
-    tip |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
-    return convention.kinematics(tables, tip)
-
-
-def build_chain(root: Section, joints: Sequence[Section], kinematics: Kinematics) -> Chain:
-    """Move the inertials into the chain's frames and check that a body can have them."""
+    end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
+    end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
+    placements, inertial_frames, tip = kinematics(convention, frames, end)
     masses, coms, inertias = [], [], []
-    for joint, frame in zip(joints, kinematics.inertial_frames, strict=True):
+    for joint, frame in zip(joints, inertial_frames, strict=True):
         mass, com, tensor = checked_body(joint)
         masses.append(mass)
         coms.append(frame.rotation @ com + frame.translation)
@@ -158,15 +153,15 @@ def build_chain(root: Section, joints: Sequence[Section], kinematics: Kinematics
         root.refuse(why)
     return Chain(
         names=joint_names(joints),
-        rotation=np.array([p.rotation for p in kinematics.placements]),
-        translation=np.array([p.translation for p in kinematics.placements]),
+        rotation=np.array([p.rotation for p in placements]),
+        translation=np.array([p.translation for p in placements]),
         mass=np.array(masses),
         com=np.array(coms),
         inertia=np.array(inertias),
         rotor_inertia=column(joints, "rotor_inertia", default=0.0),
         gravity=root.vector("gravity", 3, UPRIGHT),
-        flange_rotation=kinematics.tip.rotation,
-        flange_translation=kinematics.tip.translation,
+        flange_rotation=tip.rotation,
+        flange_translation=tip.translation,
     )
 
 

@@ -30,7 +30,7 @@ class JointFriction(Shown):
     speeds: tuple[float, ...] = ()  #: Speeds of the model "points", rising. [rad/s]
     torques: tuple[float, ...] = ()  #: Friction at these speeds. [N·m]
     #: p₁ to p₄ of the law that friction follows with the joint's temperature, as in
-    #: `vftcli.robots.temperature`; none where it is not known to follow one.
+    #: `vftcli.robots.friction`; none where it is not known to follow one.
     temperature: tuple[float, ...] = ()
     #: Joint temperature at which the model's numbers hold, None where nobody says. [°C]
     temperature_at: float | None = None

@@ -1,18 +1,21 @@
 """The dynamics terms of a log, by a robot's model and its measured effort."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from vftcli.robots.drive import check_joints, drive_torque, uses_current
-from vftcli.robots.kernels import momentum_chunks
+from vftcli.robots.kernels import MomentumTerms, momentum_chunks
 from vftcli.robots.robot import Robot
-from vftcli.robots.running_friction import RunningFriction
-from vftcli.robots.temperature import measured_temperature
+from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.packages import needed
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import Clock
 from vftcli.signals.terms import DynamicsTerms, Instant
+
+STEP = 1e-7  #: Δq of (10). [rad]
 
 
 class RunningTerms:
@@ -67,8 +70,6 @@ class RunningTerms:
             wanted = ("p", "bias", *(("gravity",) if self._friction.takes_load else ()))
             yield from momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
             return
-        from vftcli.robots.literal import literal_momentum_terms
-
         p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
         yield slice(0, len(q)), dq, [p, coriolis - gravity, gravity]
 
@@ -94,3 +95,38 @@ def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]
     if uses_current(recording, robot) and robot.torque_constant is not None:
         return recording.require("current"), robot.torque_constant
     return drive_torque(recording, robot), 1.0
+
+
+def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  # noqa: ANN401
+    r"""Evaluate p, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
+
+    It is slow (n + 3 calls of RNEA a sample) and good to about 5e-6 N·m, because (11)
+    differentiates numerically. It stays for three purposes: an oracle that shares no code with
+    the kernels, the ``--as-printed`` path, and the baseline of the benchmark.
+
+    p = rnea(q, 0, q̇, 0) (8); Ṁq̇ ≈ Σᵢ [rnea(q+Δqᵢ, 0, q̇, 0) − p]/Δq · q̇ᵢ (11);
+    Cq̇ = rnea(q, q̇, 0, 0) (12); Cᵀq̇ = Ṁq̇ − Cq̇ (14); G = rnea(q, 0, 0, g₀) (16).
+
+    Args:
+        model: Pinocchio model; its rotor inertia (`armature`) counts in M.
+        q: Joint positions. (T, n) [rad]
+        dq: Joint velocities. (T, n) [rad/s]
+    """
+    pin = needed("pinocchio", "the paper's numeric method")
+
+    weightless = model.copy()
+    weightless.gravity.linear = np.zeros(3)
+    data, free = model.createData(), weightless.createData()
+    samples, n = q.shape
+    zero = np.zeros(n)
+    p, coriolis, gravity = (np.empty((samples, n)) for _ in range(3))
+    for k in range(samples):
+        p[k] = pin.rnea(weightless, free, q[k], zero, dq[k])
+        rate = np.zeros(n)
+        for i in range(n):
+            moved = q[k].copy()
+            moved[i] += STEP
+            rate += (pin.rnea(weightless, free, moved, zero, dq[k]) - p[k]) / STEP * dq[k, i]
+        coriolis[k] = rate - pin.rnea(weightless, free, q[k], dq[k], zero)
+        gravity[k] = pin.rnea(model, data, q[k], zero, zero)
+    return MomentumTerms(p, coriolis, gravity)

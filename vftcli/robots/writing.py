@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots.chain import Chain, Payload
-from vftcli.robots.conventions import CONVENTIONS
+from vftcli.robots.conventions import CONVENTIONS, kinematics
 from vftcli.robots.profile import SCHEMA
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
@@ -52,8 +52,8 @@ def robot_document(robot: Robot) -> Table:
 
 def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Chain) -> None:
     """Put the chain's inertials into the joint tables, in the frames of the file's convention."""
-    kinematics = CONVENTIONS[document["convention"]].kinematics(tables, document)
-    for j, (table, frame) in enumerate(zip(tables, kinematics.inertial_frames, strict=True)):
+    frames = kinematics(document["convention"], tables, document).inertial_frames
+    for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
         R = frame.rotation
         tensor = R.T @ chain.inertia[j] @ R
         values = {

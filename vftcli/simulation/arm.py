@@ -8,16 +8,16 @@ import numpy as np
 from vftcli.robots import Payload, Robot, load_robot
 from vftcli.robots.bounds import out_of_bounds
 from vftcli.robots.chain import Chain
+from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.robot import REFERENCE
-from vftcli.robots.temperature import COLDEST, WARMEST, friction_factor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.simulation.contacts import Touching
 from vftcli.simulation.friction import DRY, WET, TrueFriction, true_friction
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.plant import Plant
 from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
 from vftcli.simulation.servo import Servo
-from vftcli.simulation.touch import Touching
 
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.

@@ -1,21 +1,28 @@
-"""The kinds of contact that act with a wrench: given, hung, drawn, hand, hard stop.
+"""Contacts mounted on the arm: where they act, what they exert, and the joint torque of it.
 
-It acts ON the robot at `point` of a `link` (0: the flange), in base axes.
+A contact acts ON the robot at `point` of a `link` (0: the flange), in base axes.
 """
 
 import math
-from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
+from vftcli.signals.pose import cross
 from vftcli.simulation.motion import minimum_jerk
-
-Vector = tuple[float, float, float]
-ORIGIN = (0.0, 0.0, 0.0)
+from vftcli.simulation.scenario import (
+    ContactSpec,
+    HandSpec,
+    LoadSpec,
+    PushesSpec,
+    RandomWalkSpec,
+    StopSpec,
+    WrenchSpec,
+)
 
 
 class Place(NamedTuple):
@@ -78,52 +85,6 @@ class Segments:
         return wrench
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProfileSpec:
-    """A stated wrench, switched on and off smoothly at stated times."""
-
-    KIND: ClassVar[str] = "profile"
-    name: str  #: Name of the contact.
-    spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
-    force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
-    torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
-    rise: float = 0.2  #: Time to the full wrench. [s]
-    fall: float = 0.2  #: Time of the release. [s]
-    axes: str = "base"  #: "base" or "link": what the components refer to.
-    link: int = 0  #: The link it acts on; 0 for the flange.
-    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
-
-    def start(self, rng: np.random.Generator, duration: float) -> Segments:
-        """Make the contact ready to act; nothing is drawn."""
-        del rng, duration
-        check_known(self.axes, ("base", "link"), f"no axes {self.axes!r}")
-        wrench = np.concatenate([self.force, self.torque])
-        rows = [Push(a, b, self.rise, self.fall, wrench) for a, b in self.spans]
-        return Segments(rows, in_link=self.axes == "link")
-
-
-@dataclass(frozen=True, kw_only=True)
-class LoadSpec:
-    """A load hung on a string: its weight, pulling straight down at the point."""
-
-    KIND: ClassVar[str] = "load"
-    name: str  #: Name of the contact.
-    weight: float  #: Weight. [N]
-    spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
-    rise: float = 0.5  #: Time in which the string takes the load. [s]
-    fall: float = 0.3  #: Time in which it comes off. [s]
-    link: int = 0  #: The link it hangs on; 0 for the flange.
-    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
-
-    def start(self, rng: np.random.Generator, duration: float) -> Segments:
-        """Make the load ready to hang; nothing is drawn."""
-        del rng, duration
-        if self.weight < 0:
-            raise ParameterError(f"contacts.{self.name}.weight is negative")
-        down = np.array([0.0, 0.0, -self.weight, 0.0, 0.0, 0.0])
-        return Segments([Push(a, b, self.rise, self.fall, down) for a, b in self.spans])
-
-
 class PushStyle(NamedTuple):
     """Ranges from which pushes are drawn evenly."""
 
@@ -141,85 +102,31 @@ STYLES: dict[str, PushStyle] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
-class PushesSpec:
-    """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
-
-    KIND: ClassVar[str] = "pushes"
-    name: str  #: Name of the contact.
-    style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
-    begin: float = 0.0  #: No push before this. [s]
-    end: float = 0.0  #: No push after this; 0 for the end of the log. [s]
-    length: tuple[float, float] | None = None  #: Shortest and longest push. [s]
-    pause: tuple[float, float] | None = None  #: Shortest and longest pause. [s]
-    force: tuple[float, float] | None = None  #: Smallest and largest peak force. [N]
-    torque: tuple[float, float] | None = None  #: Smallest and largest peak moment. [N·m]
-    vertical: float = 0.5  #: Share of the force that may point along base z.
-    link: int = 0  #: The link it acts on; 0 for the flange.
-    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
-
-    def ranges(self) -> PushStyle:
-        """The style's ranges, with those that are stated in their place."""
-        check_known(self.style, STYLES, f"no style {self.style!r}")
-        given = {k: v for k in PushStyle._fields if (v := getattr(self, k)) is not None}
-        return STYLES[self.style]._replace(**given)
-
-    def start(self, rng: np.random.Generator, duration: float) -> Segments:
-        """Draw the pushes of a run of `duration` [s], one after another until none fits."""
-        style = self.ranges()
-        if min(style.length[0], style.pause[0]) <= 0:
-            raise ParameterError(f"contacts.{self.name}: length and pause must be positive")
-        stop, t = self.end or duration, self.begin
-        pushes: list[Push] = []
-        while True:
-            t += rng.uniform(*style.pause)
-            length = rng.uniform(*style.length)
-            force = rng.uniform(*style.force) * direction(rng, self.vertical)
-            torque = rng.uniform(*style.torque) * direction(rng, 1.0)
-            if t + length > stop:
-                return Segments(pushes)
-            wrench = np.concatenate([force, torque])
-            pushes.append(Push(t, t + length, 0.5 * length, 0.5 * length, wrench))
-            t += length
-
-
 def direction(rng: np.random.Generator, vertical: float) -> Array:
     """A random direction whose vertical part is scaled by `vertical`. (3,)"""
     vector = rng.standard_normal(3) * np.array([1.0, 1.0, vertical])
     return np.asarray(vector / np.linalg.norm(vector))
 
 
-@dataclass(frozen=True, kw_only=True)
-class HandSpec:
-    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
-
-    KIND: ClassVar[str] = "hand"
-    name: str  #: Name of the contact.
-    #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
-    spans: tuple[tuple[float, float], ...]
-    #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
-    moves: tuple[Vector, ...] = ()
-    #: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
-    turns: tuple[Vector, ...] = ()
-    reach: float = 0.6  #: Time in which the hand makes its move. [s]
-    release: float = 0.08  #: Time in which the hand lets go, before the end of each span. [s]
-    stiffness: float = 200.0  #: Spring to the hand's position. [N/m]
-    damping: float = 15.0  #: Damper. [N·s/m]
-    twist_stiffness: float = 0.0  #: Spring to the hand's orientation. [N·m/rad]
-    twist_damping: float = 0.0  #: Damper. [N·m·s/rad]
-    link: int = 0  #: The link it holds; 0 for the flange.
-    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
-
-    def start(self, rng: np.random.Generator, duration: float) -> "Hand":
-        """Make the hand ready to grab; nothing is drawn."""
-        del rng, duration
-        for name in ("moves", "turns"):
-            if getattr(self, name) and len(getattr(self, name)) != len(self.spans):
-                raise ParameterError(
-                    f"contacts.{self.name}.{name} has {len(getattr(self, name))} rows; it must "
-                    f"have one for each of the {len(self.spans)} spans"
-                )
-        return Hand(self)
+def drawn(spec: PushesSpec, rng: np.random.Generator, duration: float) -> list[Push]:
+    """The pushes of a run of `duration` [s], one after another until none fits."""
+    check_known(spec.style, STYLES, f"no style {spec.style!r}")
+    given = {k: v for k in PushStyle._fields if (v := getattr(spec, k)) is not None}
+    style = STYLES[spec.style]._replace(**given)
+    if min(style.length[0], style.pause[0]) <= 0:
+        raise ParameterError(f"contacts.{spec.name}: length and pause must be positive")
+    stop, t = spec.end or duration, spec.begin
+    pushes: list[Push] = []
+    while True:
+        t += rng.uniform(*style.pause)
+        length = rng.uniform(*style.length)
+        force = rng.uniform(*style.force) * direction(rng, spec.vertical)
+        torque = rng.uniform(*style.torque) * direction(rng, 1.0)
+        if t + length > stop:
+            return pushes
+        wrench = np.concatenate([force, torque])
+        pushes.append(Push(t, t + length, 0.5 * length, 0.5 * length, wrench))
+        t += length
 
 
 class Hand:
@@ -264,25 +171,10 @@ class Hand:
         return hold * np.concatenate([force, torque])
 
 
-@dataclass(frozen=True, kw_only=True)
-class StopSpec:
-    """A hard stop: a plane that pushes back when the point goes beyond it."""
+class Stop(NamedTuple):
+    """A hard stop during a run: it remembers nothing."""
 
-    KIND: ClassVar[str] = "stop"
-    name: str  #: Name of the contact.
-    through: Vector  #: A point of the plane in the base frame. (3,) [m]
-    normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
-    stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
-    damping: float = 200.0  #: Damping while pressed. [N·s/m]
-    link: int = 0  #: The link that meets it; 0 for the flange.
-    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
-
-    def start(self, rng: np.random.Generator, duration: float) -> "StopSpec":
-        """The stop itself: nothing is drawn, and it remembers nothing."""
-        del rng, duration
-        if not any(self.normal):
-            raise ParameterError(f"contacts.{self.name}.normal has no length")
-        return self
+    spec: StopSpec  #: Its plane.
 
     def active(self, t: float) -> bool:
         """A stop is always there; whether it is met shows in its wrench."""
@@ -292,9 +184,150 @@ class StopSpec:
     def wrench(self, t: float, place: Place) -> Array:
         """Push along the normal, never a pull. (6,) [N, N·m]"""
         del t
-        normal = np.array(self.normal) / float(np.linalg.norm(self.normal))
-        depth = float(normal @ (np.array(self.through) - place.position))
+        spec = self.spec
+        normal = np.array(spec.normal) / float(np.linalg.norm(spec.normal))
+        depth = float(normal @ (np.array(spec.through) - place.position))
         if depth <= 0.0:
             return np.zeros(6)
-        size = max(self.stiffness * depth - self.damping * float(normal @ place.velocity), 0.0)
+        size = max(spec.stiffness * depth - spec.damping * float(normal @ place.velocity), 0.0)
         return np.concatenate([size * normal, np.zeros(3)])
+
+
+def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Segments | Hand | Stop:
+    """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
+    where = f"contacts.{spec.name}"
+    if isinstance(spec, PushesSpec):
+        return Segments(drawn(spec, rng, duration))
+    if isinstance(spec, StopSpec):
+        if not any(spec.normal):
+            raise ParameterError(f"{where}.normal has no length")
+        return Stop(spec)
+    if isinstance(spec, HandSpec):
+        for name, rows in (("moves", spec.moves), ("turns", spec.turns)):
+            if rows and len(rows) != len(spec.spans):
+                raise ParameterError(
+                    f"{where}.{name} has {len(rows)} rows; it must have one for each of the "
+                    f"{len(spec.spans)} spans"
+                )
+        return Hand(spec)
+    if isinstance(spec, LoadSpec):
+        if spec.weight < 0:
+            raise ParameterError(f"{where}.weight is negative")
+        wrench, axes = np.array([0.0, 0.0, -spec.weight, 0.0, 0.0, 0.0]), "base"
+    else:
+        wrench, axes = np.concatenate([spec.force, spec.torque]), spec.axes
+        check_known(axes, ("base", "link"), f"no axes {axes!r}")
+    pushes = [Push(a, b, spec.rise, spec.fall, wrench) for a, b in spec.spans]
+    return Segments(pushes, in_link=axes == "link")
+
+
+class Mounted(NamedTuple):
+    """A contact and the body it acts on."""
+
+    name: str  #: The contact's name.
+    contact: Segments | Hand | Stop  #: What it exerts.
+    joint: int  #: The joint that carries the body, from 1.
+    turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
+    point: Array  #: The contact's point in the joint's frame. (3,) [m]
+    on_flange: bool  #: Whether it acts on the flange.
+    lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
+
+
+def mount(
+    spec: WrenchSpec,
+    chain: Chain,
+    rng: np.random.Generator,
+    duration: float,
+) -> Mounted:
+    """Put a contact on its link."""
+    if not 0 <= spec.link <= chain.joints:
+        raise ParameterError(
+            f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
+        )
+    contact, lever = started(spec, rng, duration), np.array(spec.point)
+    if spec.link == 0:
+        point = chain.flange_rotation @ lever + chain.flange_translation
+        return Mounted(spec.name, contact, chain.joints, chain.flange_rotation, point, True, lever)
+    return Mounted(spec.name, contact, spec.link, np.eye(3), lever, False, lever)
+
+
+def draw_walk(
+    spec: RandomWalkSpec,
+    joints: int,
+    steps: int,
+    step: float,
+    rng: np.random.Generator,
+) -> Array:
+    """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
+    if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
+        raise ParameterError(
+            f"contacts.{spec.name}.intensity has {len(spec.intensity)} numbers; it must have one "
+            f"or {joints}, none negative"
+        )
+    sizes = np.sqrt(np.broadcast_to(spec.intensity, joints) * step)
+    walk = np.cumsum(rng.standard_normal((steps, joints)) * sizes, axis=0)
+    walk += spec.initial * rng.standard_normal(joints)
+    late = np.arange(steps) * step >= spec.begin
+    begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
+    return np.asarray(begun * late[:, None])
+
+
+class Touching:
+    """Everything that touches the arm during a run, evaluated at the middle of each step.
+
+    Attributes:
+        mounted: Contacts that exert wrenches.
+        walks: Name → joint torque of each random walk at each inner step. (N, n) [N·m]
+        wrenches: The last wrench of each mounted contact about its point, base axes. (C, 6)
+    """
+
+    def __init__(
+        self,
+        specs: tuple[ContactSpec, ...],
+        chain: Chain,
+        steps: int,
+        step: float,
+        seed: np.random.SeedSequence,
+    ) -> None:
+        names = [spec.name for spec in specs]
+        if doubled := {name for name in names if names.count(name) > 1}:
+            raise ParameterError(f"two contacts are named {doubled.pop()!r}; name each its own way")
+        # A generator a contact: adding one leaves what the others draw as it was.
+        rngs = [np.random.default_rng(s) for s in seed.spawn(len(specs))]
+        self.mounted: list[Mounted] = []
+        self.walks: dict[str, Array] = {}
+        for spec, rng in zip(specs, rngs, strict=True):
+            if isinstance(spec, RandomWalkSpec):
+                self.walks[spec.name] = draw_walk(spec, chain.joints, steps, step, rng)
+            else:
+                self.mounted.append(mount(spec, chain, rng, steps * step))
+        self.wrenches = np.zeros((len(self.mounted), 6))
+        self.step = step
+
+    def anything(self, t: float) -> bool:
+        """Whether any contact may exert something at `t` [s]."""
+        return bool(self.walks) or any(m.contact.active(t) for m in self.mounted)
+
+    def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
+        """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
+        tau = np.zeros_like(v)
+        for walk in self.walks.values():
+            tau += walk[min(int(t / self.step), len(walk) - 1)]
+        for k, mounted in enumerate(self.mounted):
+            self.wrenches[k] = 0.0
+            if not mounted.contact.active(t):
+                continue
+            J, pose = joint_jacobian(model, data, mounted.joint), data.oMi[mounted.joint]
+            R, arm, twist = pose.rotation, pose.rotation @ mounted.point, J @ v
+            velocity = twist[:3] + cross(twist[3:], arm)
+            place = Place(R @ mounted.turn, pose.translation + arm, velocity, twist[3:])
+            self.wrenches[k] = wrench = mounted.contact.wrench(t, place)
+            tau += J[:3].T @ wrench[:3] + J[3:].T @ (wrench[3:] + cross(arm, wrench[:3]))
+        return tau
+
+
+def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
+    """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
+    import pinocchio as pin
+
+    return np.asarray(pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED))

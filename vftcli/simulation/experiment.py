@@ -14,6 +14,7 @@ from vftcli.signals.remarks import fact
 from vftcli.signals.source import Source
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
+from vftcli.simulation.contacts import joint_jacobian
 from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import (
@@ -27,7 +28,6 @@ from vftcli.simulation.sensing import (
     sample_run,
     vendor_view,
 )
-from vftcli.simulation.touch import joint_jacobian
 from vftcli.simulation.trajectories import plan
 
 MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.

@@ -1,7 +1,7 @@
 """The true friction of the joints: dry friction that can stick, presliding, and a smooth part.
 
 τ_f = λ + a·s(q) + smooth(q̇), with λ ∈ F_c(q̇, g)·Sgn(q̇) set-valued at rest (Coulomb, load and
-Stribeck), s the state of the play operator (`vftcli.robots.presliding`) and
+Stribeck), s the state of the play operator (`vftcli.robots.running_friction`) and
 λ = F_c(q̇, g) tanh(q̇/v₀) where a > 0: at rest a joint that gives holds a·s, v₀ is `CREEP`;
 smooth(q̇) = offset + f_v q̇ + f_2 q̇|q̇| + a ln(1 + |q̇|/b) sign(q̇)
 + sign(q̇) Σ_k m_k max(|q̇| − v_k, 0) + sigmoid(q̇).

@@ -1,11 +1,12 @@
 """Scenario: one simulated experiment, everything a user may set, as in its TOML file."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
-from vftcli.simulation.touch import ContactSpec
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 Vector = tuple[float, float, float]
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,8 +65,8 @@ class PayloadSpec:
     """A rigid load on the flange."""
 
     mass: float  #: Mass. [kg]
-    com: Vector = (0.0, 0.0, 0.0)  #: Centre of mass in flange axes. (3,) [m]
-    inertia: Vector = (0.0, 0.0, 0.0)  #: Principal moments about it. (3,) [kg·m²]
+    com: Vector = ORIGIN  #: Centre of mass in flange axes. (3,) [m]
+    inertia: Vector = ORIGIN  #: Principal moments about it. (3,) [kg·m²]
     #: Whether the controller (its gravity compensation and vendor estimates) knows it.
     known: bool = False
 
@@ -76,7 +77,7 @@ class ForceSensorSpec:
 
     position: Vector = (0.0, 0.0, 0.03)  #: Origin of the sensor frame in flange axes. (3,) [m]
     #: Fixed-axis angles of the sensor frame on the flange. (3,) [rad]
-    rpy: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = ORIGIN
     #: Mass of the sensor's own body and everything it carries, felt by the arm. [kg]
     mass: float = 0.0
     com: Vector = (0.0, 0.0, 0.02)  #: Its centre of mass in flange axes. (3,) [m]
@@ -108,6 +109,101 @@ class SensingSpec:
     clock_drift: float = 0.0  #: Relative rate error of the log's clock (0.003: 0.3 % fast).
     vendor_cutoff: float = 5.0  #: Cut-off of the vendor's own external-force estimate. [Hz]
     start: float = 100.0  #: The first time stamp on the controller's clock. [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class OnLink:
+    """Where a contact acts with a wrench."""
+
+    name: str  #: Name of the contact.
+    link: int = 0  #: The link it acts on; 0 for the flange.
+    point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProfileSpec(OnLink):
+    """A stated wrench, switched on and off smoothly at stated times."""
+
+    KIND: ClassVar[str] = "profile"
+    spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
+    force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
+    torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
+    rise: float = 0.2  #: Time to the full wrench. [s]
+    fall: float = 0.2  #: Time of the release. [s]
+    axes: str = "base"  #: "base" or "link": what the components refer to.
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadSpec(OnLink):
+    """A load hung on a string: its weight, pulling straight down at the point."""
+
+    KIND: ClassVar[str] = "load"
+    weight: float  #: Weight. [N]
+    spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
+    rise: float = 0.5  #: Time in which the string takes the load. [s]
+    fall: float = 0.3  #: Time in which it comes off. [s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PushesSpec(OnLink):
+    """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
+
+    KIND: ClassVar[str] = "pushes"
+    style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
+    begin: float = 0.0  #: No push before this. [s]
+    end: float = 0.0  #: No push after this; 0 for the end of the log. [s]
+    length: tuple[float, float] | None = None  #: Shortest and longest push. [s]
+    pause: tuple[float, float] | None = None  #: Shortest and longest pause. [s]
+    force: tuple[float, float] | None = None  #: Smallest and largest peak force. [N]
+    torque: tuple[float, float] | None = None  #: Smallest and largest peak moment. [N·m]
+    vertical: float = 0.5  #: Share of the force that may point along base z.
+
+
+@dataclass(frozen=True, kw_only=True)
+class HandSpec(OnLink):
+    """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
+
+    KIND: ClassVar[str] = "hand"
+    #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
+    spans: tuple[tuple[float, float], ...]
+    #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
+    moves: tuple[Vector, ...] = ()
+    #: Rotation vector of the anchor in each grab, in base axes. (K, 3) [rad]
+    turns: tuple[Vector, ...] = ()
+    reach: float = 0.6  #: Time in which the hand makes its move. [s]
+    release: float = 0.08  #: Time in which the hand lets go, before the end of each span. [s]
+    stiffness: float = 200.0  #: Spring to the hand's position. [N/m]
+    damping: float = 15.0  #: Damper. [N·s/m]
+    twist_stiffness: float = 0.0  #: Spring to the hand's orientation. [N·m/rad]
+    twist_damping: float = 0.0  #: Damper. [N·m·s/rad]
+
+
+@dataclass(frozen=True, kw_only=True)
+class StopSpec(OnLink):
+    """A hard stop: a plane that pushes back when the point goes beyond it."""
+
+    KIND: ClassVar[str] = "stop"
+    through: Vector  #: A point of the plane in the base frame. (3,) [m]
+    normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
+    stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
+    damping: float = 200.0  #: Damping while pressed. [N·s/m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RandomWalkSpec:
+    """Joint torques that walk at random, the disturbance model of the Kalman observers."""
+
+    KIND: ClassVar[str] = "random-walk"
+    name: str  #: Name of the contact.
+    #: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
+    intensity: tuple[float, ...]
+    initial: float = 0.0  #: Standard deviation at the start. [N·m]
+    begin: float = 0.0  #: The walk is zero before this. [s]
+
+
+#: Contacts that act with a wrench on a link, told apart by their `kind`.
+WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
+ContactSpec = WrenchSpec | RandomWalkSpec  #: Every kind of ``[[contacts]]`` a scenario can have.
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -3,6 +3,7 @@
 Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -236,12 +237,11 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
     clean = np.zeros((len(samples.time), 6))
     turn = rpy_matrix(spec.rpy)
-    rotations, specific = tool_motion(arm, samples, spec, turn)
-    for k, R in enumerate(rotations):
+    for k, (R, specific) in enumerate(tool_motion(arm, samples, spec, turn)):
         force = R.T @ wrench[k, :3]
         lever = turn.T @ np.array(spec.position)
         moment = R.T @ wrench[k, 3:] - np.cross(lever, force)
-        weight = spec.tool_mass * (R.T @ specific[k])
+        weight = spec.tool_mass * (R.T @ specific)
         clean[k, :3] = force + weight
         clean[k, 3:] = moment + np.cross(spec.tool_com, weight)
     noise = np.repeat([spec.noise_force, spec.noise_torque], 3)
@@ -252,22 +252,19 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
 
 def tool_motion(
     arm: Arm, samples: Samples, spec: ForceSensorSpec, turn: Array
-) -> tuple[Array, Array]:
-    """Orientation of the sensor in the base (M, 3, 3), and g − a of the tool's centre. (M, 3)"""
+) -> Iterator[tuple[Array, Array]]:
+    """Orientation of the sensor in the base (3, 3) and g − a of the tool's centre (3,), M times."""
     import pinocchio as pin
 
     model, data = arm.plant.model, arm.plant.model.createData()
     frame = model.getFrameId("flange")
-    rotations = np.empty((len(samples.time), 3, 3))
-    specific = np.empty((len(samples.time), 3))
-    for k, (q, v, a) in enumerate(zip(samples.q, samples.v, samples.a, strict=True)):
+    for q, v, a in zip(samples.q, samples.v, samples.a, strict=True):
         pin.forwardKinematics(model, data, q, v, a)
         pose = pin.updateFramePlacement(model, data, frame)
         axes = pin.LOCAL_WORLD_ALIGNED
         moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
         spin = pin.getFrameVelocity(model, data, frame, axes).angular
-        rotations[k] = pose.rotation @ turn
-        lever = pose.rotation @ np.array(spec.position) + rotations[k] @ np.array(spec.tool_com)
+        R = pose.rotation @ turn
+        lever = pose.rotation @ np.array(spec.position) + R @ np.array(spec.tool_com)
         swing = np.cross(moving.angular, lever) + np.cross(spin, np.cross(spin, lever))
-        specific[k] = model.gravity.linear - (moving.linear + swing)
-    return rotations, specific
+        yield R, model.gravity.linear - (moving.linear + swing)

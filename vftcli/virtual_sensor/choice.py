@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRENCH, Choice, Option
@@ -64,7 +64,7 @@ class WrenchChoice(Choice):
         ParameterError: If there is no such frame or solver.
     """
 
-    GROUP: ClassVar[str] = WRENCH
+    GROUP = WRENCH
 
     #: Frame of the answer, a key of `vftcli.virtual_sensor.frames.FRAMES`.
     frame: Annotated[

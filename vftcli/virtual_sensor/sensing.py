@@ -9,17 +9,18 @@ import numpy as np
 
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
+from vftcli.signals.series import resample_columns
+from vftcli.signals.terms import DynamicsTerms
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.mean_disturbance import mean_disturbance
-from vftcli.virtual_sensor.null_space import contact_elsewhere
 from vftcli.virtual_sensor.sensor import find_mounting
-from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.sensor_reading import SensorReading, contact_elsewhere
 from vftcli.virtual_sensor.smoother.observer_wrench import (
     FreeLog,
     Gate,
@@ -45,6 +46,7 @@ from vftcli.virtual_sensor.zero import (
     zero_warning,
 )
 
+HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 PAYLOAD_SLACK = 0.05  #: Difference of payloads that is not worth a remark. [kg]
 
 
@@ -144,6 +146,23 @@ def sense(
             *(remark for e in elsewhere for remark in e.remarks),
         ),
     )
+
+
+def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
+    """The raw disturbance, its mean over `HALF` before and after each sample. (T, n) [N·m]
+
+    What is asked of a log itself is asked of it: no option touches it and no filter delays it. The
+    mean is a difference of its integral, so an uneven clock weighs by time; at the ends of the log
+    it is over what there is. A log of one sample reads nothing.
+    """
+    t, joints = terms.t, terms.joints
+    if len(t) < 2:
+        return ExternalTorque(name="disturbance", t=t, tau=np.zeros((len(t), joints)))
+    total = disturbance_impulse(terms)
+    before, after = np.maximum(t - HALF, t[0]), np.minimum(t + HALF, t[-1])
+    mean = resample_columns(after, t, total) - resample_columns(before, t, total)
+    mean /= (after - before)[:, None]
+    return ExternalTorque(name="disturbance", t=t, tau=handed_over(mean))
 
 
 def band_remarks(

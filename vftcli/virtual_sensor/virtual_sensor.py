@@ -20,7 +20,6 @@ from vftcli.virtual_sensor.solvers import (
     LEAST_SQUARES,
     SOLVERS,
     TORQUE_SD,
-    Decomposition,
     decompose,
     null_space,
 )
@@ -82,11 +81,15 @@ class VirtualSensor(Shown):
         # Chunk by chunk, so that memory does not grow with the log.
         for start in range(0, samples, CHUNK):
             span = slice(start, min(start + CHUNK, samples))
-            parts, X = self.geometry(chain, q[span])
+            parts = decompose(flange_jacobian(chain, q[span]))
+            flange = link_poses(chain, q[span]).rotation[:, -1]
+            X = from_base(self.frame, flange, self.mounting)
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
                 tau = torque.tau[span]
-                values[k, span], spread[k, span] = self.solve(parts, X, tau, errors[k][span])
+                gain, root = SOLVERS[self.solver](parts, errors[k][span])
+                values[k, span] = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
+                spread[k, span] = np.sqrt(np.sum((X @ root) ** 2, axis=2))
                 if n > 6:
                     residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
         masked = sigma < self.least_sigma
@@ -103,17 +106,6 @@ class VirtualSensor(Shown):
             )
             for k, torque in enumerate(torques)
         )
-
-    def geometry(self, chain: Chain, q: Array) -> tuple[Decomposition, Array]:
-        """The decomposed Jacobian, and what takes a wrench from base axes to the frame."""
-        flange = link_poses(chain, q).rotation[:, -1]
-        return decompose(flange_jacobian(chain, q)), from_base(self.frame, flange, self.mounting)
-
-    def solve(self, parts: Decomposition, X: Array, tau: Array, sd: Array) -> tuple[Array, Array]:
-        """Wrench and standard deviation of one chunk. (T, 6) each"""
-        gain, root = SOLVERS[self.solver](parts, sd)
-        values = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
-        return values, np.sqrt(np.sum((X @ root) ** 2, axis=2))
 
     def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
         """Where a force of this sensor acts, and where it points, both seen from the base.

@@ -163,18 +163,14 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     level = np.median(wrench.values[first], axis=0)
     spread = robust_sd(wrench.values[first] - level)
     away = np.any(np.abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
-    loaded = lasting(away & known, t, 0.1) & (t >= SETTLING)
+    last = len(t) - 1
+    runs = [(a, b) for a, b in runs_of(away & known) if t[min(b, last)] - t[a] >= 0.1]
+    loaded = covered(runs, len(t)) & (t >= SETTLING)
     stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
     if stop - SETTLING < LEAST_SPAN:
         return None
     start = float(wrench.t[0])
     return start + SETTLING, start + stop
-
-
-def lasting(flags: Mask, t: Array, least: float) -> Mask:
-    """Flags of runs that last at least `least` [s]. (T,)"""
-    last = len(t) - 1
-    return covered([(a, b) for a, b in runs_of(flags) if t[min(b, last)] - t[a] >= least], len(t))
 
 
 def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:

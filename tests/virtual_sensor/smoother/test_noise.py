@@ -104,8 +104,9 @@ def test_rest_and_joints_that_never_moved_have_the_drives_share() -> None:
     np.testing.assert_allclose(found.moving[:3], 1.25, rtol=0.4)
     np.testing.assert_array_less((UNSEEN_SHARE * dry[3:]) ** 2 + 0.8, found.moving[3:])
     assert np.all(found.moving_time[3:] >= 1.0)
-    np.testing.assert_array_less((REST_SHARE * dry) ** 2 - 1e-12, found.resting)
-    assert np.all(found.resting_time >= 2.0)
+    variance, time = found.course(blocks(np.zeros((1, 6))))
+    np.testing.assert_array_less((REST_SHARE * dry) ** 2 - 1e-12, variance[0])
+    assert np.all(time >= 2.0)
     assert found.free_seconds == pytest.approx(60.0, abs=2.0)  # from first to last motion
 
 
@@ -131,7 +132,8 @@ def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
         assert found.free_seconds == 0.0
         dry = dry_torques(UR5)
         np.testing.assert_allclose(found.moving, np.maximum(ASSUMED_SHARE * dry, 0.3) ** 2)
-        np.testing.assert_allclose(found.resting, np.maximum(REST_SHARE * dry, 0.3) ** 2)
+        resting = found.course(blocks(np.zeros((1, 6))))[0][0]
+        np.testing.assert_allclose(resting, np.maximum(REST_SHARE * dry, 0.3) ** 2)
         # a median over 48 bends of three blocks each
         np.testing.assert_allclose(found.white, 0.04, rtol=0.7)
 
@@ -142,11 +144,9 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
     log = blocks(velocity)
     assumed = torque_noise(log, [], UR5, SECONDS)
     assert assumed.near == NEAR_REST
-    found = replace(assumed, near=2.5 * SECONDS)
-    rest = found.variance(log)[:, 2] == found.resting[2]
-    assert np.flatnonzero(rest).tolist() == list(range(18, 27))
-    learned = replace(assumed, near=0.0)
-    assert np.flatnonzero(learned.rests(log)[:, 2]).tolist() == list(range(20, 25))
+    for near, expected in ((2.5 * SECONDS, range(18, 27)), (0.0, range(20, 25))):
+        variance = replace(assumed, near=near).course(log)[0][:, 2]
+        assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
 
 
 def test_a_sigmoids_dry_torque_is_its_amplitude() -> None:

@@ -15,10 +15,12 @@ BLOCKS = Blocks(
 )
 NOISE = TorqueNoise(
     white=np.full(6, 0.1),
-    moving=np.full(6, 4.0),
-    moving_time=np.full(6, 0.5),
-    resting=np.full(6, 9.0),
-    resting_time=np.full(6, 2.0),
+    variance=np.full(6, 4.0),
+    time=np.full(6, 0.5),
+    dry=np.zeros(6),
+    seen=np.ones(6, dtype=bool),
+    at_rest=np.full(6, 5.0),
+    pushed=np.full(6, 1.44 * 9.0),
 )
 PRIOR = WrenchPrior(2.0, 30.0)
 

@@ -290,8 +290,8 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) 
         np.ones(count, dtype=bool),
     )  # fmt: skip
     noise = TorqueNoise(
-        white=np.full(n, 1e-2), moving=np.full(n, 0.1), moving_time=np.full(n, 0.05),
-        resting=np.full(n, 10.0), resting_time=np.full(n, 2.0), near=near,
+        white=np.full(n, 1e-2), variance=np.full(n, 0.1), time=np.full(n, 0.05), dry=np.zeros(n),
+        seen=np.ones(n, dtype=bool), at_rest=np.full(n, 9.9), pushed=np.full(n, 14.4), near=near,
     )  # fmt: skip
     J = np.broadcast_to(np.eye(6), (count, 6, n))
     found = unlisted(blocks, J, noise, WrenchPrior(1.0, 1e3))

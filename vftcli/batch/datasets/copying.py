@@ -1,4 +1,4 @@
-"""Copies of datasets: made beside their place, renamed when all is there, taken up after a stop."""
+"""Copies of datasets: made beside their place, renamed at the end, resumable."""
 
 import os
 import shutil
@@ -21,7 +21,7 @@ FILMS = frozenset({".mp4", ".svo", ".svo2", ".mkv", ".webm", ".avi", ".png", ".j
 
 
 def partial_of(copy: Path) -> Path:
-    """Where a copy is made."""
+    """Place of a copy."""
     return copy.with_name(f"{copy.name}.partial")
 
 
@@ -51,7 +51,7 @@ def check_copy(dataset: Path, copy: Path, *, force: bool) -> None:
 
 @contextmanager
 def unfinished(copy: Path, key: str) -> Iterator[Path]:
-    """The folder in which a copy is made: that of an earlier run of the same key goes on.
+    """The folder in which a copy is made: an earlier run's, if its key is equal, goes on.
 
     It stays if the block fails after something was done, to go on from; if the block ends well it
     takes the copy's place, whatever was there before.
@@ -109,7 +109,7 @@ def take_place(partial: Path, copy: Path) -> None:
 
 @contextmanager
 def finished(path: Path) -> Iterator[Path]:
-    """Where to write a file of a copy: it has its name when the block ends well."""
+    """Path for a file of a copy; it gets its name when the block ends well."""
     path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f"{path.name}.partial")
     yield temporary

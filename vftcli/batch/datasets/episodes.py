@@ -1,4 +1,4 @@
-"""What is written back into a dataset: columns of forces, a value a frame, and whose they are."""
+"""Columns of forces for a dataset: a value a frame, and their owners."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +13,7 @@ Single = NDArray[np.float32]  #: Values of a column, as they are written. (frame
 class ForceColumn(NamedTuple):
     """A column that is added."""
 
-    name: str  #: What it is, as external_torque; where it stands is the dataset's affair.
+    name: str  #: Its name, as external_torque; the dataset decides its place.
     elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
     #: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
     told: Mapping[str, Any]
@@ -48,7 +48,7 @@ class Dataset(Protocol):
         """The data files with their episodes."""
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has, also one that cannot be read as a log."""
+        """Number of frames of an episode, even of one unreadable as a log."""
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
         """Refuse a file that has such columns already.

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
-from vftcli.readers.hdf5_layouts import episode_places, episodes_in
+from vftcli.readers.formats import FORMATS
+from vftcli.readers.hdf5 import episode_places
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
@@ -39,10 +40,11 @@ class Hdf5Dataset:
     def files(self) -> Iterator[DataFile]:
         """The files with their episodes, by name."""
         for path in [self._only] if self._only is not None else files_below(self.folder):
-            yield DataFile(path.relative_to(self.folder), path, tuple(episodes_in(open_log(path))))
+            numbers = FORMATS["hdf5"].numbers(open_log(path))
+            yield DataFile(path.relative_to(self.folder), path, numbers)
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has: those of the first data set beside its positions."""
+        """Number of an episode's frames: those of the first set beside positions."""
         import h5py
 
         path = self.folder / file.place
@@ -92,4 +94,4 @@ class Hdf5Dataset:
                         data.attrs["names"] = list(column.elements)
 
     def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Nothing: what there is to tell stands in the files."""
+        """Nothing: the files describe themselves."""

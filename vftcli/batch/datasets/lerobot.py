@@ -43,7 +43,7 @@ class LeRobotDataset:
             yield DataFile(place, self.folder, tuple(own))
 
     def frames(self, file: DataFile, number: int) -> int:
-        """How many frames an episode has."""
+        """Number of an episode's frames."""
         pq = needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
@@ -199,7 +199,7 @@ def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON hold
 
 
 def kind_of(width: int) -> Any:  # noqa: ANN401 - a pyarrow type
-    """How a column is stored: single numbers, or lists of one length."""
+    """Storage of a column: single numbers, or lists of one length."""
     pa = needed("pyarrow", DATASET)
 
     return pa.float32() if width == 1 else pa.list_(pa.float32(), width)

@@ -1,4 +1,4 @@
-"""What a figure for a paper looks like, and its files: widths, type, one and the same bytes.
+"""Look and files of a figure for a paper: widths, type, equal bytes.
 
 Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli[figures]``).
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 WIDTHS = {"single": 3.5, "double": 7.16}  #: One and two columns of the IEEE's journals. [in]
 RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. [dots/in]
 
-#: Times-like type that matplotlib brings along, so that the bytes are the same on every machine.
+#: Times-like type of matplotlib itself: equal bytes on every machine.
 #:
 #: PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
 #: log's name is a dollar sign.
@@ -106,7 +106,7 @@ def paper_style() -> Iterator[None]:
 
 
 def metadata(form: str, title: str) -> dict[str, str | None]:
-    """What a file says of itself: no date and no machine, so that its bytes stay the same."""
+    """A file's metadata: no date and no machine, so that its bytes stay equal."""
     said: dict[str, str | None] = {"Title": printable(title)}
     own: dict[str, dict[str, str | None]] = {
         "pdf": {"Creator": f"vftcli {VERSION}", "CreationDate": None},

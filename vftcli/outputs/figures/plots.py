@@ -20,7 +20,7 @@ STRETCHES = 500
 #: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
 #: wide. [in]
 NARROW, HIGH = 5.0, {False: 0.95, True: 1.15}
-#: Marks in turn: what they stand for is told by their shape where colours are not printed.
+#: Marks in turn: their shapes differ, for print without colours.
 MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 #: Width of a digit of a contact's number, and room between two numbers: where there is less, the
 #: second is left out. [in]
@@ -62,7 +62,7 @@ def line_figure(
         width: Of the figure. [in]
         plots: What is drawn.
         numbers: Numbers that stand above the first row → where. [s]
-        marks: Name → where in each plot a mark stands, across and up. 2 × (n,)
+        marks: Name → place of a mark in each plot, across and up. 2 × (n,)
         columns: Plots beside one another; None for what fits.
         below: What the horizontal axis is called, None for what its unit says.
     """
@@ -149,7 +149,7 @@ def plain(value: float, _place: int) -> str:
 
 
 def draw_over(axes: "Axes", plot: Plot, *, named: bool) -> None:
-    """The same panel of another chart with its axis to the right, named at the end of a row."""
+    """Another chart's panel with its axis to the right, named at a row's end."""
     assert plot.over is not None
     right = axes.twinx()
     draw_plot(right, Plot(plot.over, plot.panel))
@@ -171,19 +171,19 @@ def draw_line(axes: "Axes", chart: Chart, series: ChartLine, j: int) -> None:
 
 
 def dot_look(k: int) -> dict[str, Any]:
-    """How the marks of one name look: black, told by their shape."""
+    """Look of the marks of one name: black, distinct by shape."""
     shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": "white"}
     return {"color": "black", "linestyle": "none", "markeredgewidth": 0.7, **shape}
 
 
 def ribbon_looks(series: ChartLine) -> tuple[dict[str, Any], dict[str, Any]]:
-    """How the band about a line looks, and where no contact is listed."""
+    """Looks of the band about a line: itself, and where no contact is listed."""
     common = {"alpha": 0.25, "linewidth": 0.0}
     return {"facecolor": paint(series), **common}, {"facecolor": "0.4", **common}
 
 
 def band_look() -> dict[str, Any]:
-    """How the ends of a band about zero look."""
+    """Look of the ends of a band about zero."""
     return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
 
 
@@ -201,7 +201,7 @@ PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
 
 
 def look(series: ChartLine) -> dict[str, Any]:
-    """How a line looks: in grey too it is told by its dashes or its width."""
+    """Look of a line: dashes or width distinguish it in grey too."""
     dash = PAPER_DASHES.get(series.dash, series.dash)
     dashes = tuple(float(part) for part in dash.split())
     broad = series.colour == REFERENCE
@@ -272,7 +272,7 @@ class DotPlot(NamedTuple):
     """One plot."""
 
     title: str  #: Which log.
-    joints: Sequence[str]  #: What stands below. (n,)
+    joints: Sequence[str]  #: Names below. (n,)
     rows: Sequence[DotRow]  #: Dots, observer by observer.
     floor: Array  #: The reference's own error, NaN where it is not known. (n,)
 
@@ -309,7 +309,7 @@ def dot_figure(
 
 
 def dots_look(k: int, paint: str) -> dict[str, Any]:
-    """How the dots of one row look: every second one is hollow."""
+    """Look of a row's dots: every second one is hollow."""
     hollow = {"markerfacecolor": "white"} if k % 2 else {}
     shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markeredgewidth": 0.8}
     return {"color": paint, "linestyle": "none", **shape, **hollow}

@@ -1,1 +1,1 @@
-"""What one log's analysis is shown as: tables, files, recordings."""
+"""Outputs of one log's analysis: tables, files, recordings."""

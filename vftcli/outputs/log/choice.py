@@ -1,7 +1,7 @@
-"""What a user may choose of the files that are written of a log."""
+"""A user's choice of a log's files."""
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import WRITE, Choice, Option
@@ -15,9 +15,9 @@ FULL, LEVELS, NONE = "full", "levels", "none"
 
 @dataclass(frozen=True, kw_only=True)
 class OutputChoice(Choice):
-    """What is written of a log besides what always is."""
+    """Files of a log beside those always written."""
 
-    GROUP: ClassVar[str] = WRITE
+    GROUP = WRITE
 
     extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
     #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.

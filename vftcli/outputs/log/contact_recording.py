@@ -57,7 +57,7 @@ def force_plot(analysis: Analysis) -> Chart | None:
             least = np.full_like(size, found.told_force)
             lines.append(ChartLine("smallest that is listed", least, SPARE[7]))
             title += f"; green: {found.told_force:.0f} N, the smallest that is listed"
-        # The peak of every contact whose force is known; a load has a mean and no peak.
+        # The peak of every contact with a force; a load has a mean and no peak.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
         force = np.array([c.peak_force for c in felt], dtype=float)
         tallest = np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
@@ -80,7 +80,7 @@ def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine
 
 
 def contact_log(found: ContactList) -> list[LogLine]:
-    """When each contact begins, with what is known of it, and what limits the list."""
+    """Start of each contact, its facts, and limits of the list."""
     lines = []
     for contact in found.contacts:
         path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
@@ -89,7 +89,7 @@ def contact_log(found: ContactList) -> list[LogLine]:
         begins = remark.where.span[0] if remark.where.span is not None else 0.0
         lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
     if not found.contacts:
-        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as told", GREY))
+        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as known", GREY))
     return lines
 
 

@@ -91,7 +91,7 @@ def topics(recording: Recording) -> Iterator[OutputTopic]:
     efforts = (getattr(recording, name) for name in ("torque", "current", "torque_without_gravity"))
     effort = next((value for value in efforts if value is not None), None)
     yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
-    # JointState has no field for these: each gets a topic whose effort it is.
+    # JointState has no field for these: each is the effort of its own topic.
     for name in JOINT_SIGNALS:
         value = getattr(recording, name)
         if value is not None and name not in {"q", "dq"}:

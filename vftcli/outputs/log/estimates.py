@@ -1,4 +1,4 @@
-"""What `vftcli estimate` writes: the estimates as flat columns, `run.json`, extras on demand."""
+"""Files of `vftcli estimate`: estimates as columns, `run.json`, extras."""
 
 import json
 from collections.abc import (
@@ -46,7 +46,7 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz``
     [N, N·m], null where the pose cannot tell it, ``wrench_sd/<observer>/fx``…,
     ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by ``--solver map``, what it says of
-    the masked samples stands apart in ``wrench_masked/<observer>/fx``….
+    the masked samples is apart in ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """
     return frame_of(columns(analysis, rows))

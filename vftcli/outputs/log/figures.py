@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 LOG_FIGURES = ("torque", "errors", "wrench", "spectra", "tuning", "responses")
 TUNED_FIGURES = ("spectra", "tuning")  #: Those beside gains that were found.
 ERROR_FIGURES = ("errors",)  #: The figure of a table of errors.
-MOST = 8  #: Logs that one figure of errors shows; of more, only what stands for all of them.
+MOST = 8  #: Most logs in one figure of errors; of more, only their summary.
 #: Dashes of responses, which are black: the spectra beside them have colours.
 BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 

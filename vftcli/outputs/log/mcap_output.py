@@ -39,7 +39,7 @@ JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
 
 INFO, WARNING = 2, 3  #: Levels of a log message.
-BLOCK = 8192  #: Samples whose messages are held in memory at once.
+BLOCK = 8192  #: Samples with messages in memory at once.
 
 Nanoseconds = NDArray[np.int64]
 

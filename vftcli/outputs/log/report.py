@@ -1,4 +1,4 @@
-"""What `vftcli report` writes: page, recording, estimates, errors and run.json in one folder."""
+"""Files of `vftcli report`: page, recording, estimates, errors, run.json."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +35,7 @@ ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
 CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
 #: What a report of one log may hold; the error tables only where there is a reference.
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
-#: What stands above the sub-folders of several logs.
+#: Head above the sub-folders of several logs.
 SUMMARY_FILES = ("index.html", SEAL, *CONTACTS, *ERROR_TABLES)
 
 

@@ -94,7 +94,7 @@ def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
 
 
 def whole_spans(analysis: Analysis) -> list[tuple[float, float]]:
-    """Where every sample is kept: around the starts of the strongest contacts. [s]"""
+    """Times with every sample: around the strongest contacts' starts. [s]"""
     if analysis.contacts is None:
         return []
     strongest = sorted(analysis.contacts.contacts, key=lambda c: -(c.peak_force or 0.0))
@@ -103,7 +103,7 @@ def whole_spans(analysis: Analysis) -> list[tuple[float, float]]:
 
 
 def newton_per_metre(analysis: Analysis) -> float:
-    """How long arrows are: by the hardest contact. [N/m]"""
+    """Length of arrows, by the hardest contact. [N/m]"""
     found = analysis.contacts
     if found is None or found.hardest is None:
         return NEWTON_PER_METRE
@@ -185,7 +185,7 @@ def motion_plots(analysis: Analysis) -> Iterator[Chart]:
 
 
 def summary(analysis: Analysis) -> str:
-    """Which log, which robot, what the numbers and the arrow mean."""
+    """Log, robot, and meaning of numbers and arrow."""
     recording, robot = analysis.recording, analysis.robot
     source = recording.source
     lines = [
@@ -204,7 +204,7 @@ def summary(analysis: Analysis) -> str:
 
 
 def arrow_words(analysis: Analysis) -> str:
-    """What the arrow and the colours of the arm mean."""
+    """Meaning of the arrow and the arm's colours."""
     scale = f"1 m is {newton_per_metre(analysis):g} N"
     if analysis.contacts is not None:
         return (

@@ -12,7 +12,7 @@ from vftcli.outputs.grid import Column, Grid, GridCell, joint_columns
 from vftcli.outputs.quantity import DASH, significant
 from vftcli.signals.arrays import Array, Mask
 
-#: An RMSE within this factor of the reference's floor cannot be told from the reference's own.
+#: An RMSE within this factor of the reference's floor may be the reference's own.
 AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
@@ -35,7 +35,7 @@ class Block(NamedTuple):
     means: JointMeans  #: What the joints are in one number.
     #: Observer → largest share of a joint's samples without its answer, where there is.
     missing: dict[str, float]
-    #: Joints whose reference is not to be trusted, because they rest.
+    #: Joints at rest: do not trust their reference.
     untrusted: tuple[int, ...] = ()
 
     @property
@@ -45,7 +45,7 @@ class Block(NamedTuple):
 
     @property
     def best(self) -> Mask:
-        """The smallest RMSE of each joint, and what prints the same. (observers, joints)
+        """Smallest RMSE of each joint, and equals in print. (observers, joints)
 
         None where the reference cannot tell: of a joint that rests, and of several at the floor.
         """
@@ -63,7 +63,7 @@ class Block(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Which log, which reference, how many samples."""
+        """Log, reference, number of samples."""
         low, high = self.samples
         samples = f"{high}" if low == high else f"{low} to {high}"
         return f"{self.recording} against {self.reference}, {samples} samples"
@@ -87,7 +87,7 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
     if place not in errors.columns:
         return
     rows = errors.filter(pl.col(place).is_not_null())
-    # The second time that an observer comes with the same joint, the rows are another log's.
+    # An observer's second row of a joint begins another log.
     again = pl.int_range(pl.len()).over("recording", "reference", "observer", place)
     groups = rows.group_by("recording", "reference", again.alias("again"), maintain_order=True)
     yield from (group for _, group in groups)
@@ -160,7 +160,7 @@ def rmse_grid(table: Block) -> Grid:
 
 
 def details(row: dict[str, Any]) -> dict[str, str]:
-    """What the tables below the RMSE table say of one row: title of the table → text."""
+    """Text below the RMSE table for one row, by the table's title."""
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share = row.get("coverage_95")
     interval = DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
@@ -196,7 +196,7 @@ def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
 
 
 def marks_in_words(found: Sequence[Block]) -> str:
-    """What floor, star and dash mean, where they occur."""
+    """Meaning of floor, star and dash, if present."""
     lines = []
     if any(table.has_floor for table in found):
         lines.append("floor: RMSE that the reference itself is known to have")
@@ -222,7 +222,7 @@ def without_answer(found: Sequence[Block]) -> list[str]:
 
 
 def marks_on_page(found: Sequence[Block]) -> str:
-    """What the marks of the RMSE table mean, as HTML."""
+    """Meaning of the RMSE table's marks, as HTML."""
     text = (
         "Torque on the robot about each joint's own axis; bold is the best of its joint; "
         "the mean is over the joints with a reference to be trusted."

@@ -36,7 +36,7 @@ CONVENTIONS = {
 #: A list without words, which is better read on one line.
 NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
 END = "\n}\n"  #: How an object's text ends.
-#: Package → its module, whose version is recorded if it is loaded; none is imported for it.
+#: Package → its module; its version is recorded if loaded, none is imported for it.
 PACKAGES = {
     "numpy": "numpy",
     "scipy": "scipy",
@@ -142,7 +142,7 @@ def versions() -> dict[str, str]:
 
 
 def input_record(recording: Recording) -> dict[str, Any]:
-    """Which log it was, told by path and digest, and what signals it holds."""
+    """The log by path and digest, and its signals."""
     source = recording.source
     return {
         "path": str(source.path) if source.path is not None else None,
@@ -172,7 +172,7 @@ def log_remarks(logs: Iterable[Recording]) -> dict[str, list[Remark]]:
 
 
 def robot_record(robot: Robot) -> dict[str, Any]:
-    """Which robot it was taken to be. A built-in profile is told by its name, not its path."""
+    """The robot in use: a built-in profile by its name, not its path."""
     # Its path would be another on every machine; name and digest say as much.
     built_in = robot.path in PROFILES.values()
     return {
@@ -245,7 +245,7 @@ def wrench_record(analysis: Analysis) -> dict[str, Any] | None:
 
 
 def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
-    """What the complete log told: free part, chosen gains, error budget."""
+    """Results of the complete log: free part, chosen gains, error budget."""
     found = analysis.refinement
     if found is None:
         return None

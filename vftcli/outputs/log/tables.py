@@ -64,7 +64,7 @@ def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame
 
 
 def doubts_of(errors: pl.DataFrame) -> list[str]:
-    """What stands above tables of errors that mean nothing: one line a log."""
+    """Lines above tables of meaningless errors, one a log."""
     if OVERRIDDEN not in errors.columns:
         return []
     rows = errors.select("recording", OVERRIDDEN).unique(maintain_order=True).drop_nulls()
@@ -116,7 +116,7 @@ def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
 
 
 def alike(grids: "Sequence[Grid]") -> "Sequence[Grid]":
-    """Tables of several logs with the same heads: a log's dagger moves from them to its title."""
+    """Tables of several logs with equal heads: a log's dagger moves from them to its title."""
     if len(grids) == 1:
         return grids
     found = []

@@ -21,9 +21,9 @@ ROOM, LONG = 350_000, 4.0
 FEWEST, MOST = 250, 2000
 #: Bytes of a stretch of a line: two samples of a float32 and an int16 as base64.
 POINT = 2 * (4 + 2) * 4 / 3
-#: Steps between a line's lowest and highest value, finer than any screen; what stands for NaN.
+#: Steps between a line's lowest and highest value, finer than any screen; the number for NaN.
 STEPS, UNKNOWN = 65534, -32768
-#: How lines are broken, in turn: none is told by its colour alone.
+#: Dashes of lines, in turn: colour alone distinguishes none.
 DASHES = ("7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
 QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
 #: Colours that follow the page: its text's, and the reference's.
@@ -80,7 +80,7 @@ def observer_lines(estimates: Sequence[ExternalTorque]) -> dict[str, LineStyle]:
 
 
 def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
-    """The same of the names alone."""
+    """Colour and dash of every name: the first has a line without gaps."""
     colours = colours_of_names(names)
     dashes = ("", *DASHES)
     return {

@@ -41,7 +41,12 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     if not found.contacts:
         return ()
     forces = ("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]")
-    rest = ("evidence [nats]", "lead of the place [nats]", "vendor |F| [N]", "sensor |F| [N]")
+    rest = (
+        "log-likelihood ratio [nats]",
+        "margin of the place [nats]",
+        "vendor |F| [N]",
+        "sensor |F| [N]",
+    )
     wrenches = Grid(
         title="Wrench at the peak, base axes, the moment about the flange point",
         columns=(Column("#"), *words(*forces), *map(Column, rest)),
@@ -160,7 +165,7 @@ def observer_row(analysis: Analysis, name: str) -> tuple[Entry, ...]:
 def joint_values(values: Array) -> str:
     """One number where all joints agree to three digits, else one line a run of equal joints."""
     texts = [significant(float(value)) for value in values]
-    # Compared as printed: what cannot be told apart on the page is one value.
+    # Compared as printed: values that look equal are one.
     runs = [
         (text, [j for j, _ in run]) for text, run in groupby(enumerate(texts, 1), itemgetter(1))
     ]

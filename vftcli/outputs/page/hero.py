@@ -1,4 +1,4 @@
-"""The drawings of contacts: |F| over the whole log with its band, and the arm at each of them."""
+"""Drawings of contacts: |F| over the log with its band, the arm at each one."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -16,25 +16,25 @@ from vftcli.signals.errors import VftError
 from vftcli.signals.intervals import runs_of
 from vftcli.signals.series import resample_columns
 
-#: The chart for a screen and for a telephone, whose letters would be too small else; stretches of
-#: the line in each of them.
+#: The chart for a screen, and for a telephone with larger letters; stretches of the line in
+#: each.
 SHAPES = (
     (Box(width=1024, height=300, left=44, bottom=24, top=28, right=10), 600),
     (Box(width=400, height=260, left=38, bottom=24, top=28, right=8), 200),
 )
 FEWEST = 6  #: Fewest stretches of one contact's line.
-LETTER = 7.5  #: Width of a letter, for labels that shall not run into one another.
-SIZE, EDGE = np.array([84.0, 64.0]), 9.0  #: Width and height of the arm's drawing, and its margin.
-ARROW, HEAD = 20.0, 5.0  #: Length of an arrow that lies in the drawing's plane, and of its head.
+LETTER = 7.5  #: Width of a letter: labels must not overlap.
+SIZE, EDGE = np.array([84.0, 64.0]), 9.0  #: Size of the arm's drawing, and margin.
+ARROW, HEAD = 20.0, 5.0  #: Arrow in the drawing's plane, and its head.
 
 
 class Timeline(NamedTuple):
-    """What the chart of |F| is drawn from, in one of its shapes."""
+    """The chart of |F| in one shape."""
 
     scales: Scales  #: From seconds and newtons to places.
-    courses: list[tuple[str, str]]  #: Band and line of every contact whose force is known.
-    numbers: list[tuple[int, float]]  #: Contacts that have room for their number, and its place.
-    #: Place of a peak, place of its size in words, and that, "" where there is no room or no size.
+    courses: list[tuple[str, str]]  #: Band and line of contacts with a force.
+    numbers: list[tuple[int, float]]  #: Contacts with room for a number, and its place.
+    #: Place of a peak, place of its size in words, and the words, "" without room or size.
     peaks: list[tuple[float, float, float, float, str]]
 
 
@@ -50,18 +50,18 @@ def timelines(analysis: Analysis, found: ContactList) -> list[Timeline]:
 
 
 def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
-    """Stretches of the log that are known to be free of contact. [s]"""
+    """Stretches of the log without contact. [s]"""
     try:
         own = analysis.motion.known.own
     except VftError:
-        # Nothing is known to be free, which the list of contacts says.
+        # Nothing is surely free; the list of contacts says so.
         return []
     t = analysis.t
     return [(float(t[start]), float(t[stop - 1])) for start, stop in runs_of(own)]
 
 
 def highest(found: ContactList) -> float:
-    """Upper end of the axis: every peak with its band, what cannot be told, and room. [N]"""
+    """Upper end of the axis: peaks with bands, the least visible force, room. [N]"""
     tops = [2.5 * (found.told_force or 0.0)]
     for contact in found.contacts:
         if contact.peak_force is not None and contact.peak_band is not None:
@@ -76,17 +76,17 @@ def courses_of(
 ) -> Iterator[tuple[str, str]]:
     """Every contact's |F| with its band, as paths."""
     for course in (c.course for c in contacts if c.course is not None):
-        # A contact's share of the log's stretches: hundreds of them shall not make a large page.
+        # A contact's share of the log's stretches: hundreds must not make a large page.
         share = float(course.t[-1] - course.t[0]) / (scales.x.high - scales.x.low)
         t, force = thinned(course.t, course.force, max(round(share * stretches), FEWEST))
         half = np.interp(t, course.t, course.band)
-        # What is wider than the force may be leaves the chart.
+        # A band beyond the force leaves the chart.
         above = np.minimum(force + half, scales.y.high)
         yield ribbon(scales, t, np.maximum(force - half, 0.0), above), path_of(scales, t, force)
 
 
 def placed_numbers(scales: Scales, contacts: Sequence[Contact]) -> Iterator[tuple[int, float]]:
-    """The contacts' numbers above the plot, as far as there is room."""
+    """The contacts' numbers above the plot, with room."""
     last = -np.inf
     for contact in contacts:
         x = float(scales.across(0.5 * (contact.start + contact.stop)))
@@ -99,7 +99,7 @@ def placed_numbers(scales: Scales, contacts: Sequence[Contact]) -> Iterator[tupl
 def peaks_of(
     scales: Scales, contacts: Sequence[Contact]
 ) -> Iterator[tuple[float, float, float, float, str]]:
-    """Every peak; the hardest ones' sizes beside it, as far as there is room."""
+    """Every peak; the hardest with their sizes, with room."""
     labels: list[tuple[float, float]] = []
     for contact in sorted(contacts, key=by_force, reverse=True):
         force, band = contact.peak_force, contact.peak_band
@@ -118,17 +118,17 @@ def peaks_of(
 
 
 class ArmDrawing(NamedTuple):
-    """The arm from its side at a contact's peak, as points of a drawing of this size."""
+    """The arm from its side at a peak, as points of a drawing."""
 
     size: Array  #: Width and height. (2,)
     arm: Array  #: Base, the links' frames, flange. (n + 2, 2)
-    hit: list[Array]  #: The places that fit, one stretch or point each.
-    #: The force: the shaft, then the head; none where it points out of the drawing.
+    hit: list[Array]  #: The probable places, a stretch or point each.
+    #: The force: shaft, then head; none if it points out of the drawing.
     arrow: list[Array]
 
 
 def arm_drawing(analysis: Analysis, contact: Contact) -> ArmDrawing:
-    """The arm from its side at the contact's peak, the places that fit marked."""
+    """The arm from its side at a peak, with the probable places."""
     q = resample_columns(np.array([contact.peak]), analysis.t, analysis.recording.q)
     frames = link_poses(analysis.robot.loaded_chain, q).translation[0]
     points = np.vstack([np.zeros(3), frames])
@@ -139,7 +139,7 @@ def arm_drawing(analysis: Analysis, contact: Contact) -> ArmDrawing:
     # Drawings count downwards.
     drawn = 0.5 * (SIZE - scale * (high - low)) + scale * (flat - low)
     drawn[:, 1] = SIZE[1] - drawn[:, 1]
-    # Row k + 1 of the points is the frame of link k + 1, the last the flange's.
+    # Point k + 1 is the frame of link k + 1, the last the flange's.
     hit = [drawn[-1:] if link == 0 else drawn[link : link + 2] for link in contact.places]
     shaft: list[Array] = []
     if hit and contact.wrench is not None:
@@ -150,10 +150,10 @@ def arm_drawing(analysis: Analysis, contact: Contact) -> ArmDrawing:
 
 
 def side_of(points: Array) -> Array:
-    """The horizontal direction in which the arm reaches furthest, to the right. (3,)"""
+    """Horizontal direction of the arm's farthest reach, to the right. (3,)"""
     flat = points[:, :2] - points[:, :2].mean(axis=0)
     direction = np.linalg.svd(flat, full_matrices=False)[2][0]
-    # The arm reaches to the right; one that stands upright is seen along y.
+    # The arm reaches to the right; an upright one shows along y.
     if np.linalg.norm(flat) < 1e-9:
         return np.array([1.0, 0.0, 0.0])
     if direction @ (points[-1, :2] - points[0, :2]) < 0:
@@ -162,7 +162,7 @@ def side_of(points: Array) -> Array:
 
 
 def arrow(tip: Array, direction: Array) -> list[Array]:
-    """An arrow that ends at a place; the more it points out of the drawing, the shorter it is."""
+    """An arrow that ends at a place, shorter the more it leaves the plane."""
     length = ARROW * float(np.linalg.norm(direction))
     if length < HEAD:
         return []

@@ -115,7 +115,7 @@ def legend_name(analysis: Analysis, name: str) -> str:
 def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     """Gain, phase and delay of every observer over frequency, up to half the sample rate.
 
-    Of observers whose joints differ the first joint is drawn.
+    If joints differ, an observer's first joint is drawn.
     """
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
@@ -189,7 +189,7 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     sensed = analysis.virtual_sensor
     if sensed is None or not sensed.wrenches:
         return
-    # σ_min and the mask follow from the pose, so that every observer has the same.
+    # σ_min and the mask follow from the pose: all observers share them.
     first, least = sensed.wrenches[0], sensed.sensor.least_sigma
     styles = observer_lines(analysis.estimates)
 
@@ -240,7 +240,7 @@ def spectra_chart(found: Spectra) -> Chart:
     """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
 
     def level(power: Array) -> Array:
-        """Power in decibels; the least number above 0 stands for none at all."""
+        """Power in decibels; the least number above 0 replaces zero."""
         decibels: Array = 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
         return decibels
 
@@ -256,7 +256,7 @@ def spectra_chart(found: Spectra) -> Chart:
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
-    """What was minimised for every observer that the log tuned."""
+    """Minimised error of every observer tuned by the log."""
     lines = tuple(
         ChartLine(name, curve.rmse, *styles[name], x=curve.omega_n / (2.0 * np.pi))
         for name, curve in curves.items()

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 #: Heads of the overview.
-HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Not told below", "Mean RMSE", "Health")
+HEADS = ("Log", "Robot", "Span", "Contacts", "Hardest", "Detects above", "Mean RMSE", "Health")
 
 
 def render(analysis: Analysis) -> str:
@@ -106,7 +106,7 @@ def eyebrow(analysis: Analysis) -> tuple[str, ...]:
 
 
 def scale_words(chart: Chart) -> str:
-    """Which pictures share a scale, in words."""
+    """Pictures with a common scale, in words."""
     numbered = groupby(zip(chart.families, chart.panels, strict=False), key=itemgetter(0))
     families = [[name for _, name in members] for _, members in numbered]
     shared = [f"{names[0]}–{names[-1]}" for names in families if len(names) > 1]
@@ -171,7 +171,7 @@ def index_line(folder: str, analysis: Analysis) -> LogSummary:
 
 
 def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
-    """How many logs were touched, and where the hardest contact is."""
+    """Number of logs with contact, and place of the hardest."""
     lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
     pushed = [found for found in lists if found.contacts and not found.contacts[0].is_load]
     loads = sum(bool(found.contacts and found.contacts[0].is_load) for found in lists)

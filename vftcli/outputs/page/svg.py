@@ -62,12 +62,12 @@ class Scales(NamedTuple):
 
     @property
     def floor(self) -> float:
-        """Where the plot ends below."""
+        """Lower end of the plot."""
         return self.box.height - self.box.bottom
 
     @property
     def side(self) -> float:
-        """Where the plot ends to the right."""
+        """Right end of the plot."""
         return self.box.width - self.box.right
 
 
@@ -194,7 +194,7 @@ def thinned(t: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array,
 
 
 def thinned_log(x: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
-    """The same over a logarithmic axis: stretches of equal width there."""
+    """One series as drawn over a logarithmic axis: stretches of equal width there."""
     if len(x) <= 2 * stretches:
         return x, values
     starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))

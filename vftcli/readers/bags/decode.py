@@ -1,8 +1,8 @@
 """Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
 
-from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -127,30 +127,6 @@ class Stream:
         yield from ((name, value) for name, value in times if value is not None)
         yield from self.signals.items()
 
-    def with_series(self, rows: Mapping[str, JoinedRows]) -> "Stream":
-        """The stream with other times and signals, those that have one width in every message."""
-        count = rows["receive"].count
-        found = {
-            name: values.whole()
-            for name, values in rows.items()
-            if len(values.shapes) == 1 and values.count == count
-        }
-        keys = ("receive", "header", "robot")
-        times: dict[str, Any] = {key: found.pop(key, None) for key in keys}
-        return replace(self, signals=found, **times)
-
-
-@dataclass
-class _Part:
-    """Arrays of some messages of one stream."""
-
-    receive: Integers
-    header: Integers | None
-    robot: Array | None
-    signals: dict[str, Array]
-    order: Integers
-    mixed: bool
-
 
 #: What tells streams of a topic apart: the joints' names, the frame, the signals.
 _Key = tuple[tuple[str, ...], str, tuple[str, ...]]
@@ -162,10 +138,11 @@ class _Topic:
 
     types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
-    #: The parts of the batch at hand.
-    parts: dict[_Key, list[_Part]] = field(default_factory=dict)
-    #: The streams of the first batches, and the times and signals of all batches.
-    streams: dict[_Key, tuple[Stream, dict[str, JoinedRows]]] = field(default_factory=dict)
+    #: Times and signals by name, and `place` in the topic, of each layout of the batch at hand.
+    parts: dict[_Key, list[dict[str, Column]]] = field(default_factory=dict)
+    #: The times and signals of all batches.
+    series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
+    mixed: set[_Key] = field(default_factory=set)
     constants: dict[str, tuple[float, ...]] = field(default_factory=dict)
     seen: int = 0
 
@@ -193,11 +170,9 @@ class Decoder:
                 self._of_length(batch, topic, int(length))
             topic.seen += len(batch.offsets)
             for key, parts in topic.parts.items():
-                stream = _joined(channel, topic, key, parts)
-                first, series = topic.streams.setdefault(key, (stream, {}))
-                first.mixed |= stream.mixed
-                for name, value in stream.series():
-                    series.setdefault(name, JoinedRows()).add(value)
+                series = topic.series.setdefault(key, defaultdict(JoinedRows))
+                for name, value in in_recorded_order(parts):
+                    series[name].add(value)
             topic.parts.clear()
         except LayoutError as error:
             raise LogError(
@@ -267,23 +242,39 @@ class Decoder:
             }
             names = tuple(names[k] for k in order)
         frame = "".join(layout.texts.get(kind.frame, ()))
-        robot = None
-        if kind.robot_time in layout.leaves:
-            robot = layout.numbers(kind.robot_time, batch.buffer, offsets)[:, 0]
-        part = _Part(
-            receive=batch.times[rows],
-            header=_stamps(layout, batch, offsets),
-            robot=robot,
-            signals=signals,
-            order=topic.seen + rows,
-            mixed=mixed,
-        )
-        topic.parts.setdefault((names, frame, tuple(signals)), []).append(part)
+        has_clock = kind.robot_time in layout.leaves
+        clock = layout.numbers(kind.robot_time, batch.buffer, offsets)[:, 0] if has_clock else None
+        own = {"header": _stamps(layout, batch, offsets), "robot": clock}
+        part = {name: values for name, values in own.items() if values is not None} | signals
+        part |= {"place": topic.seen + rows, "receive": batch.times[rows]}
+        key = names, frame, tuple(signals)
+        topic.parts.setdefault(key, []).append(part)
+        topic.mixed |= {key} if mixed else set()
 
-    def streams(self) -> list[Stream]:
+    def streams(self) -> Iterator[Stream]:
         """All streams that were decoded, each in the order of recording."""
-        found = (each for topic in self.topics.values() for each in topic.streams.values())
-        return [stream.with_series(series) for stream, series in found]
+        for channel, topic in self.topics.items():
+            for key, series in topic.series.items():
+                names, frame, signals = key
+                count = series["receive"].count
+                # What every message has, and of one width.
+                found = {
+                    name: rows.whole()
+                    for name, rows in series.items()
+                    if len(rows.shapes) == 1 and rows.count == count
+                }
+                yield Stream(
+                    channel=channel,
+                    kind=KINDS[channel.type],
+                    names=names,
+                    mixed=key in topic.mixed,
+                    frame=frame,
+                    receive=found["receive"],
+                    header=found.get("header"),
+                    robot=found.get("robot"),
+                    signals={name: found[name] for name in signals if name in found},
+                    constants=topic.constants,
+                )
 
 
 def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:
@@ -296,36 +287,12 @@ def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers 
     )
 
 
-def _joined(channel: Channel, topic: _Topic, key: _Key, parts: Iterable[_Part]) -> Stream:
-    """One stream of its parts, in the order in which the messages were recorded."""
-    parts = list(parts)
-    names, frame, signals = key
-    widths = {name: {part.signals[name].shape[1] for part in parts} for name in signals}
-    order = np.argsort(np.concatenate([part.order for part in parts]), kind="stable")
-    straight = bool(np.all(order == np.arange(len(order))))
-
-    def whole(arrays: list[Array]) -> Array:
-        """The parts one behind the other, in the order of recording."""
-        if len(arrays) == 1 and straight:
-            return arrays[0]
-        joined: Array = np.concatenate(arrays)
-        return joined if straight else joined[order]
-
-    headers = [part.header for part in parts if part.header is not None]
-    robots = [part.robot for part in parts if part.robot is not None]
-    return Stream(
-        channel=channel,
-        kind=KINDS[channel.type],
-        names=names,
-        mixed=any(part.mixed for part in parts),
-        frame=frame,
-        receive=np.concatenate([part.receive for part in parts])[order],
-        header=np.concatenate(headers)[order] if len(headers) == len(parts) else None,
-        robot=whole(robots) if len(robots) == len(parts) else None,
-        signals={
-            name: whole([part.signals[name] for part in parts])
-            for name in signals
-            if len(widths[name]) == 1
-        },
-        constants=topic.constants,
-    )
+def in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:
+    """The times and signals that all parts of a batch have, in the order of recording."""
+    order = np.argsort(np.concatenate([part.pop("place") for part in parts]), kind="stable")
+    for name, value in parts[0].items():
+        values = [part[name] for part in parts if name in part]
+        if len(parts) == 1:
+            yield name, value  # one layout's rows rise already
+        elif len(values) == len(parts) and len({each.shape[1:] for each in values}) == 1:
+            yield name, np.concatenate(values)[order]

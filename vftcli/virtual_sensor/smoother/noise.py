@@ -28,6 +28,8 @@ from vftcli.virtual_sensor.solvers import TORQUE_SD
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]
 #: A joint that rests under a contact: the push re-settles its stiction within so long. [s]
 PUSHED_TIME = 0.3
+#: Such a push adds to the variance of motion that of rest, by the drives' share under a push.
+RESETTLED = (PUSHED_SHARE / REST_SHARE) ** 2
 #: A joint that moves in less than the share `SEEN` of the free part's blocks: the model error of
 #: its motion, as a share of F_c, and its least correlation time. [s]
 UNSEEN_SHARE, UNSEEN_TIME, SEEN = 0.2, 1.0, 0.2
@@ -43,41 +45,41 @@ class TorqueNoise:
     """White noise and model error of every joint, by blocks of one length."""
 
     white: Array  #: R, variance of the white noise. (n,) [(N·m)²]
-    moving: Array  #: Variance of the model error in motion. (n,) [(N·m)²]
-    moving_time: Array  #: Its correlation time. (n,) [s]
-    resting: Array  #: Variance of the model error at rest. (n,) [(N·m)²]
-    resting_time: Array  #: Its correlation time. (n,) [s]
+    variance: Array  #: s² of motion that the free part shows. (n,) [(N·m)²]
+    time: Array  #: T, its correlation time. (n,) [s]
+    dry: Array  #: F_c. (n,) [N·m]
+    seen: Mask  #: Whether the free part moved the joint; else motion errs by its friction. (n,)
+    at_rest: Array  #: Variance that rest adds. (n,) [(N·m)²]
+    pushed: Array  #: The same of rest under a contact. (n,) [(N·m)²]
     near: float = 0.0  #: How long before and after a rest that of rest holds. [s]
     #: How much free motion it was learned from; 0 where it is assumed. [s]
     free_seconds: float = 0.0
 
-    def variance(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
-        """Stationary variance of the model error in every block. (K, n) [(N·m)²]
+    @property
+    def moving(self) -> Array:
+        """Variance of the model error in motion. (n,) [(N·m)²]"""
+        return self.variance + ~self.seen * (UNSEEN_SHARE * self.dry) ** 2
+
+    @property
+    def moving_time(self) -> Array:
+        """Its correlation time. (n,) [s]"""
+        return np.where(self.seen, self.time, np.maximum(self.time, UNSEEN_TIME))
+
+    def course(self, blocks: Blocks, touched: Mask | None = None) -> tuple[Array, Array]:
+        """Stationary variance of the model error in every block, its correlation time. (K, n) each
 
         Args:
             blocks: The log.
-            pushed: Blocks in which a contact may re-settle stiction; None for none. (K,)
+            touched: Blocks in which a contact may re-settle stiction; None for none. (K,)
         """
-        found = np.where(self.rests(blocks), self.resting, self.moving)
-        if pushed is None:
-            return found
-        again = self.moving + (PUSHED_SHARE / REST_SHARE) ** 2 * self.resting
-        return np.where(blocks.rests & pushed[:, None], again, found)
-
-    def time(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
-        """Correlation time of the model error in every block; as `variance`. (K, n) [s]"""
-        found = np.where(self.rests(blocks), self.resting_time, self.moving_time)
-        if pushed is None:
-            return found
-        return np.where(blocks.rests & pushed[:, None], PUSHED_TIME, found)
-
-    def decay(self, blocks: Blocks, pushed: Mask | None = None) -> Array:
-        """Share of the model error that is kept from one block to the next, likewise. (K, n)"""
-        return np.exp(-steps(blocks)[:, None] / self.time(blocks, pushed))
-
-    def rests(self, blocks: Blocks) -> Mask:
-        """Blocks in which each joint rests, those within `near` of one too. (K, n)"""
-        return np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
+        rests = np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
+        variance = np.where(rests, self.variance + self.at_rest, self.moving)
+        time = np.where(rests, np.maximum(self.time, REST_TIME), self.moving_time)
+        if touched is not None:
+            held = blocks.rests & touched[:, None]
+            variance = np.where(held, self.variance + self.pushed, variance)
+            time = np.where(held, PUSHED_TIME, time)
+        return variance, time
 
 
 def steps(blocks: Blocks) -> Array:
@@ -104,14 +106,16 @@ def torque_noise(
     if not stretches:
         return assumed_noise(log, dry)
     white, variance, time = fit_joints(stretches)
-    moving = ~np.concatenate([s.rests for s in stretches])
-    unseen = moving.mean(axis=0) < SEEN
+    seen = (~np.concatenate([s.rests for s in stretches])).mean(axis=0) >= SEEN
+    resting = np.maximum(variance, (REST_SHARE * dry) ** 2)
     return TorqueNoise(
         white=white,
-        moving=variance + unseen * (UNSEEN_SHARE * dry) ** 2,
-        moving_time=np.where(unseen, np.maximum(time, UNSEEN_TIME), time),
-        resting=np.maximum(variance, (REST_SHARE * dry) ** 2),
-        resting_time=np.maximum(time, REST_TIME),
+        variance=variance,
+        time=time,
+        dry=dry,
+        seen=seen,
+        at_rest=resting - variance,
+        pushed=~seen * (UNSEEN_SHARE * dry) ** 2 + RESETTLED * resting,
         free_seconds=float(sum(s.length.sum() for s in stretches)),
     )
 
@@ -131,10 +135,12 @@ def assumed_noise(log: Blocks, dry: Array) -> TorqueNoise:
         white = np.median(bend**2, axis=0) / (0.455 * 1.5)
     return TorqueNoise(
         white=np.maximum(white, LEAST_NOISE),
-        moving=moving**2,
-        moving_time=np.full(len(dry), USUAL_TIME),
-        resting=rest**2,
-        resting_time=np.full(len(dry), REST_TIME),
+        variance=moving**2,
+        time=np.full(len(dry), USUAL_TIME),
+        dry=dry,
+        seen=np.ones(len(dry), dtype=bool),
+        at_rest=rest**2 - moving**2,
+        pushed=RESETTLED * rest**2,
         near=NEAR_REST,
     )
 

@@ -52,18 +52,6 @@ def as_modelled(motion: FreeMotion) -> FreeLog:
         return FreeLog(motion.log, ())
 
 
-def carrying(found: SmoothedWrench, load: FreeLoad, run: Run) -> SmoothedWrench:
-    """A wrench that was found beside a load, with the load in it."""
-    q = resample_columns(found.t, run.t, run.q)
-    values, covariance = load.wrench(run.robot.chain, q)
-    return replace(
-        found,
-        values=found.values + values,
-        covariance=found.covariance + covariance,
-        load=load,
-    )
-
-
 def smoothed_wrench(
     found: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, motion: FreeMotion
 ) -> Wrench:
@@ -120,7 +108,16 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
     if gate is not None:
         bare = without_load(log.run, log.load)
         found = smooth_wrench(bare, free, gate.spans, gate.prior)
-        return found if log.load is None else carrying(found, log.load, log.run)
+        if log.load is None:
+            return found
+        q = resample_columns(found.t, log.run.t, log.run.q)
+        values, covariance = log.load.wrench(log.run.robot.chain, q)
+        return replace(
+            found,
+            values=found.values + values,
+            covariance=found.covariance + covariance,
+            load=log.load,
+        )
     if log.run is not plain.run:
         modelled = plain.known_free(unloaded)
         prior = prior_of(plain.run, modelled)

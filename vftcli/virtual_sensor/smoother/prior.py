@@ -37,15 +37,18 @@ class WrenchPrior(NamedTuple):
         moment = LEVER * self.force if self.moment is None else self.moment
         return np.repeat([self.force**2, moment**2], 3)
 
-    def decay(self, inside: Mask, step: Array) -> Array:
-        """Share that is kept from the block before; 0 where the gate opens and outside. (K,)
+    def course(self, inside: Mask, step: Array) -> tuple[Array, Array]:
+        """Share that is kept from the block before, and variance that is added. (K, 1), (K, 6)
+
+        None is kept where the gate opens, and outside, where none is added either.
 
         Args:
             inside: Blocks in which there may be a wrench. (K,)
             step: Time from the block before. (K,) [s]
         """
         goes_on = inside & np.concatenate([[False], inside[:-1]])
-        return np.where(goes_on, np.exp(-step / self.time), 0.0)
+        kept = np.where(goes_on, np.exp(-step / self.time), 0.0)[:, None]
+        return kept, np.where(inside[:, None], self.variance * (1.0 - kept**2), 0.0)
 
 
 STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
@@ -90,15 +93,14 @@ def wrench_model(
     decay, added = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
     step = steps(blocks)
     for g, prior in enumerate(priors):
-        kept = prior.decay(inside, step)[:, None]
-        decay[:, g, :6] = kept
-        added[:, g, :6] = np.where(inside[:, None], prior.variance * (1.0 - kept**2), 0.0)
+        decay[:, g, :6], added[:, g, :6] = prior.course(inside, step)
     # Where the whole log may be touched nothing tells a push from what it re-settles.
     pushed = inside if not inside.all() else np.zeros(count, dtype=bool)
-    kept = noise.decay(blocks, pushed)
+    variance, time = noise.course(blocks, pushed)
+    kept = np.exp(-step[:, None] / time)
     kept[0] = 0.0
     decay[:, :, 6:] = kept[:, None, :]
-    added[:, :, 6:] = (noise.variance(blocks, pushed) * (1.0 - kept**2))[:, None, :]
+    added[:, :, 6:] = (variance * (1.0 - kept**2))[:, None, :]
     known = blocks.known[:, None, None]
     return LinearModel(
         d=np.where(known, blocks.d[:, None], 0.0),

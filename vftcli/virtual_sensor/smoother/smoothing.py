@@ -92,7 +92,7 @@ class SmoothedWrench:
             "noise_sd_Nm": np.sqrt(noise.white).tolist(),
             "model_error_sd_Nm": np.sqrt(noise.moving).tolist(),
             "model_error_time_s": noise.moving_time.tolist(),
-            "model_error_at_rest_sd_Nm": np.sqrt(noise.resting).tolist(),
+            "model_error_at_rest_sd_Nm": np.sqrt(noise.variance + noise.at_rest).tolist(),
             "free_s": noise.free_seconds,
             "gated": self.gate,
             "correction_left_out": self.uncorrected,
@@ -217,12 +217,13 @@ def unlisted(blocks: Blocks, J: Array, noise: TorqueNoise, prior: WrenchPrior) -
     R, length = noise.white, float(np.median(blocks.length)) or FINE
     count = len(blocks.t)
     half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
-    kept = np.exp(-2.0 * length / noise.time(blocks))
-    added = noise.variance(blocks) * (1.0 - kept)
+    variance, time = noise.course(blocks)
+    kept = np.exp(-2.0 * length / time)
+    added = variance * (1.0 - kept)
     beta = R * (1.0 - kept) - added
     ahead = 0.5 * (np.sqrt(beta**2 + 4.0 * added * R) - beta)
-    touched = np.ones(count, dtype=bool)
-    v, kept = noise.variance(blocks, touched), np.exp(-2.0 * length / noise.time(blocks, touched))
+    v, time = noise.course(blocks, np.ones(count, dtype=bool))
+    kept = np.exp(-2.0 * length / time)
     quiet = ahead * R / (ahead + R)
     backward = v[::-1], kept[::-1], half
     behind, nothing = (coasted(each[::-1], *backward)[::-1] for each in (quiet, v))

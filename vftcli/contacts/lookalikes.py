@@ -1,4 +1,8 @@
-"""A contact that lasts for most of a log is a load, a wrong payload or a wrong model: its mean."""
+"""What looks like a contact and is none: what lasts for most of a log, and an abrupt stop.
+
+The first is a load, a wrong payload or a wrong model, and has a mean; the jerk of a brake looks
+like a knock.
+"""
 
 from dataclasses import replace
 
@@ -10,7 +14,7 @@ from vftcli.contacts.untouched import free_part
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
-from vftcli.signals.rest import REST, faster
+from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.virtual_sensor.smoother.smoothing import (
     DRIVES,
     SmoothedWrench,
@@ -26,6 +30,11 @@ ALIKE = 0.95
 #: The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]
 AROUND = 1.0
 PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
+SHORT = 0.3  #: Longest row that a stop explains. [s]
+#: When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
+#: row, which is known to a block. A knock on an arm that stood still is none of this. [s]
+BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
+LEFT = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
 
 
 def is_load(recording: Recording, contacts: tuple[Contact, ...]) -> bool:
@@ -96,3 +105,26 @@ def mean_and_spread(wrench: SmoothedWrench, start: float, stop: float) -> tuple[
     else:
         error = wrench.sd[inside].mean(axis=0)
     return mean, np.hypot(error, DRIVES * mean)
+
+
+def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:
+    """Whether a row begins where every joint that moved comes to rest at once, and is over soon.
+
+    Args:
+        recording: The log.
+        start: When the row begins. [s]
+        stop: When it ends. [s]
+        block: Length of a block. [s]
+    """
+    if stop - start > SHORT + block:
+        return False
+    t, speed = recording.t - start, np.abs(recording.require("dq"))
+    before, around, after = (
+        speed[(t >= first) & (t <= last)]
+        for first, last in (BEFORE, AT_STOP, (AFTER[0] + block, AFTER[1]))
+    )
+    if not len(before) or not len(after):
+        return False
+    rests = after.max(axis=0) < np.maximum(MOVES, LEFT * around.max(axis=0))
+    # A median, since noise must not pass for motion.
+    return bool(np.median(before, axis=0).max() > MOVES and rests.all())
