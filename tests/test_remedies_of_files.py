@@ -232,6 +232,7 @@ ROWS = [
 ]  # fmt: skip
 
 
+BAG = Path(__file__).parent.parent / "fixtures/panda_bag/panda_bag.mcap"
 COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
     "vftcli init LOG writes one": (
         on(same, "inspect", "--config", "my.toml"),
@@ -249,6 +250,9 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
     "of another log `vftcli estimate` writes": (
         on(same, "annotate", "-o", "out", "--robot", "ur5"),
         (on(same, "estimate", "-o", "out", *GMO),),
+    ),
+    "not a table of text": (
+        lambda _: ["inspect", BAG, "--format", "table"], (lambda _: ["inspect", BAG],),
     ),
 }  # fmt: skip
 """Error that names a command → what it refuses, and the commands that it names."""
@@ -314,7 +318,6 @@ NOTHING = "says what does not go together; what to do depends on the files of th
 ELSEWHERE = "tried in tests/test_remedies.py"
 DATASET = "needs a dataset with other features than the fixture's"
 CLUSTER = "needs a cluster, its certificates or an installation without Dask"
-LONG = "needs a log too long to be read in one piece"
 NAMED = "only names the option that is wrong, and what it may be"
 WITHOUT_ROW = {
     NAMED: (
@@ -347,7 +350,6 @@ WITHOUT_ROW = {
         "can run code as you", "workers need a certificate", "no Dask scheduler answers",
         "has no worker; start some",
     ),
-    LONG: ("cannot be mended: leave out --causal",),
 }  # fmt: skip
 """Why a text has no row, and words that only it has."""
 

@@ -102,8 +102,8 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
     if "dq" in source.derived:
         yield ProposedOption("the log has no velocities", "derive", "dq")
     if recording.payload_mass:
-        told = f"the controller assumes {recording.payload_mass:.3g} kg"
-        yield ProposedOption(told, "payload", "log", taken=False)
+        words = f"the controller assumes {recording.payload_mass:.3g} kg"
+        yield ProposedOption(words, "payload", "log", taken=False)
 
 
 def possible_robots(recording: Recording, error: RobotError) -> Iterator[ProposedOption]:
@@ -129,8 +129,8 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
             named = right.kind.replace("_", "-") if right.factor == 1.0 else "auto"
             return ProposedOption(in_words(finding).evidence, "effort", named)
     called = effort_name(recording, robot).replace("_", "-")
-    told = "as the log calls it; the robot's model explains no other reading clearly better"
-    return ProposedOption(told, "effort", called, taken=False)
+    words = "as the log calls it; the robot's model explains no other reading clearly better"
+    return ProposedOption(words, "effort", called, taken=False)
 
 
 def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
@@ -143,8 +143,10 @@ def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
         return ProposedOption(f"{label} is left out: {error}", taken=False)
     count = len(contacts.contacts) if contacts is not None else 0
     if count:
-        told = f"{label}: {count} contacts by this robot's model; take it if nobody touched the arm"
-        return ProposedOption(told, "free", [str(log)], taken=False)
+        words = (
+            f"{label}: {count} contacts by this robot's model; take it if nobody touched the arm"
+        )
+        return ProposedOption(words, "free", [str(log)], taken=False)
     return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
 
 
@@ -195,8 +197,8 @@ def reasons(recording: Recording) -> dict[str, str]:
         return others
     # A sensor measures in axes of its own; what stands in base axes is its controller's.
     del others["sensor"]
-    told = "the log holds a wrench of its controller: an estimate as well where no sensor is"
-    return {"two-cycle": others.pop("two-cycle"), "sensor": told, **others}
+    words = "the log holds a wrench of its controller: an estimate as well where no sensor is"
+    return {"two-cycle": others.pop("two-cycle"), "sensor": words, **others}
 
 
 #: Begins a file of options.

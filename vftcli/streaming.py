@@ -75,6 +75,6 @@ def analysed_in_blocks(
         from vftcli.virtual_sensor.torque_error import unknown_error
 
         hidden = np.concatenate(masked)
-        told = (*mask_remark(hidden, np.array([least])), *unknown_error().remarks)
-        sensed = replace(sensed, wrenches=(), masked=hidden, remarks=(*sensed.remarks, *told))
+        more = (*mask_remark(hidden, np.array([least])), *unknown_error().remarks)
+        sensed = replace(sensed, wrenches=(), masked=hidden, remarks=(*sensed.remarks, *more))
     yield replace(made, estimates=tuple(estimates), virtual_sensor=sensed), None

@@ -64,5 +64,5 @@ def test_a_size_that_depends_on_an_unknown_place_is_unknown() -> None:
 def test_a_pose_that_is_blind_along_an_axis_tells_no_least_force(
     least: float | None, told: float | None
 ) -> None:
-    assert contact_list(smallest_force=least).told_force == told
-    assert contact_list(smallest_force=float("nan")).told_force is None
+    assert contact_list(smallest_force=least).detectable_force == told
+    assert contact_list(smallest_force=float("nan")).detectable_force is None

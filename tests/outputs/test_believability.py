@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import polars as pl
 import pytest
 from contact_rows import contact, contact_list
 
@@ -190,10 +191,26 @@ def test_what_measures_the_force(analysis: Analysis, without_reference: Analysis
     (none,) = of(without, "no reference")
     assert none.standing == "unknown"
     vendor = contact_list(contact(vendor_force=61.2), contact(vendor_force=None))
-    (own,) = of(replace(without_reference, contacts=vendor), "no reference")
+    (own,) = of(replace(without_reference, contacts=vendor), "vendor")
     assert "61, – N at the peaks" in own.sentence
+    assert own.standing == "unknown"
     assert own.remedy is not None
     assert "--reference vendor" in own.remedy
+    sensor = contact_list(contact(sensor_force=3.0))
+    (measured,) = of(replace(without_reference, contacts=sensor), "force sensor")
+    assert measured.standing == "good"
+
+
+def test_the_references_error_is_the_mean_that_the_table_prints(analysis: Analysis) -> None:
+    """Over the joints at which the reference can be trusted, as in the screen's last line."""
+    assert analysis.errors is not None
+    rests = pl.col("joint") == 5
+    errors = analysis.errors.with_columns(
+        reference_trusted=~rests,
+        reference_floor_Nm=pl.when(rests).then(5.0).otherwise(pl.col("reference_floor_Nm")),
+    )
+    (ground,) = of(replace(analysis, errors=errors), "reference")
+    assert ground.sentence == "vendor without J5, its own error 0.5 N·m a joint"
 
 
 def test_the_rest_of_the_log(without_reference: Analysis) -> None:

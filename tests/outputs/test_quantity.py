@@ -2,7 +2,15 @@
 
 import pytest
 
-from vftcli.outputs.quantity import banded, counted, percent, signed, significant, vector
+from vftcli.outputs.quantity import (
+    at_least_shown,
+    banded,
+    counted,
+    percent,
+    signed,
+    significant,
+    vector,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,6 +38,12 @@ def test_a_share_has_one_digit_or_one_that_is_not_zero() -> None:
     assert percent(0.00099) == "0.1 %"
     assert percent(0.0004) == "0.04 %"
     assert percent(0.123) == "12.3 %"
+    assert percent(2e-7) == "<0.001 %"
+    assert percent(0.0) == "0 %"
+
+
+def test_a_force_that_shows_is_never_rounded_to_none() -> None:
+    assert [at_least_shown(force) for force in (0.31, 0.97, 4.4)] == ["0.3 N", "1 N", "4 N"]
 
 
 def test_values_bear_their_band_and_a_true_minus() -> None:

@@ -96,7 +96,7 @@ def log_facts(analysis: Analysis) -> dict[str, Any]:
         "hardest_N": None if hardest is None else hardest.peak_force,
         "hardest_band_N": None if hardest is None else hardest.peak_band,
         "hardest_s": None if hardest is None else hardest.peak,
-        "told_N": found.told_force,
+        "told_N": found.detectable_force,
     }
 
 

@@ -1,4 +1,4 @@
-"""Which contacts of a log thresholds would have caught: when, by what, and how hard they were."""
+"""Contacts of a log that thresholds would have detected: when, by what, and how hard they were."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ class ContactCheck:
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     #: Alarms that touch no contact, None where nothing says where they are.
     false_alarms: int | None = None
-    untouched_h: float = float("nan")  #: Time without contact, NaN likewise. [h]
+    untouched_h: float = float("nan")  #: Time without contact, NaN if not known. [h]
     remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
 
     @property

@@ -306,7 +306,7 @@ class ContactList(Shown):
         return self.basis == "free motion" and not any(c.is_load for c in self.contacts)
 
     @property
-    def told_force(self) -> float | None:
+    def detectable_force(self) -> float | None:
         """`smallest_force`, None without one or where the pose does not tell an axis. [N]"""
         least = self.smallest_force
         return least if least is not None and least < BLIND else None

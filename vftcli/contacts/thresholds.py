@@ -238,7 +238,7 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
 
     Args:
         free: Logs of one arm that nobody touched.
-        rate: False alarms of all joints together; of all axes likewise. [1/h]
+        rate: False alarms of all joints together; and as many of all axes. [1/h]
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")

@@ -78,8 +78,8 @@ def per_joint(value: Array | float, joints: int) -> Array:
     """One number a joint from one number or one a joint. (n,)"""
     found = np.asarray(value, dtype=np.float64)
     if found.size != 1 and found.shape != (joints,):
-        told = f"an observer's parameter has shape {found.shape}"
-        raise ShapeError(f"{told}; expected one number, or one a joint: ({joints},)")
+        words = f"an observer's parameter has shape {found.shape}"
+        raise ShapeError(f"{words}; expected one number, or one a joint: ({joints},)")
     return np.full(joints, found.ravel())
 
 
@@ -87,8 +87,8 @@ def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
     """A parameter as a list of numbers, one or one a joint. (1,) or (n,)"""
     found = number_array(value, name, observer)
     if found.ndim > 1:
-        told = f"{name} of {observer} has shape {found.shape}"
-        raise ShapeError(f"{told}; expected one number, or one a joint: (n,)")
+        words = f"{name} of {observer} has shape {found.shape}"
+        raise ShapeError(f"{words}; expected one number, or one a joint: (n,)")
     return frozen(np.atleast_1d(found))
 
 

@@ -297,8 +297,8 @@ class KalmanObserver(BlockObserver):
             return settled.prior
         given, joints = np.asarray(self.initial_covariance, np.float64), len(settled.prior.p11)
         if given.shape not in {(3,), (3, 1), (3, joints)}:
-            told = f"initial_covariance of {self.name} has shape {given.shape}"
-            raise ShapeError(f"{told}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
+            words = f"initial_covariance of {self.name} has shape {given.shape}"
+            raise ShapeError(f"{words}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
         return Covariance(*np.broadcast_to(given.reshape(3, -1), (3, joints)))
 
     def tuning(self, step: float, joints: int) -> Tuning:

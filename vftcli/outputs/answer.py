@@ -4,7 +4,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
-from vftcli.outputs.quantity import DASH, banded, counted, ranged
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, ranged
 from vftcli.outputs.remedies import LOADS
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
@@ -37,7 +37,7 @@ def otherwise(found: ContactList) -> str:
 
     A load leaves no rest, and an arm of few joints tells no force.
     """
-    least = found.told_force
+    least = found.detectable_force
     if found.smallest_force is None or any(c.is_load for c in found.contacts):
         return ""
     if least is None and np.isnan(found.smallest_force):
@@ -46,12 +46,14 @@ def otherwise(found: ContactList) -> str:
         return "A push along one axis may go unseen: the pose hardly shows it."
     if found.basis != "free motion":
         more = f" {counted(len(found.candidates), 'candidate')} more: --all."
-        return f"Pushes below {least:.0f} N do not show.{more if found.candidates else ''}"
+        return (
+            f"Pushes below {at_least_shown(least)} do not show.{more if found.candidates else ''}"
+        )
     rest = "Nothing else" if found.contacts else "Nothing"
     if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
         # Along the axes that are felt best less shows than along all.
-        return f"{rest} above {least:.0f} N (less at good poses)."
-    return f"{rest} above {least:.0f} N. Weaker pushes would not show."
+        return f"{rest} above {at_least_shown(least)} (less at good poses)."
+    return f"{rest} above {at_least_shown(least)}. Weaker pushes would not show."
 
 
 def answer(found: ContactList) -> str:

@@ -15,6 +15,7 @@ from vftcli.analysis import Analysis
 from vftcli.doctor.examination import REFUSING
 from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import RobotMatch
+from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.answer import free_words, hardest_words
 from vftcli.outputs.quantity import DASH, counted, percent
 from vftcli.outputs.remedies import (
@@ -94,7 +95,7 @@ def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:
         count,
         hardest,
         (most and most.peak_force) or 0.0,
-        None if listed is None else listed.told_force,
+        None if listed is None else listed.detectable_force,
         worst.standing,
         "sound" if worst.standing == "good" else f"{worst.subject}: {worst.sentence}",
     )
@@ -282,12 +283,15 @@ def joint_words(joints: Sequence[int]) -> str:
 def reference_ground(analysis: Analysis) -> Ground:
     """Whether anything measures the force independently of the observers."""
     if analysis.reference is not None:
-        floor = analysis.reference.floor
-        known = "" if floor is None else f", its own error {np.nanmean(floor):.2g} N·m a joint"
+        known = ""
+        means = None if analysis.errors is None else joint_means(analysis.errors)
+        if means is not None and np.isfinite(means.floor):
+            known = f"{means.left_out}, its own error {means.floor:.2g} N·m a joint"
         doubts = [sentence(r) for r in analysis.reference.remarks if r.level == "warning"]
         words = "; ".join(doubts) or f"{analysis.reference.name}{known}"
         return Ground("caution" if doubts else "good", "reference", words, of_log=False)
     contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
+    subject = "no reference"
     standing: Standing = "unknown"
     words, remedy = "no force sensor in the log: sizes are unchecked", None
     for kind, name in (("vendor", "the vendor's own estimate"), ("sensor", "the log's own sensor")):
@@ -301,7 +305,9 @@ def reference_ground(analysis: Analysis) -> Ground:
                 if contacts
                 else f"the log holds {name}"
             )
-            standing = "good" if kind == "sensor" else "unknown"
+            subject, standing = "force sensor", "good"
+            if kind == "vendor":
+                subject, standing = "vendor", "unknown"
             options = ("--reference", kind, "--robot", robot_option(analysis))
             remedy = command("compare", analysis.recording, *options)
-    return Ground(standing, "no reference", words, remedy, of_log=False)
+    return Ground(standing, subject, words, remedy, of_log=False)

@@ -35,6 +35,11 @@ def banded(value: float | None, band: float | None, form: str = ".0f", unit: str
     return f"{minus(format(value, form))} ± {band:{form}}{unit}"
 
 
+def at_least_shown(force: float) -> str:
+    """The least force that shows, never rounded down to none. [N]"""
+    return f"{force:.0f} N" if force >= 0.95 else f"{force:.1g} N"
+
+
 def ranged(low: float, high: float) -> str:
     """Between which forces something lies. [N]"""
     return f"{low:.0f}–{high:.0f} N"
@@ -53,4 +58,6 @@ def vector(values: Iterable[float]) -> str:
 def percent(share: float) -> str:
     """A share in per cent, with one digit behind the point, or one that is not zero."""
     value = 100.0 * share
+    if 0.0 < value < 0.001:
+        return "<0.001 %"
     return f"{value:.1f} %" if value >= 0.095 else f"{value:.1g} %"

@@ -25,7 +25,7 @@ from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks
 from vftcli.outputs.log.wrench_tables import contact_grids
-from vftcli.outputs.quantity import DASH, percent, significant
+from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
 
@@ -300,8 +300,8 @@ def log_table(
 def log_row(analysis: Analysis, line: LogSummary) -> list[str]:
     """Text of a log's line, without its health."""
     found, rest, error = analysis.contacts, DASH, DASH
-    if found is not None and found.told_force is not None and found.tells_untouched:
-        rest = f"{found.told_force:.0f} N"
+    if found is not None and found.detectable_force is not None and found.tells_untouched:
+        rest = at_least_shown(found.detectable_force)
     for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
         for value in [*block.means.errors.values()][:1]:
             error = f"{significant(value, 2)} N·m"

@@ -68,7 +68,7 @@ class TextTable:
         """The first lines that hold something, comments taken off."""
         lines = [decoded(line) for line in self.file.lines[:200]]
         if not lines:
-            raise LogError(f"{self.path}: not a table of text; vftcli inspect says what it is.")
+            raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")
         if len(self.file.lines) <= 200 and not self.file.is_whole:
             lines = lines[:-1] if len(lines) > 1 else lines  # the head may end inside a line
         lines[0] = lines[0].removeprefix("\ufeff")

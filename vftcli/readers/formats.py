@@ -156,10 +156,10 @@ def known_kind(file: LogFile) -> str | None:
     # The end of a zip archive names what it holds.
     if file.head.startswith(b"PK\x03\x04"):
         end = bytes(file.content[-HEAD_BYTES:])
-        for name, told in OFFICE.items():
+        for name, words in OFFICE.items():
             if name in end:
-                return told
-    return next((told for begins, told in KINDS if re.match(begins, file.head, re.DOTALL)), None)
+                return words
+    return next((words for begins, words in KINDS if re.match(begins, file.head, re.DOTALL)), None)
 
 
 def of_folder(path: Path, entries: Sequence[str]) -> str:

@@ -65,7 +65,7 @@ class Library:
     def label(self, path: str | Path) -> str:
         """What a log is called, a name that no other log of the command has."""
         at = absolute(path)
-        # A log that nobody announced is told from those that were, which keep their labels.
+        # A log without a label gets one that no other has.
         return self._labels.setdefault(at, labelled([at, *self._labels])[at])
 
     def open_logs(self, paths: Iterable[str | Path], choice: ReadChoice) -> tuple[Recording, ...]:
@@ -136,7 +136,7 @@ class LogCollection:
                     yield from self._inside(path) if path.is_dir() else self._parts(path)
 
     def _parts(self, path: Path) -> Iterator[LogEntry]:
-        """The episodes of a file, or itself: what cannot be read is told when it is read."""
+        """The episodes of a file, or itself: reading it says what is wrong."""
         try:
             reader = reading.recognise(path, self._choice)
             yield from self._episodes(path, reader)
@@ -196,7 +196,7 @@ class LogCollection:
                 yield from self._parts(path)
 
     def _may_be_log(self, path: Path) -> bool:
-        """Whether a file of a folder is taken; one that is damaged is, so that this is told."""
+        """Whether a file of a folder may be a log; a damaged one may, so that its error is seen."""
         if path.name.endswith((TRUTH, RECORD)):
             return False
         try:

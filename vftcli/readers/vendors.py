@@ -128,8 +128,8 @@ def read_states(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog
             columns[name] = field_of(file, states, name, (width,))
     table = ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
     mass = states[-1].get("m_load")
-    told = float(mass) if isinstance(mass, int | float) else None
-    return read_layout(table, layout, request, payload_mass=told)
+    mass_kg = float(mass) if isinstance(mass, int | float) else None
+    return read_layout(table, layout, request, payload_mass=mass_kg)
 
 
 def state_in(line: bytes) -> dict[str, Any] | None:

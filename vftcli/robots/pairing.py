@@ -1,4 +1,4 @@
-"""Pairing a log with its robot: joints by their names, a gear's motor side and turns taken off."""
+"""Pairing a log with its robot: joints by their names, the gear's motor side, and whole turns."""
 
 import re
 from collections.abc import Sequence

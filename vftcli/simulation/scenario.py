@@ -27,7 +27,7 @@ class FrictionSpec:
     enabled: bool = True  #: False for a frictionless arm.
     #: Dry friction of an arm whose robot file has no friction. (n,) [N·m]
     coulomb: tuple[float, ...] | None = None
-    viscous: tuple[float, ...] | None = None  #: Its viscous friction, likewise. (n,) [N·m·s/rad]
+    viscous: tuple[float, ...] | None = None  #: Its viscous friction. (n,) [N·m·s/rad]
     #: Torque at breakaway above the sliding Coulomb torque, as a share of it.
     stribeck: float = 0.0
     stribeck_velocity: float = 0.05  #: Velocity over which that excess fades. [rad/s]
@@ -201,7 +201,7 @@ class RandomWalkSpec:
     begin: float = 0.0  #: The walk is zero before this. [s]
 
 
-#: Contacts that act with a wrench on a link, told apart by their `kind`.
+#: Contacts that act with a wrench on a link, by their `kind`.
 WrenchSpec = ProfileSpec | PushesSpec | HandSpec | LoadSpec | StopSpec
 ContactSpec = WrenchSpec | RandomWalkSpec  #: Every kind of ``[[contacts]]`` a scenario can have.
 

@@ -53,7 +53,7 @@ def test_every_contact_has_its_stripe_its_number_and_its_course(pushed: Analysis
         assert f'href="#contact-{contact.number}"' in drawn
     assert drawn.count('class="force"') == drawn.count('class="band"') == len(found.contacts)
     assert drawn.count('class="peak"') == len(found.contacts)
-    assert drawn.count('class="untold"') == 1
+    assert drawn.count('class="unseen"') == 1
     assert re.search(r'fill="url\(#free-1024\)"', drawn)
 
 
@@ -68,7 +68,7 @@ def test_the_axis_holds_every_peak_with_its_band(pushed: Analysis) -> None:
     found = listed(pushed)
     tops = [(c.peak_force or 0.0) + (c.peak_band or 0.0) for c in found.contacts]
     assert highest(found) > max(tops)
-    assert highest(replace(found, contacts=())) == 2.5 * (found.told_force or 0.0)
+    assert highest(replace(found, contacts=())) == 2.5 * (found.detectable_force or 0.0)
     assert highest(replace(found, contacts=(), smallest_force=None)) == 1.0
 
 
@@ -95,9 +95,9 @@ def test_only_what_is_there_is_explained(pushed: Analysis, without_reference: An
     words = hero(pushed, listed(pushed))
     assert "Hatched: motion known to be free." in words
     assert "stopped" not in words
-    assert "Grey: below 4 N" in words
+    assert "Grey: too weak to detect (below 4 N)" in words
     stopped = replace(listed(pushed), stops=(3.0,), contacts=(), smallest_force=float("nan"))
-    assert stopped.told_force is None
+    assert stopped.detectable_force is None
     words = hero(without_reference, stopped)
     assert "Dashed: the arm stopped abruptly." in words
     assert "Grey" not in words

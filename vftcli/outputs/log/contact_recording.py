@@ -15,6 +15,7 @@ from vftcli.outputs.answer import beginning
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.palette import COLOURS, PLACES, SPARE
 from vftcli.outputs.palette import REFERENCE as GREY
+from vftcli.outputs.quantity import at_least_shown
 from vftcli.outputs.rerun_arm import ArmPoses, PaintedSpan, Stream, send_force
 from vftcli.outputs.rerun_file import BAR, CONTACTS, EDGES, LogLine
 from vftcli.robots.chain import Chain
@@ -53,10 +54,12 @@ def force_plot(analysis: Analysis) -> Chart | None:
     title = "|F| on the robot"
     if found is not None:
         title += " as at the flange, 95 % band; bars: touched; diamonds: peaks by place"
-        if found.told_force is not None:
-            least = np.full_like(size, found.told_force)
+        if found.detectable_force is not None:
+            least = np.full_like(size, found.detectable_force)
             lines.append(ChartLine("smallest that is listed", least, SPARE[7]))
-            title += f"; green: {found.told_force:.0f} N, the smallest that is listed"
+            title += (
+                f"; green: {at_least_shown(found.detectable_force)}, the smallest that is listed"
+            )
         # The peak of every contact with a force; a load has a mean and no peak.
         felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
         force = np.array([c.peak_force for c in felt], dtype=float)

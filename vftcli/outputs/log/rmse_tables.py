@@ -9,7 +9,7 @@ import polars as pl
 
 from vftcli.evaluation.errors import JointMeans, joint_means
 from vftcli.outputs.grid import Column, Grid, GridCell, joint_columns
-from vftcli.outputs.quantity import DASH, significant
+from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.arrays import Array, Mask
 
 #: An RMSE within this factor of the reference's floor may be the reference's own.
@@ -169,7 +169,7 @@ def details(row: dict[str, Any]) -> dict[str, str]:
         "95 % interval of the RMSE, moving-block bootstrap [N·m]": interval,
         "lag of the estimate behind the reference, best fit [ms]": DASH
         if lag is None
-        else f"{1e3 * lag:.0f}",
+        else minus(f"{round(1e3 * lag)}"),
         "samples within the estimate's 95 % band, while the joint moves": DASH
         if share is None
         else f"{100 * share:.0f} %",

@@ -62,7 +62,7 @@ def free_spans(analysis: Analysis) -> list[tuple[float, float]]:
 
 def highest(found: ContactList) -> float:
     """Upper end of the axis: peaks with bands, the least visible force, room. [N]"""
-    tops = [2.5 * (found.told_force or 0.0)]
+    tops = [2.5 * (found.detectable_force or 0.0)]
     for contact in found.contacts:
         if contact.peak_force is not None and contact.peak_band is not None:
             tops.append(1.12 * (contact.peak_force + min(contact.peak_band, contact.peak_force)))

@@ -95,7 +95,7 @@
         const line = series.lines[this.panel], x = Array.from(new Float32Array(bytes(line.x))), y = values(line.y);
         const stroke = ink(series.colour), columns = [y];
         drawn.push({ label: series.name, stroke, width: series.colour === "reference" ? 4 : series.leads ? 2 : 1.3, dash: series.dash, points: { show: false }, entry: k });
-        for (const [ribbon, fill] of [[line.half, `${stroke}30`], [line.quiet, css("--untold")]]) {
+        for (const [ribbon, fill] of [[line.half, `${stroke}30`], [line.quiet, css("--unseen")]]) {
           if (!ribbon) continue;
           const half = values(ribbon), at = drawn.length, edge = (sign) => y.map((v, i) => (v === null || half[i] === null ? null : v + sign * half[i]));
           columns.push(edge(1), edge(-1));
@@ -140,7 +140,7 @@
         ctx.fillRect(place(start, "x"), bbox.top, Math.max(place(stop, "x") - place(start, "x"), 1), bbox.height);
       const band = this.spec.band && this.spec.band[this.panel];
       if (band) {
-        ctx.fillStyle = css("--untold");
+        ctx.fillStyle = css("--unseen");
         ctx.fillRect(bbox.left, place(band, "y"), bbox.width, place(-band, "y") - place(band, "y"));
       }
       ctx.restore();

@@ -27,7 +27,7 @@ from vftcli.outputs.page import details, log_charts
 from vftcli.outputs.page.charts import Chart, observer_lines
 from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
 from vftcli.outputs.page.shell import page, part
-from vftcli.outputs.quantity import DASH, banded, counted, significant
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.signals.remarks import sentence
 from vftcli.virtual_sensor.frames import FRAMES
 
@@ -42,8 +42,8 @@ def render(analysis: Analysis) -> str:
     """The report of one log: self-contained, nothing is loaded from anywhere."""
     found, record = analysis.contacts, analysis.run or run_record(analysis, "")
     torque, wrench = log_charts.torque_chart(analysis), log_charts.wrench_chart(analysis)
-    untold = [r for r in analysis.remarks if r.code == "contacts-not-told"]
-    sentences = [f"What touched the arm is unknown: {sentence(r)}." for r in untold]
+    unlisted = [r for r in analysis.remarks if r.code == "contacts-not-told"]
+    sentences = [f"What touched the arm is unknown: {sentence(r)}." for r in unlisted]
     view: dict[str, Any] = {"grounds": grounds(analysis), "record": record}
     if found is not None:
         sentences = [otherwise(found)]
@@ -203,7 +203,7 @@ def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
         f"{line.duration:.1f} s",
         line.contacts,
         line.hardest,
-        DASH if line.least is None else f"{line.least:.0f} N",
+        DASH if line.least is None else at_least_shown(line.least),
         line.error,
         GridCell(f"{MARKS[line.standing]} {line.words}", html=part("parts/state", line, MARKS)),
     )
@@ -212,7 +212,7 @@ def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
 def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     """The page over a batch."""
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
-    told = sum(line.contacts != DASH for line in lines)
+    listed = sum(line.contacts != DASH for line in lines)
     count = failures.height
     grid = Grid(
         columns=tuple(Column(head, words=True) for head in ("Log", "Stage", "Error", "Why")),
@@ -223,7 +223,7 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     )
     return page(
         "logs.html",
-        f"{len(lines)} logs" + (f", {touched} of {told} touched." if told else "."),
+        f"{len(lines)} logs" + (f", {touched} of {listed} touched." if listed else "."),
         scripts=["sort.js"],
         eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
         words=f"{counted(count, 'log')} could not be analysed." if count else "",

@@ -15,7 +15,7 @@ from vftcli.outputs.answer import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.page import svg
 from vftcli.outputs.page.charts import QUIET, Chart, LineStyle, packed_charts
-from vftcli.outputs.quantity import counted, ranged
+from vftcli.outputs.quantity import at_least_shown, counted, ranged
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import Remark, explanation
 
@@ -49,7 +49,16 @@ def templates() -> "Environment":
         "is_plain": re.compile(r"[\w.,=× -]+").fullmatch,
         "QUIET": QUIET,
     }
-    functions = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
+    functions = (
+        overridden_lines,
+        in_words,
+        direction,
+        force_size,
+        place_words,
+        ranged,
+        reason,
+        at_least_shown,
+    )
     drawing = (svg.ticks, svg.decades, svg.label, svg.scales_of, svg.stripes, svg.strokes)
     made.globals |= {each.__name__: each for each in (*functions, svg.polyline, *drawing)}
     made.filters |= {
