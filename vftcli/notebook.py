@@ -39,7 +39,6 @@ def report(
     observers: Sequence[str] = (),
     reference: str | None = None,
     free: Sequence[str | Path] = (),
-    free_part: str | None = None,
     columns: str | None = None,
     interval: str | None = None,
     output: str | Path | None = None,
@@ -53,7 +52,6 @@ def report(
         observers: Which run, as "best" and "gmo"; the default of the command if none.
         reference: What the estimates are compared with: zero, two-cycle, vendor, sensor, file:PATH.
         free: Motion that nobody touched: other logs, or spans ``A:B`` of this one. [s]
-        free_part: The same as one span ``A:B``. [s]
         columns: Columns of a table, as ``--columns``.
         interval: The span ``A:B`` to use. [s]
         output: A folder for page, recording and tables; None to write nothing.
@@ -70,7 +68,7 @@ def report(
     from vftcli.outputs.log.run_record import all_remarks
 
     choice = replace(
-        log_choice(log, robot, free, free_part, columns, interval),
+        log_choice(log, robot, free, columns, interval),
         observers=ObserverChoice.parsed(observer=words_of(observers, "observers")),
         reference=None if reference is None else ReferenceChoice(name=reference),
     )
@@ -89,7 +87,6 @@ def contacts(
     robot: NamedRobot = None,
     *,
     free: Sequence[str | Path] = (),
-    free_part: str | None = None,
     columns: str | None = None,
     interval: str | None = None,
 ) -> "ContactList":
@@ -99,14 +96,13 @@ def contacts(
         log: The log.
         robot: The arm.
         free: Motion that nobody touched: other logs, or spans ``A:B`` of this one. [s]
-        free_part: The same as one span ``A:B``. [s]
         columns: Columns of a table, as ``--columns``.
         interval: The span ``A:B`` to use. [s]
 
     Raises:
         VftError: If the log cannot be read, or is meaningless with this robot.
     """
-    choice = log_choice(log, robot, free, free_part, columns, interval)
+    choice = log_choice(log, robot, free, columns, interval)
     found = answered(log, robot, choice, list_touches).contacts
     assert found is not None, "a log that tells no contacts raises"
     return found
@@ -139,7 +135,7 @@ def thresholds(
         raise ParameterError("no log is given; thresholds are learned from motion nobody touches")
     models, runs = Runs(), []
     for log in logs:
-        choice = log_choice(log, robot, (), None, columns, interval)
+        choice = log_choice(log, robot, (), columns, interval)
         runs.append(modelled(*laid(log, robot, choice), choice, models))
     found = find_thresholds([compared_signals(run) for run in runs], rate)
     return replace(found, remarks=(*found.remarks, *(r for run in runs for r in touched(run))))
@@ -149,7 +145,6 @@ def log_choice(
     log: Log,
     robot: NamedRobot,
     free: Sequence[str | Path],
-    free_part: str | None,
     columns: str | None,
     interval: str | None,
 ) -> AnalysisChoice:
@@ -158,7 +153,7 @@ def log_choice(
     Raises:
         ParameterError: If they are of another kind than is expected.
     """
-    words = {"free_part": free_part, "columns": columns, "interval": interval}
+    words = {"columns": columns, "interval": interval}
     for key, word in words.items():
         if not isinstance(word, str | None):
             raise ParameterError(f"{key} is {word!r}; expected a text, as interval='0:4'")
@@ -172,7 +167,7 @@ def log_choice(
     return AnalysisChoice(
         read=ReadChoice.parsed(columns=columns, interval=interval),
         robot=RobotChoice.parsed(robot=name),
-        free=FreeChoice.parsed(free=words_of(free, "free"), free_part=free_part),
+        free=FreeChoice.parsed(free=words_of(free, "free")),
         library=Library([] if isinstance(log, Recording) else [log]),
     )
 

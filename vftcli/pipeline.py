@@ -280,7 +280,7 @@ def refine(
         return analysis
     from vftcli.refinement import refine as room
 
-    bias, of_file = choice.refinement.remove_bias, choice.observers.of_robot_file
+    bias, of_file = choice.refinement.bias, choice.observers.of_robot_file
     made = room.refine(
         baselines, analysis.observers, analysis.estimates, bias, gains_of_file=of_file
     )

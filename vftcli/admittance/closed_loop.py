@@ -171,7 +171,7 @@ def run_closed_loop(
     seed: int | None = None,
     torque: str = "average",
     zero: tuple[float, float] | None = None,
-    force_unstable: bool = False,
+    anyway: bool = False,
     progress: Progress | None = None,
 ) -> ClosedLoop:
     """Run a scenario's contacts against an arm under admittance control.
@@ -185,12 +185,12 @@ def run_closed_loop(
         seed: Seed of everything drawn; the scenario's own if not given.
         torque: "average" over the sampling interval, or the last "instant".
         zero: Unloaded span, None for none: the arm holds still, its mean wrench is removed. [s]
-        force_unstable: Run unstable settings too.
+        anyway: Run unstable settings too.
         progress: Told how far the run is.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")
-    check_stable([controller], force_unstable=force_unstable)
+    check_stable([controller], anyway=anyway)
     period = controller.parameters.period
     arm = still_arm(scenario, period, seed)
     loop, log = Loop(arm, controller, observer, torque), list[dict[str, Any]]()

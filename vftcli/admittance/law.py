@@ -223,14 +223,14 @@ def judge(controller: Controller) -> Verdict:
 def check_stable(
     controllers: Sequence[Controller],
     *,
-    force_unstable: bool = False,
+    anyway: bool = False,
     release: Array | None = None,
 ) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
     """Judge controllers before they run, and refuse what would be unstable.
 
     Args:
         controllers: The controllers.
-        force_unstable: Run them all the same, for study.
+        anyway: Run them all the same, for study.
         release: The deviation of a release from rest, if they run for that alone: an axis that
             starts inside the escape bound needs no speed limit. (6,) [m, rad]
 
@@ -241,7 +241,7 @@ def check_stable(
     # Under a hand any deviation can come about; only a release has a size.
     size = np.inf if release is None else np.abs(release)
     grave = [remark for verdict in verdicts for remark in verdict.complaints(size)]
-    if grave and not force_unstable:
+    if grave and not anyway:
         more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise UnstableError(
             f"unstable: {grave[0]}{more}. Change the parameters, or study it with --force-unstable."

@@ -74,7 +74,7 @@ def replay(
     controllers: Sequence[Controller],
     *,
     source: Remark,
-    force_unstable: bool = False,
+    anyway: bool = False,
 ) -> Replay:
     """Run a log's wrench through controllers that hold the arm at the log's first pose.
 
@@ -86,11 +86,11 @@ def replay(
         parameters: Thresholds and control period, shared by the controllers.
         controllers: The controllers.
         source: Where the wrench comes from.
-        force_unstable: Run unstable settings too.
+        anyway: Run unstable settings too.
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
-    verdicts, complaints = check_stable(controllers, force_unstable=force_unstable)
+    verdicts, complaints = check_stable(controllers, anyway=anyway)
     solver = FlangeSolver(robot)
     clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
     start = solver.check_start(q[0])
@@ -117,7 +117,7 @@ def replay_release(
     *,
     start: Array,
     duration: float | None = None,
-    force_unstable: bool = False,
+    anyway: bool = False,
 ) -> Replay:
     """Let go of the arm at rest at deviation `x` (6,) [m, rad] from the pose `start` (n,) [rad].
 
@@ -127,7 +127,7 @@ def replay_release(
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
         )
-    verdicts, complaints = check_stable(controllers, force_unstable=force_unstable, release=x)
+    verdicts, complaints = check_stable(controllers, anyway=anyway, release=x)
     solver = FlangeSolver(robot)
     q = solver.check_start(start)
     motion = release(controllers, x, duration or settling(controllers, x))

@@ -41,7 +41,7 @@ from vftcli.signals.errors import LogError
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
 #: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
 FEW = 32
-HERE = WorkersChoice(workers=0)  #: This process alone.
+HERE = WorkersChoice(jobs=0)  #: This process alone.
 
 
 class FileTask(NamedTuple):

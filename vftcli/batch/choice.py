@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, Option
+from vftcli.signals.option import Choice, Option, setting
 
 ADDRESS = re.compile(r"(tcp|tls)://[^\s/]+:[0-9]{1,5}")  #: tcp://host:8786
 MEMORY = 1.5e9  #: What a worker needs of the machine's memory at least. [B]
@@ -21,101 +21,90 @@ class WorkersChoice(Choice):
 
     #: How many processes of this machine; 0 for this process alone, None for as many as it has
     #: cores and memory for.
-    workers: Annotated[
+    jobs: Annotated[
         int | None,
         Option(
-            "--workers",
+            "--jobs",
             "N",
-            "Processes of this machine. Default: one a core, at most 8. 0 does one log after the "
-            "other in this process, and needs no Dask.",
+            "Use N processes; default: one a core, at most 8.",
             least=0,
             most=4096,
         ),
     ] = None
     #: Address of a running Dask scheduler, or None.
-    scheduler: Annotated[
+    address: Annotated[
         str | None,
-        Option(
-            "--scheduler",
-            "ADDRESS",
-            "A running Dask cluster. As tls://host:8786; tcp://, open to everyone, needs --anyway.",
-        ),
+        setting("cluster.address", "ADDRESS", "A running Dask cluster, as tls://host:8786."),
     ] = None
     #: What a worker of this machine may take before it is ended, None for its share. [GB]
-    worker_memory: Annotated[
+    memory_gb: Annotated[
         float | None,
-        Option(
-            "--worker-memory",
+        setting(
+            "cluster.memory-gb",
             "GB",
-            "What a process of this machine may take before it is ended; default: its share.",
-            seldom=True,
+            "Memory of a process of this machine; default: its share.",
             least=0.1,
         ),
     ] = None
-    tls_ca: Annotated[
+    ca: Annotated[
         Path | None,
-        Option("--tls-ca", "FILE", "Certificate of the authority, for tls://.", seldom=True),
+        setting("cluster.ca", "FILE", "Certificate of the cluster's authority.", Path),
     ] = None
-    tls_cert: Annotated[
-        Path | None,
-        Option("--tls-cert", "FILE", "Own certificate, for tls://.", seldom=True),
-    ] = None
-    tls_key: Annotated[
-        Path | None, Option("--tls-key", "FILE", "Its key, for tls://.", seldom=True)
-    ] = None
+    cert: Annotated[Path | None, setting("cluster.cert", "FILE", "Own certificate.", Path)] = None
+    key: Annotated[Path | None, setting("cluster.key", "FILE", "Its key.", Path)] = None
 
     def __post_init__(self) -> None:
         if len(self.tls) in {1, 2}:
-            raise ParameterError("--tls-ca, --tls-cert and --tls-key are given together")
-        if self.scheduler is not None:
-            self._check_address(self.scheduler)
+            raise ParameterError("cluster.ca, cluster.cert and cluster.key are given together")
+        if self.address is not None:
+            self._check_address(self.address)
         elif self.tls:
             raise ParameterError(
-                "--tls-… are for the workers of a cluster; add --scheduler ADDRESS"
+                "cluster.ca, cert and key are for a cluster; add --set cluster.address=ADDRESS"
             )
         if not self.in_process and not is_installed():
             raise ParameterError(
-                f"--workers and --scheduler need Dask and cryptography: {EXTRA}, or --workers 0"
+                f"--jobs and cluster.address need Dask and cryptography: {EXTRA}, or --jobs 0"
             )
 
     def _check_address(self, address: str) -> None:
         if not ADDRESS.fullmatch(address):
             raise ParameterError(
-                f"--scheduler {address!r} is no address, as tcp://host:8786 or tls://host:8786"
+                f"cluster.address={address} is no address, as tcp://host:8786 or tls://host:8786"
             )
         if address.startswith("tls") != bool(self.tls):
             raise ParameterError(
-                "tls:// and --tls-ca, --tls-cert, --tls-key (all three) belong together"
+                "tls:// and cluster.ca, cluster.cert, cluster.key (all three) belong together"
             )
-        if self.workers is not None:
-            raise ParameterError("--scheduler has its own workers; leave --workers out")
+        if self.jobs is not None:
+            raise ParameterError("a cluster has its own workers; leave --jobs out")
 
     @property
     def tls(self) -> tuple[Path, ...]:
         """The files of the authority's certificate, the own certificate and its key, or none."""
-        given = (self.tls_ca, self.tls_cert, self.tls_key)
+        given = (self.ca, self.cert, self.key)
         return tuple(path for path in given if path is not None)
 
     @property
     def memory(self) -> int | None:
         """Bytes that a worker of this machine may take before it is ended, None for its share."""
-        return None if self.worker_memory is None else int(self.worker_memory * 1e9)
+        return None if self.memory_gb is None else int(self.memory_gb * 1e9)
 
     def check_closed(self, *, anyway: bool) -> None:
         """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""
-        if self.scheduler is not None and self.scheduler.startswith("tcp") and not anyway:
+        if self.address is not None and self.address.startswith("tcp") and not anyway:
             raise ParameterError(
-                f"--scheduler {self.scheduler}: anyone who reaches a tcp:// cluster can run code "
-                "as you; use tls:// with --tls-ca, --tls-cert and --tls-key, or --anyway where "
-                "you trust everyone on its network"
+                f"cluster.address={self.address}: anyone who reaches a tcp:// cluster can run code "
+                "as you; use tls:// with cluster.ca, cert and key, or --anyway where you "
+                "trust everyone on its network"
             )
 
     @property
     def in_process(self) -> bool:
         """Whether the work is done here, one piece after the other."""
-        if self.scheduler is not None:
+        if self.address is not None:
             return False
-        return self.workers == 0 or (self.workers is None and not is_installed())
+        return self.jobs == 0 or (self.jobs is None and not is_installed())
 
 
 def is_installed() -> bool:

@@ -81,14 +81,14 @@ def run_tasks(
     times in all. Closing the iterator ends what has not begun.
     """
     if choice.in_process:
-        if choice.workers is None:
+        if choice.jobs is None:
             tell(f"one log after the other; to use every core: {EXTRA}")
         for group in groups:
             for task in group:
                 yield Outcome(task, *perform(work, task))
         return
     with connected(choice, seen, tell) as client:
-        yield from outcomes(client, groups, work, standing=choice.scheduler is not None)
+        yield from outcomes(client, groups, work, standing=choice.address is not None)
 
 
 @contextmanager
@@ -101,7 +101,7 @@ def connected(
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # outcomes report who dies
     with dask.config.set(dict(CONFIG)):
-        if choice.scheduler is None:
+        if choice.address is None:
             with local(choice, tell) as client:
                 yield client
         else:
@@ -123,7 +123,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
 
     # As many as this machine has cores and memory for.
     most = max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
-    workers = choice.workers or most
+    workers = choice.jobs or most
     memory = choice.memory or int(MEMORY_LIMIT / workers)
     try:
         security = Security.temporary()
@@ -156,10 +156,10 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
             require_encryption=True,
         )
     try:
-        client = Client(choice.scheduler, security=security, timeout=ANSWER)
+        client = Client(choice.address, security=security, timeout=ANSWER)
     except Exception as error:  # noqa: BLE001 - what answers there may be anything
         raise EngineError(
-            f"no Dask scheduler answers at {choice.scheduler} within {ANSWER:g} s "
+            f"no Dask scheduler answers at {choice.address} within {ANSWER:g} s "
             f"({failure_of(error).line[:120]}); start one with `dask scheduler`, or leave "
             "--scheduler out"
         ) from None
@@ -168,10 +168,10 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
             client.wait_for_workers(1, timeout=ANSWER)
         except TimeoutError:
             raise EngineError(
-                f"the scheduler at {choice.scheduler} has no worker; start some with `dask worker "
-                f"{choice.scheduler} --nthreads 1`"
+                f"the scheduler at {choice.address} has no worker; start some with `dask worker "
+                f"{choice.address} --nthreads 1`"
             ) from None
-        tell(f"{len(client.nthreads())} workers of {choice.scheduler}")
+        tell(f"{len(client.nthreads())} workers of {choice.address}")
         yield client
 
 

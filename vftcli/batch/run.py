@@ -76,7 +76,7 @@ class BatchRun:
     def groups(self) -> Iterator[list[LogTask]]:
         """The logs that are to be done, those of equal bytes once; small ones go together."""
         there, begun = self.folder.keys(), set[str]()
-        workers = max(1, self.workers.workers or 4)
+        workers = max(1, self.workers.jobs or 4)
         most = max(1, min(TOGETHER, len(self.logs) // (SHARES * workers)))
         group: list[LogTask] = []
         room = float(most)

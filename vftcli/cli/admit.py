@@ -9,9 +9,12 @@ import typer
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
+from vftcli.evaluation.reference_choice import FILE
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from vftcli.admittance.closed_loop import ClosedLoop
     from vftcli.admittance.driving_force import DrivingForce
     from vftcli.admittance.replay import Replay
@@ -22,68 +25,6 @@ if TYPE_CHECKING:
 
 #: Whose estimate is the force unless another is named: the paper drives its controller with it.
 OBSERVER = "kfo-fe"
-WITHOUT_LOG = "Without a log"  #: Heading of what needs none.
-
-
-class ReleaseOptions(opt.Bundle):
-    """A release from rest, without a log."""
-
-    GROUP = WITHOUT_LOG
-
-    release: Annotated[
-        list[str] | None,
-        Option("--release", "AXIS=VALUE", "Replay a release from rest: x=0.3 [m], rz=0.5 [rad]."),
-    ]
-    start: Annotated[
-        str | None,
-        Option(
-            "--start",
-            "Q1,Q2,…",
-            "Start pose of a release [rad]; default the profile's.",
-            seldom=True,
-        ),
-    ]
-    duration: Annotated[
-        float | None,
-        Option("--duration", "S", "Length of a release; default until it is over.", seldom=True),
-    ]
-
-
-class LoopOptions(opt.Bundle):
-    """A controller in the loop of a simulation, without a log."""
-
-    GROUP = WITHOUT_LOG
-
-    closed_loop: Annotated[
-        str | None,
-        Option(
-            "--closed-loop",
-            "SCENARIO",
-            "Run a scenario against the controller. Its contacts are simulated, then the force "
-            "that it acted on is replayed.",
-        ),
-    ]
-    seed: Annotated[int | None, opt.SEED._replace(seldom=True)]
-    torque: Annotated[
-        str,
-        Option(
-            "--torque", "average|instant", "What the closed loop's sensors report.", seldom=True
-        ),
-    ] = "average"
-
-
-class ForceOptions(opt.Bundle):
-    """Which force drives the replay, if not an observer's."""
-
-    GROUP = "The force"
-
-    sensor: Annotated[bool, Option("--sensor", "", "Take the log's own wrench.")]
-    truth: Annotated[
-        Path | None,
-        Option(
-            "--truth", "FILE", "Take the wrench of a truth file, flange, base axes.", seldom=True
-        ),
-    ]
 
 
 class ShownOptions(opt.Bundle):
@@ -91,20 +32,24 @@ class ShownOptions(opt.Bundle):
 
     figures: opt.Figures
     json: opt.Json
-    latex: Annotated[bool, opt.LATEX._replace(seldom=True, group=OUTPUT)]
+    latex: Annotated[bool, opt.LATEX._replace(group=OUTPUT)]
 
 
 @opt.command
 def admit(
     controllers: opt.Typed[ControlChoice],
-    release: ReleaseOptions,
-    loop: LoopOptions,
-    source: ForceOptions,
+    release: Annotated[
+        list[str] | None,
+        Option(
+            "--release", "AXIS=VALUE", "Release from rest, without a log: x=0.3 [m], rz=0.5 [rad]."
+        ),
+    ],
+    seed: Annotated[int | None, opt.SEED],
     analysis: AnalysisOptions,
     shown: ShownOptions,
     log: Annotated[
         Path | None,
-        Option("", "[LOG]", "A log or an estimates.parquet; none with --release."),
+        Option("", "[LOG|SCENARIO]", "A log, an estimates.parquet, or a scenario to simulate."),
     ],
     output: Annotated[
         Path | None,
@@ -115,27 +60,23 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    Traditional ones and variable-parameter ones. Writes DIR/index.html, motion.parquet,
-    comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe unless another
-    is named. --set also takes the controllers' parameters:
-    position.stiffness=12, rz.threshold=4, admittance.xi=1.
+    The traditional controller and variable-parameter ones. Writes DIR/index.html,
+    motion.parquet, comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe
+    unless you name another. A scenario runs with the controller in the loop.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
-    from vftcli.admittance.choice import split_settings
     from vftcli.cli.console import command_line, say, say_left_out
     from vftcli.cli.opening import open_made
     from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
+    from vftcli.simulation.load import listing
 
-    asked = log is not None, bool(release.release), loop.closed_loop is not None
-    if sum(asked) != 1:
-        raise typer.BadParameter("give one of LOG, --release AXIS=VALUE, --closed-loop SCENARIO")
+    if (log is None) != bool(release):
+        raise typer.BadParameter("give one of LOG, SCENARIO, --release AXIS=VALUE")
     check_installed("pinocchio", "vftcli admit")
-    typed = analysis.observers.words
-    own, typed["set"] = split_settings(typed["set"] or ())
-    control = replace(controllers.choice(), assignments=tuple(own), as_printed=typed["as_printed"])
+    control = replace(controllers.choice(), as_printed=analysis.observers.words["as_printed"])
     form = shown.figures
     if output is not None:
         OutputFolder(output, force, files_of_replay(form)).check()
@@ -145,12 +86,12 @@ def admit(
         raise typer.BadParameter("choose one of --json and --latex")
     recording, run = None, None
     examinations: tuple[Examination, ...] = ()
-    if loop.closed_loop is not None:
-        result, run = looped(loop, analysis, control)
-    elif log is None:
-        result = released(release, analysis, control)
+    if log is None:
+        result = released(release or [], analysis, control)
+    elif not log.exists() and str(log) in dict(listing()):
+        result, run = looped(str(log), seed, analysis, control)
     else:
-        result, recording, examinations = replayed(log, source, analysis, control)
+        result, recording, examinations = replayed(log, analysis, control)
     show(result, run, shown)
     if output is not None:
         write_admittance(
@@ -188,14 +129,14 @@ def chosen(analysis: AnalysisOptions, log: Path | None = None) -> "AnalysisChoic
 
 
 def released(
-    release: ReleaseOptions, analysis: AnalysisOptions, control: ControlChoice
+    release: "Sequence[str]", analysis: AnalysisOptions, control: ControlChoice
 ) -> "Replay":
     """A release from rest."""
-    from vftcli.admittance.choice import released_robot, start_pose
+    from vftcli.admittance.choice import released_robot
     from vftcli.admittance.parameters import release_deviation
     from vftcli.admittance.replay import replay_release
 
-    deviation = release_deviation(release.release or ())
+    deviation = release_deviation(release)
     arm = released_robot(chosen(analysis).robot)
     settings = control.parameters(arm)
     return replay_release(
@@ -203,14 +144,14 @@ def released(
         arm,
         settings,
         control.controllers(settings),
-        start=start_pose(arm, release.start),
-        duration=release.duration,
-        force_unstable=control.force_unstable,
+        start=control.start_pose(arm),
+        duration=control.duration,
+        anyway=analysis.anyway,
     )
 
 
 def replayed(
-    log: Path, source: ForceOptions, analysis: AnalysisOptions, control: ControlChoice
+    log: Path, analysis: AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, Recording, tuple[Examination, ...]]":
     """A log's force through every controller."""
     from vftcli.admittance.replay import replay
@@ -230,7 +171,7 @@ def replayed(
     if stored is None:  # estimates of an earlier run were examined in it
         choice.examiner.examine(recording, arm)
     settings = control.parameters(arm)
-    driving = force_of(recording, arm, choice, source, stored)
+    driving = force_of(recording, arm, choice, control.force, stored)
     result = replay(
         driving.wrench,
         recording.q,
@@ -238,7 +179,7 @@ def replayed(
         settings,
         control.controllers(settings),
         source=driving.source,
-        force_unstable=control.force_unstable,
+        anyway=analysis.anyway,
     )
     result = replace(result, remarks=(*driving.remarks, *result.remarks))
     return result, recording, choice.examiner.examinations
@@ -248,20 +189,19 @@ def force_of(
     recording: "Recording",
     robot: "Robot",
     choice: "AnalysisChoice",
-    source: ForceOptions,
+    source: str | None,
     stored: str | None,
 ) -> "DrivingForce":
     """The wrench that drives the replay."""
     from vftcli.admittance import driving_force
     from vftcli.pipeline import analyse
 
-    if source.sensor and source.truth is not None:
-        raise typer.BadParameter("choose one of --sensor and --truth")
     assert choice.wrench is not None, "`chosen` asks for one"
-    if source.truth is not None:
-        return driving_force.truth_force(recording, robot, choice.wrench, source.truth)
-    if source.sensor:
+    if source == "sensor":
         return driving_force.sensor_force(recording, robot, choice.wrench)
+    if source is not None:
+        truth = Path(source.removeprefix(FILE))
+        return driving_force.truth_force(recording, robot, choice.wrench, truth)
     if stored is not None:
         return driving_force.stored_force(recording, robot, choice.wrench, stored)
     reading = analyse(recording, robot, choice).virtual_sensor
@@ -270,7 +210,7 @@ def force_of(
 
 
 def looped(
-    loop: LoopOptions, analysis: AnalysisOptions, control: ControlChoice
+    name: str, seed: int | None, analysis: AnalysisOptions, control: ControlChoice
 ) -> "tuple[Replay, ClosedLoop]":
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
@@ -287,8 +227,8 @@ def looped(
     assert choice.wrench is not None, "`chosen` asks for one"
     zero = choice.wrench.zero
     if zero.start:
-        raise ParameterError("--closed-loop holds still over a span: give it as --zero A:B")
-    scenario = load_scenario(str(loop.closed_loop), ())
+        raise ParameterError("the closed loop holds still over a span: give it as --zero A:B")
+    scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     settings = control.parameters(arm)
     step = 1.0 / log_rate(scenario.sensing, arm)
@@ -300,10 +240,10 @@ def looped(
         scenario,
         controllers[-1],
         observer,
-        seed=loop.seed,
-        torque=loop.torque,
+        seed=seed,
+        torque=control.loop_torque,
         zero=zero.spans[0] if zero.spans else UNLOADED,
-        force_unstable=control.force_unstable,
+        anyway=analysis.anyway,
         progress=progress_bar(),
     )
     result = replay(
@@ -313,7 +253,7 @@ def looped(
         settings,
         controllers,
         source=fact("force-of-loop"),
-        force_unstable=control.force_unstable,
+        anyway=analysis.anyway,
     )
     return result, run
 

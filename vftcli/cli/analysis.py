@@ -1,7 +1,7 @@
 """The options of commands that analyse a log, and what they state together."""
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
@@ -12,7 +12,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import WRITE, Option
+from vftcli.signals.option import WRITE, Choice, Option, is_yes, setting
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
@@ -76,12 +76,7 @@ class ExtraOptions(Bundle):
 
     mcap: Annotated[
         bool,
-        Option(
-            "--mcap",
-            "",
-            "Also write estimates.mcap. For ROS 2, Foxglove and PlotJuggler.",
-            group=WRITE,
-        ),
+        Option("--mcap", "", "Also write estimates.mcap (ROS 2, Foxglove).", group=WRITE),
     ]
     written: Typed[OutputChoice]
 
@@ -89,6 +84,16 @@ class ExtraOptions(Bundle):
         """What is written, with what the command's own options ask for."""
         extras = tuple(name for name, asked in {**others, "mcap": self.mcap}.items() if asked)
         return replace(self.written.choice(), extras=extras)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ListChoice(Choice):
+    """Whether contacts are listed."""
+
+    contacts: Annotated[
+        bool,
+        setting("contacts.list", "yes|no", "Whether contacts are listed.", is_yes),
+    ] = True
 
 
 class AnalysisOptions(Bundle):
@@ -100,9 +105,7 @@ class AnalysisOptions(Bundle):
     refinement: Typed[RefinementChoice]
     also_wrench: Wrench
     wrench: Typed[WrenchChoice]
-    no_contacts: Annotated[
-        bool, Option("--no-contacts", "", "Leave the list of contacts out.", group=WRITE)
-    ]
+    listing: Typed[ListChoice]
     anyway: Anyway
     talk: TalkOptions
 
@@ -132,7 +135,9 @@ class AnalysisOptions(Bundle):
             free=self.free.choice(),
             refinement=self.refinement.choice(),
             wrench=self.wrench.choice() if self.asks_wrench else None,
-            reference=reference.choice() if reference is not None and compared else None,
-            contacts=not self.no_contacts,
+            reference=replace(reference.choice(), contacts=self.talk.details)
+            if reference is not None and compared
+            else None,
+            contacts=self.listing.choice().contacts,
             progress=stages(),
         )

@@ -8,14 +8,14 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import COMPARE, OUTPUT, WRITE, Option
+from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
     import polars as pl
 
     from vftcli.outputs.files import OutputFolder
 
-MORE = "Intervals, lags and significance: --details"  #: What the tables on the terminal leave out.
+MORE = "Intervals, lags, pairs of observers: --details"  #: What screens leave out.
 
 
 class TableOptions(opt.Bundle):
@@ -80,15 +80,6 @@ def compare(
     analysis: AnalysisOptions,
     table: TableOptions,
     drawn: DrawnErrors,
-    significance: Annotated[
-        bool,
-        Option(
-            "--significance",
-            "",
-            "Every pair of observers: difference, interval, p.",
-            group=COMPARE,
-        ),
-    ],
 ) -> None:
     """Print every observer's error against a reference, and its floor.
 
@@ -106,8 +97,7 @@ def compare(
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
-    if drawn.folder() is not None and significance:
-        raise typer.BadParameter("--figures draws the errors; leave --significance away")
+    drawn.folder()
     library = Library(logs)
     choice = for_comparison(analysis.choice(library, reference))
     left_out, analyses = LeftOut(library, logs), []
@@ -118,17 +108,6 @@ def compare(
         analyses.append(made)
     if not (analyses or by_jacobian.judged):
         left_out.end(0)
-    if significance:
-        pairs = [
-            paired_significance(a.recording.name, a.estimates, a.reference)
-            for a in analyses
-            if a.reference is not None
-        ]
-        if not pairs:
-            raise typer.BadParameter("--significance compares observers, and none ran")
-        typer.echo(tables.pairs_text(pl.concat(pairs), as_json=table.json))
-        left_out.end(len(analyses))
-        return
     errors = [a.errors for a in analyses if a.errors is not None]
     errors += [made.errors for made in by_jacobian.judged if made.errors is not None]
     members = [
@@ -142,6 +121,13 @@ def compare(
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
         typer.echo(text if analysis.talk.details else f"{text}{MORE}")
+        pairs = [
+            paired_significance(a.recording.name, a.estimates, a.reference)
+            for a in analyses
+            if a.reference is not None and analysis.talk.details
+        ]
+        if pairs:
+            typer.echo(tables.pairs_text(pl.concat(pairs)))
     else:
         typer.echo(tables.FORMS[table.form](rows, bounds))
     left_out.end(len(errors))

@@ -5,30 +5,33 @@ and typed ones go before them. What was taken is said, and stands in the command
 """
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import typer
 from typer.core import TyperOption
 
 from vftcli.cli.commands import COMMANDS
+from vftcli.cli.options import settings_by_name
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
+from vftcli.signals.option import Choice
 from vftcli.signals.parsing import did_you_mean, interval, shown, toml_tables
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
 NONE = "none"  #: Value of ``--config`` with which no file is read.
 #: Options that are only ever typed: what asks before it overwrites shall ask each time.
-TYPED = frozenset({"config", "force", "help", "help-all"})
+TYPED = frozenset({"config", "force", "help", "set"})
 #: Command → options that it takes otherwise than the rest: only its own table gives them.
 OTHERWISE = {
     "identify": {"free"},  # the motion without the load that is sought
     "thresholds": {"reference", "reference-columns"},  # of --check alone
-    "convert": {"derive"},  # it writes what was logged
+    "convert": {"log.derive"},  # it writes what was logged
 }
 LARGEST = 1 << 20  #: Bytes that such a file has at most.
 FILE = "file:"  #: What a reference's file begins with.
@@ -39,6 +42,7 @@ class Taken(NamedTuple):
 
     path: Path | None = None  #: The file, None where none was read.
     words: tuple[str, ...] = ()  #: The options as they would be typed.
+    settings: Mapping[str, str] = MappingProxyType({})  #: Name → value of the settings.
 
 
 NOTHING = Taken()  #: What a command took that read no file.
@@ -89,14 +93,20 @@ def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
     if ctx.resilient_parsing or named == NONE or (named is None and not unasked.is_file()):
         return
     path = unasked if named is None else Path(named)
-    options = options_of(ctx.command)
+    options, keys = options_of(ctx.command), keys_for(ctx.command, path)
     kept = {
         options[key].name: value_of(ctx, options[key], key, value, path)
-        for key, value in keys_for(ctx.command, path).items()
+        for key, value in keys.items()
         if key in options
     }
     ctx.default_map = {name: value for name, value in kept.items() if value is not None}
-    _taken.set(Taken(path))
+    choices = vars(ctx.command.callback).get("choices", ())
+    settings = {
+        key: value
+        for key, value in keys.items()
+        if "." in key and any(kind.takes(key) for kind in choices)
+    }
+    _taken.set(Taken(path, settings=settings))
 
 
 def settle(ctx: Any) -> None:  # noqa: ANN401
@@ -111,7 +121,9 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
     given = [ctx.params[argument.name] for argument in arguments]
     each_log = (log for one in given for log in (one if isinstance(one, tuple) else (one,)))
     logs = [Path(log) for log in each_log if log is not None]
-    words = []
+    typed = [word.partition("=")[0].strip() for word in ctx.params.get("set") or ()]
+    settings = {name: text for name, text in taken().settings.items() if name not in typed}
+    words = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
     for param in ctx.command.params:
         source = ctx.get_parameter_source(param.name)
         if source is None or source.name != "DEFAULT_MAP":
@@ -121,7 +133,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
             ctx.params[param.name] = value
         each = value if isinstance(value, list) else [value]
         words += [word for one in each if one is not None for word in as_typed(key, one)]
-    _taken.set(Taken(path, tuple(words)))
+    _taken.set(Taken(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     typer.echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
@@ -149,26 +161,48 @@ def as_typed(key: str, value: str | bool) -> tuple[str, ...]:
 
 
 def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
-    """What a file holds for a command: what stands on top, then what is in the command's table."""
-    top, known = tables_of(path), known_options()
-    every = dict.fromkeys(key for options in known.values() for key in options)
-    tables = {
-        key: top.pop(key)
-        for key, value in list(top.items())
-        if isinstance(value, dict) and (key in known or key not in every)
-    }
+    """What a file holds for a command: what is on top, then what is in the command's table.
+
+    Settings have their dotted names, and their values are texts.
+    """
+    known, choices = known_options()
+    content = tables_of(path)
+    tables = {key: content.pop(key) for key in list(content) if key in known}
     for name, table in tables.items():
-        if name not in known:
-            near = did_you_mean(name, known)
-            raise ParameterError(
-                f"{path}: [{name}] is no command that reads a log; there is {', '.join(known)}."
-                f"{near}"
-            )
-        check_keys(path, f"of {name}", table, known[name])
+        if not isinstance(table, dict):
+            raise ParameterError(f"{path}: {name} = {shown(table)} is no table of options")
+        check_keys(path, f"of {name}", flattened(path, table, choices), known[name])
+    top = flattened(path, content, choices)
+    every = dict.fromkeys(key for options in known.values() for key in options)
     check_keys(path, "of a command that reads a log", top, every)
     others = OTHERWISE.get(command.name, set())
-    own: dict[str, Any] = tables.get(command.name, {})
+    own = flattened(path, tables.get(command.name, {}), choices)
     return {key: value for key, value in top.items() if key not in others} | own
+
+
+def flattened(
+    path: Path, table: Mapping[str, Any], choices: Iterable[type[Choice]]
+) -> dict[str, Any]:
+    """A table with the settings of each group in it by their dotted names, as texts."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if not isinstance(value, dict):
+            found[key] = value
+            continue
+        for name, given in value.items():
+            dotted = f"{key}.{name}"
+            if not any(kind.takes(dotted) for kind in choices):
+                near = did_you_mean(dotted, settings_by_name(choices))
+                raise ParameterError(
+                    f"{path}: {dotted} is no setting; vftcli help settings lists them.{near}"
+                )
+            text = {True: "yes", False: "no"}.get(given) if isinstance(given, bool) else None
+            text = text or ",".join(words_in(given))
+            if not text:
+                raise ParameterError(f"{path}: {dotted} = {shown(given)} is not a text or a number")
+            setting = settings_by_name(choices).get(dotted)
+            found[dotted] = beside(path.parent, text, setting[0]) if setting else text
+    return found
 
 
 def check_keys(
@@ -176,6 +210,8 @@ def check_keys(
 ) -> None:
     """Check that every key of a table is an option."""
     for key in table:
+        if "." in key:
+            continue
         if key in TYPED:
             raise ParameterError(f"{path}: {key} is not kept in a file; type --{key}")
         if key not in there:
@@ -199,12 +235,15 @@ def tables_of(path: Path) -> dict[str, Any]:
         raise ParameterError(f"--config {path}: {error}") from None
 
 
-def known_options() -> dict[str, dict[str, Any]]:
-    """The options that may be kept, by key, of each command that takes them from a file."""
+def known_options() -> tuple[dict[str, dict[str, Any]], tuple[type[Choice], ...]]:
+    """The options that may be kept, by key, of each command that reads them; all choices."""
     # All are loaded: a key that this command does not have may be another's.
     group = typer.main.get_command(import_module("vftcli.cli").make_app())
     commands: Mapping[str, Any] = vars(group)["commands"]
-    return {name: options_of(commands[name]) for name in COMMANDS if is_configured(commands[name])}
+    reading = [name for name in COMMANDS if is_configured(commands[name])]
+    choices = {kind for n in reading for kind in vars(commands[n].callback)["choices"]}
+    every = tuple(sorted(choices, key=lambda kind: kind.__name__))
+    return {name: options_of(commands[name]) for name in reading}, every
 
 
 def options_of(command: Any) -> dict[str, Any]:  # noqa: ANN401

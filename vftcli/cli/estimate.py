@@ -52,7 +52,7 @@ def estimate(
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
-    causal = analysis.observers.words["causal"] or analysis.no_contacts
+    causal = analysis.observers.words["causal"] or not analysis.listing.choice().contacts
     signals = EXAMINED if causal and not (analysis.asks_wrench or written.extras) else None
     if analysis.log.reading.words["columns"] is None:
         refuse_estimates(log)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from typer.core import TyperCommand, TyperGroup, TyperOption
+from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options
 from vftcli.cli.commands import COMMANDS
@@ -22,20 +22,15 @@ from vftcli.signals.parsing import did_you_mean, nearest
 
 OWN = "This command"  #: Heading of the options that only one command has.
 NARROWEST, WIDEST, LEFT = 72, 100, 33  #: Columns of a help text, and of its left half at most.
-SHORT = 3  #: Lines of a paragraph that the short help shows.
 
 
 class GroupedCommand(TyperCommand):
-    """A command whose `--help` shows the options wanted most, in groups, and `--help-all` all."""
+    """A command whose `--help` shows its options in groups."""
 
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)
         if is_configured(self):
             self.params.append(config_option())
-
-    def get_params(self, ctx: Any) -> list[Any]:  # noqa: ANN401 - typer carries its own click
-        """The command's parameters, and `--help-all`."""
-        return [*super().get_params(ctx), help_all()]
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
@@ -57,8 +52,8 @@ class GroupedCommand(TyperCommand):
         return own or Option("", "", "", group=OUTPUT)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """Write the short help."""
-        formatter.write(command_help(ctx, every=False))
+        """Write the help."""
+        formatter.write(command_help(ctx))
 
 
 class JourneyGroup(TyperGroup):
@@ -75,66 +70,34 @@ class JourneyGroup(TyperGroup):
         return super().resolve_command(ctx, args)
 
 
-def help_all() -> TyperOption:
-    """The option that shows every other."""
-    return TyperOption(
-        param_decls=["--help-all"],
-        is_flag=True,
-        is_eager=True,
-        expose_value=False,
-        callback=show_all,
-        help="Show every option.",
-        type=bool,
-        default=False,
-    )
-
-
-def show_all(ctx: Any, _param: Any, asked: bool) -> None:  # noqa: ANN401
-    """Print the help of every option and stop."""
-    if asked and not ctx.resilient_parsing:
-        typer.echo(command_help(ctx, every=True), nl=False)
-        ctx.exit()
-
-
 def columns() -> int:
     """Width of a help text."""
     return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
 
 
-def command_help(ctx: Any, *, every: bool) -> str:  # noqa: ANN401
+def command_help(ctx: Any) -> str:  # noqa: ANN401
     """The help of a command: how it is called, what it does, its options by group."""
     command, width = ctx.command, columns()
-    usage = " ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)])
-    paragraphs = [" ".join(p.split()) for p in (command.help or "").split("\n\n")]
-    lines = [usage, ""]
-    for k, paragraph in enumerate(paragraphs):
-        wrapped = textwrap.wrap(paragraph, width)
-        # What it is and an example always; what takes long to say only in full.
-        if every or k in {0, len(paragraphs) - 1} or len(wrapped) <= SHORT:
-            lines += wrapped
-    for group, rows in grouped(command, ctx, every=every):
-        lines += ["", group] if every else [group + ":"]
-        lines += list(two_columns(rows, width))
-    if not every and any(command.option(p).seldom for p in command.get_params(ctx)):
-        lines.append("Further options: --help-all. Topics: vftcli help")
+    lines = [" ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)]), ""]
+    for paragraph in (command.help or "").split("\n\n"):
+        lines += textwrap.wrap(" ".join(paragraph.split()), width)
+    for group, rows in grouped(command, ctx):
+        lines += [f"{group}:", *two_columns(rows, width)]
     return "\n".join(lines) + "\n"
 
 
 def grouped(
     command: GroupedCommand,
     ctx: Any,  # noqa: ANN401
-    *,
-    every: bool,
 ) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """The options of each heading that has any, as they are typed and what they mean."""
     found: dict[str, list[tuple[str, str]]] = {}
     for param in command.get_params(ctx):
         option = command.option(param)
-        if (record := row_of(param, ctx)) is None or (option.seldom and not every):
+        if (record := row_of(param, ctx)) is None:
             continue
-        text = record[1] if every else first_sentence(record[1])
         group = LOG if param.param_type_name == "argument" else option.group or OWN
-        found.setdefault(group, []).append((record[0], text))
+        found.setdefault(group, []).append(record)
     others = [group for group in found if group not in GROUPS]
     for group in (LOG, *others, *GROUPS[1:]):
         if group in found:
@@ -147,13 +110,6 @@ def row_of(param: Any, ctx: Any) -> tuple[str, str] | None:  # noqa: ANN401
         return (param.metavar or param.name.upper(), param.help) if param.help else None
     record: tuple[str, str] | None = param.get_help_record(ctx)
     return record
-
-
-def first_sentence(text: str) -> str:
-    """The first sentence of a text, and what stands in brackets at its end."""
-    head, _, rest = text.partition(". ")
-    required = "  [required]" if rest.endswith("[required]") else ""
-    return head.rstrip(".") + required
 
 
 def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:

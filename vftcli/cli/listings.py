@@ -11,8 +11,7 @@ from vftcli.signals.option import Option
 
 @opt.command
 def robots(
-    tip: Annotated[str | None, RobotChoice.option("tip", seldom=False)],
-    robot_arg: Annotated[list[str] | None, RobotChoice.option("robot_arg", seldom=False)],
+    tip: Annotated[str | None, RobotChoice.option("tip")],
     name: Annotated[str | None, Option("", "[NAME|FILE]", "Show one robot in full.")],
     json: opt.Json,
 ) -> None:
@@ -33,7 +32,7 @@ def robots(
         for maker, each in rows.items():
             typer.echo(f"{maker}\n{terminal(robots_grid(each))}", nl=False)
         return
-    robot = RobotChoice.parsed(robot=name, tip=tip, robot_arg=robot_arg).named()
+    robot = RobotChoice.parsed(robot=name, tip=tip).named()
     if json:
         say_json(robot.document or robot_row(robot))
     else:

@@ -8,7 +8,7 @@ that has it. A command is handed one object for all options of a choice::
 """
 
 import inspect
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import (
@@ -24,15 +24,16 @@ from typing import (
 import typer
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import LOG, OUTPUT, WRENCH, WRITE, Choice, Option
+from vftcli.signals.option import ESTIMATE, LOG, OUTPUT, WRENCH, WRITE, Choice, Option
 from vftcli.signals.packages import check_installed
+from vftcli.signals.parsing import assignment, did_you_mean
 
 C = TypeVar("C", bound=Choice)
 EMPTY = inspect.Parameter.empty
 
-Log = Annotated[Path, Option("", "LOG", "A log file or a bag directory; recognised by content.")]
+Log = Annotated[Path, Option("", "LOG", "A log file or bag folder, recognised by content.")]
 Logs = Annotated[
-    list[Path], Option("", "LOG...", "Log files or bag directories; recognised by content.")
+    list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
 Folder = Annotated[Path, Option("-o/--output", "DIR", "Folder to write into.", group=WRITE)]
 Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
@@ -41,7 +42,7 @@ Json = Annotated[
     Option(
         "--json",
         "",
-        "JSON on stdout. It is what the command makes: rows, a run record, a summary.",
+        "Print JSON on stdout.",
         group=OUTPUT,
     ),
 ]
@@ -50,7 +51,7 @@ Open = Annotated[
     Option(
         "--open",
         "",
-        "Open what was made. The page in the browser, else the recording (--rrd).",
+        "Open the page or the recording when done.",
         group=OUTPUT,
     ),
 ]
@@ -59,14 +60,11 @@ Anyway = Annotated[
     Option(
         "--anyway",
         "",
-        "Go on where a finding makes results meaningless. The outputs say so.",
-        seldom=True,
+        "Continue despite errors; the outputs are marked.",
         group=LOG,
     ),
 ]
-Wrench = Annotated[
-    bool, Option("--wrench", "", "Also the wrench, as force on the robot.", group=WRENCH)
-]
+Wrench = Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.", group=WRENCH)]
 
 
 FORMS = ("pdf", "svg", "png")  #: What figures may be written as.
@@ -85,13 +83,26 @@ Figures = Annotated[
     Option(
         "--figures",
         "|".join(FORMS),
-        "Also figures for a paper, one and two columns wide.",
+        "Also draw figures for a paper: pdf, svg or png.",
         checked_form,
         group=WRITE,
     ),
 ]
-LATEX = Option("--latex", "", "Print a LaTeX table (booktabs).")
-SEED = Option("--seed", "N", "Seed of everything drawn; the scenario's own if not given.", least=0)
+#: The option for every setting of a command.
+SET = (
+    Annotated[
+        list[str] | None,
+        Option(
+            "--set",
+            "NAME=VALUE",
+            "Change any setting (help settings). Repeatable.",
+            group=ESTIMATE,
+        ),
+    ],
+    None,
+)
+LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).")
+SEED = Option("--seed", "N", "Seed everything random.", least=0)
 
 
 class Typed(Generic[C]):
@@ -136,20 +147,22 @@ class TalkOptions(Bundle):
 
     GROUP = OUTPUT
 
-    details: Annotated[bool, Option("-v/--details", "", "Everything that is known.")]
+    details: Annotated[bool, Option("-v/--details", "", "Show everything that is known.")]
     quiet: Annotated[
         bool,
-        Option("-q/--quiet", "", "Errors only, and the table or JSON that is asked for."),
+        Option("-q/--quiet", "", "Print errors and results only."),
     ]
 
 
 def command(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command as typer wants it: every option of its choices a parameter of its own.
 
-    Its `options` are the option of every parameter by name.
+    Its `options` are the option of every parameter by name, its `choices` what has its settings.
     """
     arguments = inspect.signature(function).parameters.values()
     part = members("", {a.name: (a.annotation, a.default) for a in arguments})
+    if any(option.is_setting for kind in part.choices for _, _, option in kind.options().values()):
+        part.parameters.extend(taken_apart("set", *SET).parameters)
 
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.cli.config import taken
@@ -157,6 +170,8 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         from vftcli.outputs.files import protected
 
         kept = taken().path
+        typed = values.get("set") or ()
+        values["settings"] = {**taken().settings, **settings_of(typed, part.choices)}
         inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
@@ -168,8 +183,36 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     # typer asks for the signature; without annotations of its own it finds nothing else.
     vars(called)["__signature__"] = inspect.Signature([each for each, _ in part.parameters])
     vars(called)["options"] = {each.name: option for each, option in part.parameters}
+    vars(called)["choices"] = part.choices
     called.__annotations__ = {}
     return called
+
+
+def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[str, str]:
+    """Name → value of ``NAME=VALUE`` words, each a setting of one of the choices.
+
+    Raises:
+        ParameterError: If a word is malformed or there is no such setting.
+    """
+    found = dict(assignment(word, "--set", "NAME=VALUE") for word in words)
+    for name in found:
+        if not any(kind.takes(name) for kind in choices):
+            near = did_you_mean(name, settings_by_name(choices))
+            raise ParameterError(
+                f"--set {name}: this command has no such setting; vftcli help settings lists all."
+                f"{near}"
+            )
+    return found
+
+
+def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option, object]]:
+    """Name → setting and default, of every setting of the choices."""
+    return {
+        option.name: (option, getattr(kind, field, EMPTY))
+        for kind in choices
+        for field, _, option in kind.options().values()
+        if option.is_setting
+    }
 
 
 class Part(NamedTuple):
@@ -177,6 +220,7 @@ class Part(NamedTuple):
 
     parameters: list[tuple[inspect.Parameter, Option]]  #: What typer sees.
     made: Callable[[Mapping[str, Any]], Any]  #: The argument of the values that typer parsed.
+    choices: tuple[type[Choice], ...] = ()  #: The rooms' choices in it.
 
 
 def members(prefix: str, kinds: Mapping[str, tuple[Any, object]], group: str = "") -> Part:
@@ -187,7 +231,10 @@ def members(prefix: str, kinds: Mapping[str, tuple[Any, object]], group: str = "
         for part in parts.values()
         for parameter, option in part.parameters
     ]
-    return Part(flat, lambda values: {name: part.made(values) for name, part in parts.items()})
+    choices = tuple(kind for part in parts.values() for kind in part.choices)
+    return Part(
+        flat, lambda values: {name: part.made(values) for name, part in parts.items()}, choices
+    )
 
 
 def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 - an annotation
@@ -196,14 +243,24 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
         each = inspect.get_annotations(kind).items()
         found = {own: (what, getattr(kind, own, EMPTY)) for own, what in each}
         part = members(f"{name}_", found, kind.GROUP)
-        return Part(part.parameters, lambda values: kind(**part.made(values)))
+        return Part(part.parameters, lambda values: kind(**part.made(values)), part.choices)
     if (typed := get_origin(kind)) in {Typed, Needed}:
         (choice,) = get_args(kind)
         fields = choice.options().items()
         needed = typed is Needed
-        found = {word: typed_as(choice, *field, needed=needed) for word, field in fields}
+        found = {
+            word: typed_as(choice, *field, needed=needed)
+            for word, field in fields
+            if not field[2].is_setting
+        }
         part = members(f"{name}_", found, choice.GROUP)
-        return Part(part.parameters, lambda values: typed(choice, part.made(values)))
+        nothing = dict.fromkeys(word for word in choice.options() if word not in found)
+
+        def made(values: Mapping[str, Any]) -> Any:  # noqa: ANN401 - `Typed` of this choice
+            words = part.made(values) | nothing | choice.words_of(values["settings"])
+            return typed(choice, words)
+
+        return Part(part.parameters, made, (choice,))
     if typed is not Annotated:  # typer's own context
         plain = inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=kind)
         return Part([(plain, Option("", "", ""))], lambda values: values[name])
@@ -235,7 +292,7 @@ def typed_as(
     if not (needed and default is EMPTY) and option.metavar:
         what = what | None
     plain = option._replace(reads=None)
-    return Annotated[what, plain], default if option.shows_default else EMPTY
+    return Annotated[what, plain], EMPTY
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:

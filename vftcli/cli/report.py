@@ -1,6 +1,6 @@
 """`vftcli report`: everything about a log in one folder."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +9,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import COMPARE, Option
+from vftcli.signals.option import Choice, setting
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -17,6 +17,15 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.cli.console import LeftOut
     from vftcli.pipeline import AnalysisChoice
+
+
+@dataclass(frozen=True, kw_only=True)
+class PrintChoice(Choice):
+    """A printed table beside the errors."""
+
+    table: Annotated[
+        str | None, setting("report.published", "table1", "The paper's table beside the errors.")
+    ] = None
 
 
 @opt.command
@@ -27,10 +36,7 @@ def report(
     analysis: AnalysisOptions,
     also: ExtraOptions,
     figures: opt.Figures,
-    published: Annotated[
-        str | None,
-        Option("--published", "table1", "Set the paper's table beside the errors.", group=COMPARE),
-    ],
+    beside: opt.Typed[PrintChoice],
     json: opt.Json,
     force: opt.Force,
     show: opt.Open,
@@ -52,7 +58,7 @@ def report(
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
 
-    library = Library(logs)
+    library, published = Library(logs), beside.choice().table
     written = also.choice()
     names = report_files([library.label(log) for log in logs], written.extras, figures)
     OutputFolder(output, force, names).check()

@@ -23,28 +23,15 @@ class ReferenceChoice(Choice):
 
     #: One of `NAMES`, or ``file:PATH``.
     name: Annotated[
-        str, Option("--reference", "REF", "two-cycle, sensor, vendor, zero, or file:PATH.")
+        str, Option("--reference", "REF", "Compare with two-cycle, sensor, vendor, zero, file.")
     ]
     #: The column description of a reference file, None to recognise its columns.
     columns: Annotated[
         str | None,
-        Option(
-            "--reference-columns",
-            "SPEC",
-            "Columns of a reference file, as --columns: 't,tau_ext:6'.",
-            seldom=True,
-        ),
+        Option("--reference-columns", "SPEC", "Name the columns of a reference file."),
     ] = None
     #: Whether each observer's contacts are judged by the reference's too.
-    contacts: Annotated[
-        bool,
-        Option(
-            "--contacts",
-            "",
-            "Judge the listed contacts. Also detection delay, false alarms per hour and missed "
-            "contacts of the observers against the reference, with the free part of --free.",
-        ),
-    ] = False
+    contacts: bool = False
 
     def __post_init__(self) -> None:
         if self.path is None and self.name not in NAMES:

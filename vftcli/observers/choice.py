@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import ESTIMATE, Choice, Option
+from vftcli.signals.option import ESTIMATE, NUMBERS, Choice, Option, setting
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -33,11 +33,24 @@ def settings_of(words: Sequence[str]) -> "Settings":
     return parse_settings(words, sections())
 
 
-def goal_of(text: str) -> "Goal":
-    """What ``delay=S`` or ``bandwidth=HZ`` asks of every observer alike."""
-    from vftcli.observers.tuning import parse_target
+def source_of(text: str) -> "str | Path | Goal":
+    """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file.
 
-    return parse_target(text)
+    Raises:
+        ParameterError: If a goal is malformed, or `vftcli identify` alone serves it.
+    """
+    if text in {PAPER_GAINS, LOG_GAINS}:
+        return text
+    if text.startswith(("delay=", "bandwidth=")):
+        from vftcli.observers.tuning import parse_target
+
+        return parse_target(text)
+    if text.startswith("false-alarms="):
+        raise ParameterError(
+            f"--gains {text}: vftcli identify --method gains writes a file for this goal; give its "
+            "name"
+        )
+    return Path(text)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,60 +69,32 @@ class ObserverChoice(Choice):
     names: Annotated[
         tuple[str, ...],
         Option(
-            "--observer",
-            "NAME",
-            "Which observers, repeatable. Default: best fdo gmo kfo-fe kfo-zoh; of admit: "
-            "kfo-fe; of annotate: kfo-zoh.",
-            several=True,
+            "--observer", "NAME", "Run this observer. Repeatable (help observers).", several=True
         ),
     ] = ()
     #: Whether to leave out what could not run while the log is being written.
-    causal: Annotated[
-        bool,
-        Option("--causal", "", "Only what could run online. It leaves out best, and smoothers."),
-    ] = False
+    causal: Annotated[bool, Option("--causal", "", "Use only what could run online.")] = False
     #: Parameters the user sets, which go before every file's.
     settings: Annotated[
         "Settings",
-        Option(
-            "--set",
-            "OBSERVER.PARAMETER=VALUE",
-            "Repeatable: gmo.gain=30, gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
+        setting(
+            NUMBERS,
+            "NUMBER(S)",
+            "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
             settings_of,
             several=True,
-            seldom=True,
         ),
     ] = field(default_factory=dict)
     #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
     gains: Annotated[
-        str,
+        "str | Path | Goal",
         Option(
-            "--gains",
-            "auto|paper|FILE",
-            "Gains of all but best (vftcli help gains). Those the log's spectra call for, the "
-            "robot file's (default), or those that `vftcli tune` wrote; --set goes before them.",
+            "--gains", "SOURCE", "Take gains from auto, paper, FILE... (help gains).", source_of
         ),
     ] = PAPER_GAINS
-    #: A file of gains that go before the robot's own, or None.
-    gains_file: Annotated[
-        Path | None,
-        Option("--set-file", "FILE", "The old name of --gains FILE.", seldom=True),
-    ] = None
-    #: What every observer is to have alike on every joint, or None.
-    match: Annotated[
-        "Goal | None",
-        Option(
-            "--match",
-            "delay=S|bandwidth=HZ",
-            "Gains that give every observer the same delay or −3 dB bandwidth on every joint.",
-            goal_of,
-            seldom=True,
-        ),
-    ] = None
     #: Whether the paper's printed formulas run, and its numeric dynamics.
     as_printed: Annotated[
-        bool,
-        Option("--as-printed", "", "The paper's printed formulas, errata and all.", seldom=True),
+        bool, Option("--as-printed", "", "Use the paper's formulas as printed.")
     ] = False
     #: Whether estimates start at the static residual of the first sample, not at zero.
     from_rest: bool = False
@@ -134,26 +119,21 @@ class ObserverChoice(Choice):
         object.__setattr__(self, "names", tuple(dict.fromkeys((*leads, *names))))
 
     @classmethod
-    def parsed(
-        cls,
-        *,
-        gains: str | Path | None = None,
-        set_file: Path | None = None,
-        **words: Any,  # noqa: ANN401 - texts and lists of them
-    ) -> Self:
-        """The choice that the options of a command state, each the word after its option.
+    def takes(cls, name: str) -> bool:
+        """Whether a name is one of an observer's numbers, as ``gmo.gain``."""
+        from vftcli.observers.table import sections
 
-        `gains` is `PAPER_GAINS`, `LOG_GAINS`, or a file of gains; `set_file` is that file under the
-        old name of the option.
+        return name.partition(".")[0] in sections()
 
-        Raises:
-            ParameterError: If a name or parameter does not exist, or a value is malformed.
-        """
-        if gains is not None and set_file is not None:
-            raise ParameterError("--set-file is the old name of --gains FILE; give one of them")
-        if gains in {None, PAPER_GAINS, LOG_GAINS}:
-            return super().parsed(gains=gains, set_file=set_file, **words)
-        return super().parsed(set_file=Path(str(gains)), **words)
+    @property
+    def gains_file(self) -> Path | None:
+        """A file of gains that go before the robot's own, or None."""
+        return self.gains if isinstance(self.gains, Path) else None
+
+    @property
+    def match(self) -> "Goal | None":
+        """What every observer is to have alike on every joint, or None."""
+        return None if isinstance(self.gains, str | Path) else self.gains
 
     @property
     def from_spectra(self) -> bool:

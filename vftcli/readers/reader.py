@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError, ParameterError
-from vftcli.signals.option import LOG, Choice, Option
+from vftcli.signals.option import LOG, Choice, Option, setting
 
 if TYPE_CHECKING:
     from vftcli.readers.columns import ColumnSpec
@@ -135,14 +135,14 @@ class RawLog:
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
-#: Value of ``--effort`` → field of Recording; None where the robot's model has to decide.
+#: Value of ``log.effort`` → field of Recording; None where the robot's model has to decide.
 EFFORT = {
     "auto": None,
     "current": "current",
     "torque": "torque",
     "torque-without-gravity": "torque_without_gravity",
 }
-#: Values of ``--derive``: the signal that is derived where the log lacks it, or none.
+#: Values of ``log.derive``: the signal that is derived where the log lacks it, or none.
 DERIVE = ("dq", "none")
 
 
@@ -166,39 +166,25 @@ class ReadChoice(Choice):
     #: Name of a format in `vftcli.readers.FORMATS`, None to recognise it by its content.
     format: Annotated[
         str | None,
-        Option(
-            "--format", "NAME", "Skip recognition; `vftcli formats` lists the names.", seldom=True
-        ),
+        setting("log.format", "NAME", "Read it as this format; by default its content decides."),
     ] = None
     columns: Annotated[
         str | None,
-        Option(
-            "--columns",
-            "SPEC",
-            "Columns of a table (vftcli help columns). 't,q:6,dq:6,current:6' in file order, or "
-            "'q=joint_pos_{i},tau=eff_{i}' by header.",
-        ),
+        Option("--columns", "SPEC", "Name a table's columns (help columns)."),
     ] = None
     #: The span that is used, from the first sample, None for all of it. [s]
     interval: Annotated[
         tuple[float, float] | None,
-        Option(
-            "--interval",
-            "A:B",
-            "Only this span, in seconds from the first sample.",
-            parsing.interval,
-        ),
+        Option("--interval", "A:B", "Use only seconds A to B of the log.", parsing.interval),
     ] = None
     #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the robot; None
     #: to take what it is called.
     effort: Annotated[
         str | None,
-        Option(
-            "--effort",
+        setting(
+            "log.effort",
             "auto|current|torque|torque-without-gravity",
-            "What the log's effort is, whatever it is called; auto takes what the robot's model "
-            "explains best, and says so.",
-            seldom=True,
+            "What the log's effort is, whatever its name; auto: what the robot's model explains.",
         ),
     ] = None
     #: Number of the episode of a file that holds several, None to leave it to the reader.
@@ -207,26 +193,22 @@ class ReadChoice(Choice):
         Option(
             "--episode",
             "K|all",
-            "Of a file that holds several: which, or each as a log of its own.",
+            "Choose an episode of a file that holds several.",
             episode_number,
-            seldom=True,
         ),
     ] = None
     #: Which arm of a log of two, a member of `ARMS`; None for the only one.
     arm: Annotated[
-        str | None,
-        Option("--arm", "left|right", "Of a log of two arms: which.", seldom=True),
+        str | None, Option("--arm", "left|right", "Choose one arm of a two-armed log.")
     ] = None
     #: "dq" to derive the velocities even where the log has some, "none" never to; None to do so
     #: where it has none and is fast enough.
     derive: Annotated[
         str | None,
-        Option(
-            "--derive",
+        setting(
+            "log.derive",
             "dq|none",
-            "Velocities from the positions over the complete log, in place of logged ones; where "
-            "the log has none, from 50 Hz on, they are derived unasked, and that is said.",
-            seldom=True,
+            "Velocities from the positions; by default where the log has none, from 50 Hz on.",
         ),
     ] = None
     #: The signals that are wanted; None for all. Others may be left unread.
@@ -241,11 +223,12 @@ class ReadChoice(Choice):
         known = {"arm": ARMS, "derive": DERIVE, "effort": tuple(EFFORT)}
         for name, there in known.items():
             if (word := getattr(self, name)) is not None:
-                parsing.check_known(word, there, f"--{name} {word!r}")
+                option = next(o for field, _, o in self.options().values() if field == name)
+                parsing.check_known(word, there, f"{option.typed} {word!r}")
 
     @classmethod
     def parsed(cls, *, episode: str | None = None, **words: Any) -> Self:  # noqa: ANN401
-        """The choice that ``--format``, ``--columns``, ``--interval A:B``, … state.
+        """The choice that ``--columns``, ``--interval A:B``, … state.
 
         Raises:
             ParameterError: If the interval or the episode is malformed.

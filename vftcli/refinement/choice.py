@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from vftcli.signals.option import ESTIMATE, Choice, Option
+from vftcli.signals.option import ESTIMATE, Choice, setting
 from vftcli.signals.parsing import check_known
 
 #: The word for what the log allows: the whole log's bias for `best`, none for the others.
 AUTOMATIC = "auto"
 #: The word for the bias fitted to the whole log and subtracted before observers run.
 WHOLE_LOG = "whole-log"
-REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``--remove-bias`` takes.
+REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``bias.method`` takes.
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,25 +23,24 @@ class RefinementChoice(Choice):
 
     GROUP = ESTIMATE
 
-    remove_bias: Annotated[
+    bias: Annotated[
         str,
-        Option(
-            "--remove-bias",
+        setting(
+            "bias.method",
             "|".join(REMOVALS),
             "Whether the bias fitted to the whole log comes off; auto: for best alone.",
-            seldom=True,
         ),
     ] = AUTOMATIC
 
     def __post_init__(self) -> None:
-        check_known(self.remove_bias, REMOVALS, f"--remove-bias {self.remove_bias!r}")
+        check_known(self.bias, REMOVALS, f"--set bias.method={self.bias}")
 
     @property
     def corrects_all(self) -> bool:
         """Whether every observer runs on what is left without the whole log's bias."""
-        return self.remove_bias == WHOLE_LOG
+        return self.bias == WHOLE_LOG
 
     @property
     def corrects_best(self) -> bool:
         """Whether `best` does."""
-        return self.remove_bias in {AUTOMATIC, WHOLE_LOG}
+        return self.bias in {AUTOMATIC, WHOLE_LOG}

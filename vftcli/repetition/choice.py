@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.option import LOG, Choice, Option
+from vftcli.signals.option import LOG, Choice, Option, setting
 from vftcli.signals.parsing import interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
@@ -26,16 +26,16 @@ def cycle_numbers(text: str) -> tuple[int, ...]:
         short = max(len(first), len(last)) <= DIGITS
         if not short or not first.isdecimal() or (dash and not last.isdecimal()):
             raise ReferenceTorqueError(
-                f"--free-cycles {text!r} is not a list of cycle numbers such as 1 or 1,2 or 1-3"
+                f"two-cycle.free-cycles={text} is no list of cycle numbers as 1 or 1,2 or 1-3"
             )
         found += range(int(first), int(last or first) + 1)
     if not found or min(found) < 1:
-        raise ReferenceTorqueError(f"--free-cycles {text!r} names no cycle; they count from 1")
+        raise ReferenceTorqueError(f"two-cycle.free-cycles={text} names no cycle; they begin at 1")
     return tuple(dict.fromkeys(found))
 
 
 def cutoff(text: str) -> float | str | None:
-    """Cutoff of ``--low-pass``: a number [Hz], None for "none", else the word."""
+    """Cutoff of ``two-cycle.low-pass``: a number [Hz], None for "none", else the word."""
     if text == "none":
         return None
     try:
@@ -61,67 +61,42 @@ class FreeChoice(Choice):
     logs: Annotated[
         tuple[Path, ...],
         Option(
-            "--free",
-            "LOG|A:B",
-            "Motion that nobody touched: another log, or a span. Repeatable: two free runs of the "
-            "same trajectory measure the floor.",
-            str,
-            several=True,
+            "--free", "LOG|A:B", "Name motion that nobody touched. Repeatable.", str, several=True
         ),
     ] = ()
     #: Free spans of the log itself, from and to. [s]
-    spans: Annotated[
-        tuple[tuple[float, float], ...],
-        Option(
-            "--free-part",
-            "A:B",
-            "The same as --free A:B; without either, the log's own free cycles are found.",
-            str,
-            seldom=True,
-        ),
-    ] = ()
+    spans: tuple[tuple[float, float], ...] = ()
     #: The commanded period of a repeated motion, None to go by the positions alone. [s]
     period: Annotated[
         float | None,
-        Option(
-            "--period",
-            "S",
-            "Commanded period of a repeated motion; found if not given.",
-            seldom=True,
-        ),
+        setting("two-cycle.period", "S", "Commanded period of a repeated motion; else found."),
     ] = None
     #: Its free cycles, counted from 1; none to find them.
     cycles: Annotated[
         tuple[int, ...],
-        Option(
-            "--free-cycles",
+        setting(
+            "two-cycle.free-cycles",
             "1|1,2|1-3",
-            "Cycles free of contact; found if not given.",
+            "Cycles free of contact; else found.",
             cycle_numbers,
-            seldom=True,
         ),
     ] = ()
     alignment: Annotated[
         str,
-        Option(
-            "--alignment",
+        setting(
+            "two-cycle.alignment",
             "auto|commanded|period|phase|model",
-            "How the two-cycle difference lays free and loaded motion over one another; auto takes "
-            "what has the smallest error on this log.",
-            seldom=True,
-            shows_default=True,
+            "How the free motion is brought under the other; auto: with the smallest error.",
         ),
     ] = AUTOMATIC
     #: Cutoff of the two-cycle difference [Hz], None for none, or "auto".
     low_pass: Annotated[
         float | str | None,
-        Option(
-            "--low-pass",
+        setting(
+            "two-cycle.low-pass",
             "auto|none|HZ",
-            "Zero-phase low-pass of that difference.",
+            "Zero-phase low-pass of the difference.",
             cutoff,
-            seldom=True,
-            shows_default=True,
         ),
     ] = AUTOMATIC
 
@@ -132,20 +107,21 @@ class FreeChoice(Choice):
             )
         if self.logs and (self.cycles or self.period is not None):
             raise ReferenceTorqueError(
-                "--period and --free-cycles are for cycles of one log; leave them away with --free"
+                "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
+                "away with --free"
             )
         if self.period is not None and not self.period > 0.0:
             raise ReferenceTorqueError(
-                f"--period {self.period:g} is not a positive time in seconds"
+                f"two-cycle.period={self.period:g} is not a positive time in seconds"
             )
         if self.alignment == "commanded" and self.period is None:
             raise ReferenceTorqueError(
-                "alignment commanded needs the commanded period: add --period S"
+                "alignment commanded needs the commanded period: add --set two-cycle.period=S"
             )
         numeric = self.low_pass is not None and self.low_pass != AUTOMATIC
         if numeric and not (isinstance(self.low_pass, float | int) and self.low_pass > 0.0):
             raise ReferenceTorqueError(
-                f"--low-pass {self.low_pass!r} is not a positive cutoff in Hz, none or auto"
+                f"two-cycle.low-pass={self.low_pass} is not a positive cutoff in Hz, none or auto"
             )
 
     @property
@@ -163,18 +139,18 @@ class FreeChoice(Choice):
         cls,
         *,
         free: Sequence[str | Path] | None = None,
-        free_part: str | None = None,
         **words: Any,  # noqa: ANN401 - texts and numbers
     ) -> Self:
         """The choice that the options of a command state, each the word after its option.
 
-        A word of `free` is a log or a span ``A:B``, as `free_part` is.
+        A word of `free` is a log or a span ``A:B``.
 
         Raises:
             ParameterError: If a span is malformed.
             ReferenceTorqueError: If cycles, alignment or cutoff are not what there is.
         """
-        spans, logs = [] if free_part is None else [interval(free_part)], []
+        spans: list[tuple[float, float]] = []
+        logs: list[Path] = []
         for word in free or ():
             # What reads as a span is one: a file of such a name can be given as ./A:B.
             try:

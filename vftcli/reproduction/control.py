@@ -175,8 +175,8 @@ def released(
     """
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
-    for variant, xi in ((CORRECTED, None), ("ξ = 1", "1")):
-        control = replace(ControlChoice(xi=xi), alphas=tuple(alphas))
+    for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):
+        control = ControlChoice(assignments=xi, alphas=tuple(alphas))
         parameters = control.parameters(arm)
         laws = control.controllers(parameters)
         motion = release(laws, x, settling(laws, x))
@@ -186,7 +186,7 @@ def released(
             for key in ("return_10_s", "return_2_s"):
                 result.put(variant, {f"{key}/{name}": row[key]})
             result.put(variant, {f"overshoot/{name}": 100.0 * (row["overshoot"] or 0.0)})
-        if xi is None:
+        if not xi:
             keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
             table = {key: getattr(parameters, key) for key in keys}
             for key, values in {**table, "xi": parameters.damping_ratio}.items():

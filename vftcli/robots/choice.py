@@ -1,20 +1,23 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
+import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import RobotError
-from vftcli.signals.option import LOG, Choice, Option
-from vftcli.signals.parsing import assignment, check_known
+from vftcli.signals.option import LOG, Choice, Option, setting
+from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.robots.chain import Payload
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
 
-#: Values of ``--friction``: the robot file's, none at all, or that of a simulator's description.
+#: Values of ``model.friction``: the robot file's, none at all, or that of a simulator.
 FRICTION = ("profile", "none", "model")
+#: Between a xacro and its arguments, as ROS has them: ``ur.xacro ur_type:=ur5e``.
+ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
 DECLARED = "log"  #: Value of ``--payload``: what the log says that the controller was told of.
 
 
@@ -23,7 +26,7 @@ class RobotChoice(Choice):
     """Which arm made a log, and how it is modelled.
 
     Raises:
-        ParameterError: If friction is none of these, or an argument no NAME=VALUE.
+        ParameterError: If friction is none of these.
     """
 
     GROUP = LOG
@@ -31,51 +34,24 @@ class RobotChoice(Choice):
     #: Profile name, robot file or description, None to take what the log settles.
     name: Annotated[
         str | None,
-        Option("--robot", "NAME|FILE", "Profile, FILE.toml, or a URDF, xacro or MJCF."),
+        Option("--robot", "NAME|FILE", "Name the arm: profile, TOML, URDF, xacro, MJCF."),
     ] = None
     friction: Annotated[
         str,
-        Option(
-            "--friction",
+        setting(
+            "model.friction",
             "profile|none|model",
-            "The robot file's friction (default), none, or what an MJCF gives for simulation.",
-            seldom=True,
+            "Friction of the robot file, none, or what an MJCF gives for simulation.",
         ),
     ] = "profile"
     payload: Annotated[
         str | None,
-        Option(
-            "--payload",
-            "NAME",
-            "Mount a [payload.NAME] of the robot file; log: the one that the log declares.",
-            seldom=True,
-        ),
+        Option("--payload", "NAME", "Mount this payload of the robot file."),
     ] = None
-    tip: Annotated[
-        str,
-        Option(
-            "--tip",
-            "FRAME",
-            "Link or joint at the arm's end, in a description with hands or several arms; the "
-            "wrench stands at a link that is fixed to the last one.",
-            seldom=True,
-        ),
-    ] = ""
-    arguments: Annotated[
-        tuple[str, ...],
-        Option(
-            "--robot-arg",
-            "NAME=VALUE",
-            "An argument of a xacro, which is a program. Repeatable.",
-            several=True,
-            seldom=True,
-        ),
-    ] = ()
+    tip: Annotated[str, Option("--tip", "FRAME", "End the arm at this link or joint.")] = ""
 
     def __post_init__(self) -> None:
-        check_known(self.friction, FRICTION, f"--friction {self.friction!r}")
-        for word in self.arguments:
-            assignment(word, "--robot-arg", "NAME=VALUE")
+        check_known(self.friction, FRICTION, f"--set model.friction={self.friction}")
 
     def load(self, recording: "Recording", otherwise: str | None = None) -> "Robot":
         """Load the robot that is chosen, or the one that the log says.
@@ -116,7 +92,10 @@ class RobotChoice(Choice):
         Raises:
             RobotError: If there is no such robot.
         """
-        return load_robot(self.name or "", tip=self.tip, arguments=self.arguments)
+        name, *arguments = ARGUMENT.split(self.name or "")
+        return load_robot(
+            name, tip=self.tip, arguments=[a.replace(":=", "=", 1) for a in arguments]
+        )
 
 
 def choices_for(recording: "Recording") -> str:

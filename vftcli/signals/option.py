@@ -1,14 +1,17 @@
 """Option: how a value is typed and what `--help` says of it, beside the field that holds it.
 
 A room's choice is a dataclass whose fields say how a user gives them, once for the command line,
-the file of options and notebooks::
+the file of options and notebooks. What few users need is a setting, given by ``--set NAME=VALUE``::
 
-    period: Annotated[float | None, Option("--period", "S", "Commanded period.")] = None
+    frame: Annotated[str, Option("--frame", "FRAME", "Give the wrench in this frame.")] = "flange"
+    period: Annotated[float | None, setting("two-cycle.period", "S", "Commanded period.")] = None
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import get_annotations
 from typing import Any, ClassVar, NamedTuple, Self, get_args
+
+from vftcli.signals.errors import ParameterError
 
 #: Headings of the options that commands share, in their order.
 LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
@@ -19,15 +22,15 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 class Option(NamedTuple):
     """How one value is typed, and what `--help` says of it."""
 
-    name: str  #: As it is typed, ``-v/--details`` where it has two names; "" of an argument.
+    #: As it is typed, ``-v/--details`` where it has two names; "" of an argument; a dotted name of
+    #: a setting.
+    name: str
     metavar: str  #: What its value is called, "" of an option that is given or not.
     help: str  #: What it means; the short help shows the first sentence.
     #: What makes the field's value of the typed text, None where that is the value.
     reads: Callable[[Any], Any] | None = None
     several: bool = False  #: Whether it may be repeated.
-    seldom: bool = False  #: Whether only `--help-all` shows it.
     group: str = ""  #: The heading under which it is listed, "" for the command's own.
-    shows_default: bool = False  #: Whether `--help` says what a choice takes if it is not given.
     least: float | None = None  #: Smallest number that is taken.
     most: float | None = None  #: Largest number that is taken.
 
@@ -36,9 +39,61 @@ class Option(NamedTuple):
         return self.reads(typed) if self.reads and typed is not None else typed
 
     @property
+    def is_setting(self) -> bool:
+        """Whether it is given by ``--set NAME=VALUE``."""
+        return bool(self.name) and not self.name.startswith("-")
+
+    @property
+    def typed(self) -> str:
+        """The name as a complaint gives it, ``--details`` or a setting's."""
+        return self.name.rpartition("/")[2]
+
+    @property
     def word(self) -> str:
-        """The name as a keyword, ``robot_arg`` of ``--robot-arg``."""
-        return self.name.rpartition("--")[2].replace("-", "_")
+        """The name as a keyword, ``reference_columns`` of ``--reference-columns``."""
+        return self.name if self.is_setting else self.name.rpartition("--")[2].replace("-", "_")
+
+    def number(self, text: str, kind: type[int] | type[float]) -> float:
+        """The number that a setting's text states.
+
+        Raises:
+            ParameterError: If it states none, or one out of range.
+        """
+        try:
+            value = kind(text)
+        except ValueError:
+            value = None
+        if value is None or not (self.least is None or value >= self.least):
+            bound = "" if self.least is None else f" of {self.least:g} or more"
+            what = "a whole number" if kind is int else "a number"
+            raise ParameterError(f"--set {self.name}={text} is not {what}{bound}")
+        return value
+
+
+def setting(
+    name: str,
+    unit: str,
+    help: str,
+    reads: Callable[[Any], Any] | None = None,
+    **more: Any,  # noqa: ANN401 - an option's fields
+) -> Option:
+    """A setting: an option that few need, given by ``--set NAME=VALUE``."""
+    return Option(name, unit, help, reads, **more)
+
+
+def is_yes(text: str) -> bool:
+    """Whether a setting's text is yes.
+
+    Raises:
+        ParameterError: If it is neither yes nor no.
+    """
+    if text not in {"yes", "no"}:
+        raise ParameterError(f"{text!r} is neither yes nor no")
+    return text == "yes"
+
+
+#: Name of the setting that gathers what has a name of its own per robot, as ``gmo.gain``.
+NUMBERS = "numbers"
 
 
 class Choice:
@@ -62,11 +117,28 @@ class Choice:
         return cls.options()[word][2]._replace(**changed)
 
     @classmethod
+    def takes(cls, name: str) -> bool:
+        """Whether there is a setting of this name."""
+        found = cls.options().get(name)
+        return found is not None and found[2].is_setting and name != NUMBERS
+
+    @classmethod
+    def words_of(cls, settings: Mapping[str, str]) -> dict[str, Any]:
+        """The words that settings state, by name; those of other choices are left out."""
+        own = {name: text for name, text in settings.items() if cls.takes(name)}
+        words: dict[str, Any] = {name: own.pop(name) for name in cls.options() if name in own}
+        return words | ({NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {})
+
+    @classmethod
     def parsed(cls, **words: Any) -> Self:  # noqa: ANN401 - texts, numbers, lists of them
         """The choice that typed words state; None and an empty list are as if not given."""
         options, values = cls.options(), {}
         for word, typed in words.items():
-            field, _, option = options[word]
+            field, what, option = options[word]
             if typed is not None and (typed or not option.several):
-                values[field] = option.read(tuple(typed) if option.several else typed)
+                kinds = [kind for kind in (int, float) if kind in (what, *get_args(what))]
+                if option.is_setting and kinds and not option.reads and isinstance(typed, str):
+                    values[field] = option.number(typed, kinds[0])
+                else:
+                    values[field] = option.read(tuple(typed) if option.several else typed)
         return cls(**values)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRENCH, Choice, Option
+from vftcli.signals.option import WRENCH, Choice, Option, setting
 from vftcli.signals.parsing import check_known, interval
 
 if TYPE_CHECKING:
@@ -70,44 +70,36 @@ class WrenchChoice(Choice):
     frame: Annotated[
         str,
         Option(
-            "--frame",
-            "flange|base|tool|sensor",
-            "Its frame; default flange. See vftcli help frames. base: base axes, moment about the "
-            "flange point. Implies --wrench.",
+            "--frame", "FRAME", "Give the wrench in flange, base, tool or sensor (help frames)."
         ),
     ] = "flange"
     #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the smoother where
     #: it is the observer's own, and least squares for the others.
     solver: Annotated[
         str | None,
-        Option(
-            "--solver",
+        setting(
+            "virtual-sensor.solver",
             "smoother|pinv|map",
-            "How torques become a wrench: smoothed over the whole log with a band in every pose "
-            "(default for best: zero outside of the listed contacts), least squares (default for "
-            "the others), or with a prior of 50 N and 10 N·m. Implies --wrench.",
-            seldom=True,
+            "How torques become a wrench: smoothed over the whole log (best), least squares (the "
+            "others), or with a prior of 50 N and 10 N·m.",
         ),
     ] = None
     #: The tool's pose as text or a name in the robot file, None for the file's own.
     tool: Annotated[
         str | None,
-        Option(
-            "--tool",
+        setting(
+            "virtual-sensor.tool",
             "POSE|NAME",
-            "The tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or [tool.NAME] of the robot "
-            "file.",
-            seldom=True,
+            "Tool on the flange: x,y,z[,roll,pitch,yaw] [m, rad], or its [tool.NAME].",
         ),
     ] = None
     #: The sensor's pose as text or a name in the robot file, "fit", or None for the file's own.
     sensor_pose: Annotated[
         str | None,
-        Option(
-            "--sensor-pose",
+        setting(
+            "virtual-sensor.sensor",
             "POSE|NAME|fit",
-            "The force/torque sensor on the flange, likewise; fit estimates it from the log.",
-            seldom=True,
+            "Force/torque sensor on the flange, written alike; fit: estimated from the log.",
         ),
     ] = None
     #: What is taken as the zero.
@@ -116,8 +108,7 @@ class WrenchChoice(Choice):
         Option(
             "--zero",
             "A:B|start",
-            "Unloaded span whose mean comes off. Also the unloaded start. Repeat A:B to see the "
-            "drift between spans. Implies --wrench.",
+            "Subtract the wrench of this unloaded span. Repeatable.",
             ZeroChoice.parsed,
             several=True,
         ),
@@ -126,11 +117,10 @@ class WrenchChoice(Choice):
     #: the best that is known. [N·m]
     torque_sd: Annotated[
         str | None,
-        Option(
-            "--torque-sd",
+        setting(
+            "virtual-sensor.torque-sd",
             "own|NUMBER(S)",
             "Joint torque error behind the wrench's band [N·m]; own: the observer's covariance.",
-            seldom=True,
         ),
     ] = None
 
@@ -169,7 +159,7 @@ class WrenchChoice(Choice):
 
         tool, sensor = robot.tools.get(""), robot.sensors.get("")
         if self.tool is not None:
-            tool = read_pose(self.tool, robot, "tool", "--tool")
+            tool = read_pose(self.tool, robot, "tool", "virtual-sensor.tool")
         if self.sensor_pose is not None and self.sensor_pose != FIT:
-            sensor = read_pose(self.sensor_pose, robot, "sensor", "--sensor-pose")
+            sensor = read_pose(self.sensor_pose, robot, "sensor", "virtual-sensor.sensor")
         return Mounting(tool, sensor)

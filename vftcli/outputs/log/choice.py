@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRITE, Choice, Option
+from vftcli.signals.option import WRITE, Choice, setting
 
 #: How much of a log its recording holds: every sample, of a long one its levels, or no recording.
 #:
@@ -21,31 +21,28 @@ class OutputChoice(Choice):
 
     extras: tuple[str, ...] = ()  #: Names of `estimates.EXTRAS`.
     #: How much of the log its recording holds: `FULL`, `LEVELS` or `NONE`.
-    rrd_detail: Annotated[
+    detail: Annotated[
         str,
-        Option(
-            "--rrd-detail",
+        setting(
+            "recording.detail",
             f"{FULL}|{LEVELS}|{NONE}",
-            "How much of a long log recording.rrd holds. Levels, unless another is given: the "
-            "lowest and highest samples of 5000 stretches, every sample where the strongest "
-            "contacts begin.",
-            seldom=True,
-            shows_default=True,
+            "How much of a long log recording.rrd holds; levels: the lowest and highest samples of "
+            "5000 stretches, every sample where the strongest contacts begin.",
         ),
     ] = LEVELS
 
     def __post_init__(self) -> None:
-        if self.rrd_detail not in (FULL, LEVELS, NONE):
+        if self.detail not in (FULL, LEVELS, NONE):
             raise ParameterError(
-                f"--rrd-detail {self.rrd_detail} is none of {FULL}, {LEVELS} and {NONE}"
+                f"--set recording.detail={self.detail} is none of {FULL}, {LEVELS} and {NONE}"
             )
-        if self.rrd_detail == NONE and "rrd" in self.extras:
-            raise ParameterError("--rrd-detail none writes no recording; leave --rrd or it away")
+        if self.detail == NONE and "rrd" in self.extras:
+            raise ParameterError("recording.detail=none writes no recording; leave one away")
 
     @property
     def writes_recording(self) -> bool:
         """Whether a report has its recording."""
-        return self.rrd_detail != NONE
+        return self.detail != NONE
 
 
 PLAIN = OutputChoice()  #: What is written where nothing is asked for.

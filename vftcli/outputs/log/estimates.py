@@ -194,7 +194,7 @@ def write_extras(
             needed("rerun", path.name)
             from vftcli.outputs.log.rerun_recording import write_rrd
 
-            write_rrd(path, analysis, choice.rrd_detail)
+            write_rrd(path, analysis, choice.detail)
 
 
 def write_estimate_folder(

@@ -144,7 +144,7 @@ def fill(
         from vftcli.outputs.log.rerun_recording import write_rrd
 
         path = folder / f"{place}recording.rrd"
-        writers.insert(1, lambda: write_rrd(path, analysis, choice.rrd_detail))
+        writers.insert(1, lambda: write_rrd(path, analysis, choice.detail))
     for write in steps(writers):
         write()
     put_errors(folder, place, analysis.errors, [analysis])
