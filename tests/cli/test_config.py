@@ -64,10 +64,10 @@ def test_a_named_file_is_read_in_place_of_the_folder_s(run, here: Path) -> None:
 
 
 def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
-    keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nno-contacts = true\nwrench = false\n')
+    keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nwrench = false\n[contacts]\nlist = false\n')
     assert run("estimate", LOG, "-o", "out")[0] == 0
     command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
-    kept = "--observer gmo --robot ur5 --no-contacts --config none"
+    kept = "--observer gmo --robot ur5 --set contacts.list=no --config none"
     assert sorted(command.split()) == sorted(f"vftcli estimate {LOG} -o out {kept}".split())
     (here / config.NAME).unlink()
     assert run(*command.split()[1:], "-o", "again")[0] == 0
@@ -77,7 +77,7 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
 
 @pytest.mark.slow
 def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
-    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\nno-contacts = true\n')
+    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\n[contacts]\nlist = false\n')
     code, _, err = run("estimate", LOG, "-o", "out")
     assert (code, "--columns=-t,q:6" in err) == (1, True)
     assert run("estimate", LOG, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
@@ -99,17 +99,19 @@ def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch
         ('robt = "ur5"', "'robt' is no option of a command that reads a log. Did you mean robot?"),
         ("dance = 1", "A key is an option without its dashes, as robot."),
         ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
-        ("[compre]\nwrench = true", "[compre] is no command that reads a log; there is contacts"),
+        ("[compre]\nwrench = true", "compre.wrench is no setting; vftcli help settings lists them"),
         ("force = true", "force is not kept in a file; type --force"),
         ("robot = ", "not valid TOML"),
         ("robot = true", "robot = True is not a text or a number"),
         ('robot = ["ur5", "ur3"]', "is not a text or a number"),
-        ("robot = {name = 'ur5'}", "is not a text or a number"),
+        ("robot = {name = 'ur5'}", "robot.name is no setting"),
+        ("[two-cycle]\nperiot = 4", "is no setting; vftcli help settings lists them. Did you mean"),
         ("free = [[1, 2]]", "is not a text, a number or a list of them"),
         ("free = []", "is not a text, a number or a list of them"),
         ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
-        ('period = "long"', "period = 'long': 'long' is not a valid float"),
-        ('alignment = "odd"', "no alignment 'odd'"),
+        ('[two-cycle]\nperiod = "long"', "two-cycle.period=long is not a number"),
+        ('[two-cycle]\nalignment = "odd"', "no alignment 'odd'"),
+        ("two-cycle = 4", "'two-cycle' is no option of a command that reads a log"),
         ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
     ],
 )
@@ -180,7 +182,16 @@ def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
 
 
 def test_every_option_kept_otherwise_exists() -> None:
-    known = config.known_options()
-    assert "init" not in known
+    known, choices = config.known_options()
     for command, keys in config.OTHERWISE.items():
-        assert keys <= set(known[command])
+        for key in keys:
+            assert key in known[command] or any(kind.takes(key) for kind in choices)
+
+
+def test_a_typed_setting_goes_before_a_kept_one(run, here: Path) -> None:
+    keep(here, 'robot = "ur5"\n[gmo]\ngain = [5, 5, 5, 5, 5, 5]\n[fdo]\nomega = 8\n')
+    words = ("--observer", "gmo", "--observer", "fdo", "--reference", "zero", "--json")
+    _, kept, err = run("compare", LOG, *words, "--set", "gmo.gain=9")
+    assert "gives --set fdo.omega=8 --robot ur5 (" in err
+    typed = ("--set", "gmo.gain=9", "--set", "fdo.omega=8", "--robot", "ur5", "--config", "none")
+    assert kept == run("compare", LOG, *words, *typed)[1]

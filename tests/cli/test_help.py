@@ -61,8 +61,8 @@ def test_options_stand_in_groups_in_their_order(run: Run) -> None:
     assert tuple(heads) == GROUPS
     wrench = text.partition("The wrench")[2].partition("What to write")[0]
     assert "--frame" in wrench
-    assert "--solver" not in text
-    assert "--solver" in helped(run, "report", "--help-all")
+    assert "virtual-sensor.solver" not in text
+    assert "virtual-sensor.solver" in helped(run, "report", "--help-all")
 
 
 def test_the_commands_are_listed_by_what_one_sets_out_to_do(run: Run) -> None:
@@ -141,7 +141,7 @@ def test_help_loads_nothing_heavy() -> None:
 
 @pytest.mark.parametrize(
     ("typed", "offered"),
-    [("vftcli rep", {"report"}), ("vftcli report --fr", {"--free", "--frame", "--friction"})],
+    [("vftcli rep", {"report"}), ("vftcli report --fr", {"--free", "--frame", "model.friction"})],
 )
 def test_a_shell_completes_commands_and_options(typed: str, offered: set[str]) -> None:
     words = typed.split()

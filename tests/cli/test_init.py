@@ -62,7 +62,7 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     }
     assert options(here) == found == json.loads(out)["options"]
     assert '# free = ["push_pose.csv"]' in (here / NAME).read_text("utf-8")
-    asked = ("load_14harm.csv", "--observer", "gmo", "--no-contacts")
+    asked = ("load_14harm.csv", "--observer", "gmo", "--set", "contacts.list=no")
     assert run("report", *asked, "-o", "kept")[0] == 0
     typed = ["--robot", "ur10e", "--columns", found["columns"], "--free", "free_14harm.csv"]
     (here / NAME).unlink()

@@ -67,7 +67,7 @@ class Task:
             raise ParameterError("--fit-constants is an option of --method friction")
         if self.method == "targets" and not self.friction:
             raise ParameterError(
-                "--method targets reads the controller's friction; leave out --friction none"
+                "--method targets reads the controller's friction; leave model.friction=none away"
             )
 
 
