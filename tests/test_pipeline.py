@@ -196,12 +196,10 @@ def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None
 
 def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
     online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
-    with pytest.raises(
-        ParameterError, match=r"--set bias\.method=whole-log needs the complete log"
-    ):
+    with pytest.raises(ParameterError, match=r"bias\.method=whole-log needs the complete log"):
         replace(online, refinement=RefinementChoice(bias="whole-log"))
     with pytest.raises(
-        ParameterError, match=r"--set virtual-sensor\.solver=smoother needs the complete log"
+        ParameterError, match=r"virtual-sensor\.solver=smoother needs the complete log"
     ):
         replace(online, wrench=WrenchChoice(solver="smoother"))
 

@@ -199,7 +199,8 @@ FIT = ("--set", "virtual-sensor.sensor=fit")
 TOO_LONG = cut(0, 9, *TWO, "--set", "two-cycle.period=30")
 
 ROWS = [
-    Row("has no admittance.start", released("start"), "admittance.start", "0,-1.35,1.9,-2.12,-1.57,0"),
+    Row("has no admittance.start", released("start"), "admittance.start",
+        "0,-1.35,1.9,-2.12,-1.57,0"),
     Row("no admittance.period", released("period"), "admittance.period"),
     Row(": no admittance ", released("mass = 3.0"), "set", "3"),
     Row("a release needs a deviation", lambda _: [

@@ -37,12 +37,12 @@ def test_xi_and_threshold_mode_are_settings() -> None:
 
 
 def test_as_printed_the_whole_force_enters_unless_a_mode_is_named() -> None:
-    def mode(*assignments: str, **words: str) -> str:
-        choice = ControlChoice(assignments=assignments, as_printed=True, **words)
+    def mode(*assignments: str) -> str:
+        choice = ControlChoice(assignments=assignments, as_printed=True)
         return choice.parameters(UR5).threshold_mode
 
     assert mode() == "literal"
-    assert mode(threshold_mode="hard") == mode("threshold_mode=hard") == "hard"
+    assert mode("admittance.threshold_mode=hard") == mode("threshold_mode=hard") == "hard"
     assert ControlChoice.parsed().parameters(UR5).threshold_mode == "hard"
 
 

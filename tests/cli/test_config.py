@@ -17,7 +17,7 @@ interval = "0:4"
 reference = "file:truth.csv"
 [compare]
 reference = "zero"
-contacts = false
+wrench = false
 """
 
 

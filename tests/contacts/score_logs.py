@@ -101,7 +101,7 @@ def engine(log: Path, folder: Path, read: ReadChoice, span: str, reference: str)
     choice = AnalysisChoice(
         read=read,
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        free=FreeChoice.parsed(free=[span]),
+        free=FreeChoice.parsed(free=[span] if span else ()),
         observers=ObserverChoice(names=("best",)),
         wrench=WrenchChoice(frame="base"),
         reference=ReferenceChoice(name=reference),

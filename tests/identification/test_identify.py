@@ -349,7 +349,7 @@ def test_an_unknown_load_is_suspected():
     [
         ({"method": "magic"}, "friction, base, targets"),
         ({"method": None}, "nothing to identify"),
-        ({"method": "targets", "friction": False}, "leave out --set model.friction=none"),
+        ({"method": "targets", "friction": False}, "leave model.friction=none away"),
         ({"method": "base", "fit_constants": True}, "--method friction"),
     ],
 )

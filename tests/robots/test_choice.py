@@ -42,7 +42,7 @@ def test_friction_can_be_left_away() -> None:
 
 
 def test_another_friction_is_refused_before_a_log_is_read() -> None:
-    with pytest.raises(ParameterError, match=r"model\.friction 'lugre'; there is profile, none"):
+    with pytest.raises(ParameterError, match=r"model\.friction=lugre; there is profile, none"):
         RobotChoice(friction="lugre")
 
 

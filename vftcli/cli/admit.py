@@ -59,9 +59,7 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    The traditional controller and variable-parameter ones. Writes DIR/index.html,
-    motion.parquet, comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe
-    unless you name another. A scenario runs with the controller in the loop.
+    The force is that of kfo-fe; a scenario runs with the controller in the loop.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """

@@ -171,6 +171,10 @@ def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
     for name, table in tables.items():
         if not isinstance(table, dict):
             raise ParameterError(f"{path}: {name} = {shown(table)} is no table of options")
+        # [contacts] is the command's table, and the group of contacts.list.
+        group = [key for key in table if any(kind.takes(f"{name}.{key}") for kind in choices)]
+        if group:
+            content[name] = {key: table.pop(key) for key in group}
         check_keys(path, f"of {name}", flattened(path, table, choices), known[name])
     top = flattened(path, content, choices)
     every = dict.fromkeys(key for options in known.values() for key in options)

@@ -170,8 +170,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         from vftcli.outputs.files import protected
 
         kept = taken().path
-        typed = values.get("set") or ()
-        values["settings"] = {**taken().settings, **settings_of(typed, part.choices)}
+        if part.choices:
+            typed = settings_of(values.get("set") or (), part.choices)
+            values["settings"] = {**taken().settings, **typed}
         inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
