@@ -1,5 +1,6 @@
 """The commands: where each is, what it does in a sentence, and what one sets out to do with it."""
 
+import os
 import re
 from pathlib import Path
 from typing import NamedTuple
@@ -58,3 +59,16 @@ COMMANDS = {
     for journey, places in JOURNEYS.items()
     for name, place in places.items()
 }
+
+DEFAULT = "contacts"  #: The command of words that name none.
+#: Options of the program itself.
+OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
+
+
+def with_command(words: list[str]) -> list[str]:
+    """The words of a call with its command, also where a log or options come first."""
+    if not words or words[0] in COMMANDS or words[0] in OF_PROGRAM:
+        return words
+    first = words[0]
+    is_log = not {".", "/", os.sep}.isdisjoint(first) or Path(first).exists()
+    return [DEFAULT, *words] if is_log or first.startswith("-") else words

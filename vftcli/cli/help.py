@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options
-from vftcli.cli.commands import COMMANDS
+from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.config import config_option, forget, is_configured, settle
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
@@ -63,9 +63,13 @@ class JourneyGroup(TyperGroup):
         """Write the list of commands."""
         formatter.write(program_help(self, ctx))
 
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+        """Parse the words; without a command they are of the default one."""
+        return super().parse_args(ctx, with_command(args))
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """The command that is asked for; of one that there is not, the nearest if it is near."""
-        if args and not args[0].startswith("-") and args[0] not in self.commands:
+        if args[0] not in self.commands:
             ctx.fail(f"No such command '{args[0]}'.{did_you_mean(args[0], self.commands)}")
         return super().resolve_command(ctx, args)
 
@@ -127,7 +131,7 @@ def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
 def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
     """The commands by what one sets out to do, one line each; then the program's options."""
     width = columns()
-    lines = ["Usage: vftcli COMMAND LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
+    lines = ["Usage: vftcli [COMMAND] LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
     left = max(map(len, group.commands))
     for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
         lines += ["", journey]
