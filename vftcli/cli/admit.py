@@ -105,7 +105,7 @@ def admit(
             form=form,
         )
         if not (shown.json or shown.latex):
-            say(f"wrote {output}: vftcli open {output}")
+            say(f"wrote {output}: open {output / 'index.html'}")
         say_left_out(files_of_replay(form))
         if show_made:
             open_made(output)
