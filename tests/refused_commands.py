@@ -121,7 +121,7 @@ def mimicking(folder: Path) -> list[Any]:
     parts = text.split("</joint>")
     parts[2] += '<mimic joint="' + re.findall('<joint name="([^"]+)"', text)[1] + '"/>'
     (folder / "arm.urdf").write_text("</joint>".join(parts), encoding="utf-8")
-    return ["robots", folder / "arm.urdf"]
+    return ["help", "robots", folder / "arm.urdf"]
 
 
 def xacro(folder: Path) -> list[Any]:
@@ -130,7 +130,7 @@ def xacro(folder: Path) -> list[Any]:
     text = re.sub("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', text, count=1)
     text = re.sub('<mass value="[^"]*"', '<mass value="$(arg heavy)"', text, count=1)
     (folder / "arm.urdf.xacro").write_text(text, encoding="utf-8")
-    return ["robots", folder / "arm.urdf.xacro"]
+    return ["help", "robots", folder / "arm.urdf.xacro"]
 
 
 def gripping(folder: Path) -> list[Any]:

@@ -30,7 +30,6 @@ JOURNEYS = {
         "compare": "compare:compare",
         "batch": "batch:batch",
         "thresholds": "thresholds:contact_thresholds",
-        "open": "opening:open_folder",
     },
     "Prepare a robot and its logs": {
         "inspect": "inspect:inspect_log",
@@ -47,10 +46,7 @@ JOURNEYS = {
         "bench": "bench:bench",
     },
     "Look up": {
-        "robots": "listings:robots",
-        "observers": "listings:observers",
-        "formats": "listings:list_formats",
-        "help": "help:show_help",
+        "help": "listings:show_help",
     },
 }
 #: Name → the command.

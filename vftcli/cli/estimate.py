@@ -78,7 +78,7 @@ def estimate(
     else:
         show_estimates(made, output, estimate_files(written.extras))
     if show:
-        from vftcli.cli.opening import open_made
+        from vftcli.cli.console import open_made
 
         open_made(output)
 

@@ -8,20 +8,17 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
 from typer.core import TyperCommand, TyperGroup
 
-from vftcli.cli import options
 from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.config import config_option, forget, is_configured, settle
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
 from vftcli.signals.parsing import did_you_mean, nearest
 
 OWN = "This command"  #: Heading of the options that only one command has.
-NARROWEST, WIDEST, LEFT = 72, 100, 33  #: Columns of a help text, and of its left half at most.
+NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left half at most.
 
 
 class GroupedCommand(TyperCommand):
@@ -153,28 +150,3 @@ def topics() -> Mapping[str, Mapping[str, str]]:
     import tomllib
 
     return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
-
-
-@options.command
-def show_help(
-    ctx: typer.Context,
-    topic: Annotated[str | None, Option("", "[TOPIC]", "A topic or a command; none: the list.")],
-) -> None:
-    """Explain a topic, as columns or frames, or a command.
-
-    Example: vftcli help columns
-    """
-    found = topics()
-    if topic is None:
-        lines = [f"  {name:<10} {entry['summary']}" for name, entry in found.items()]
-        typer.echo("\n".join(["vftcli help TOPIC, of", *lines, "or of a command's name."]))
-    elif topic in found:
-        typer.echo(found[topic]["text"].rstrip())
-    elif topic in COMMANDS:
-        root: Any = ctx.find_root()
-        asked = root.command.commands[topic]
-        of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
-        typer.echo(asked.get_help(of_command))
-    else:
-        near = did_you_mean(topic, [*found, *COMMANDS])
-        raise ParameterError(f"no topic {topic!r}; there is {', '.join(found)}.{near}")

@@ -48,9 +48,8 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.cli.console import LeftOut, command_line, say_left_out
+    from vftcli.cli.console import LeftOut, command_line, open_made, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
-    from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports

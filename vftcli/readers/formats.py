@@ -147,7 +147,8 @@ def description(file: LogFile) -> str:
         )
     return (
         f"a binary file of no kind that is known (it begins {file.head[:8].hex(' ')}); export the "
-        "log as CSV, Parquet or MCAP, or name its format with --format (vftcli formats lists them)"
+        "log as CSV, Parquet or MCAP, or name its format: --set log.format=NAME (vftcli help "
+        "formats lists them)"
     )
 
 
