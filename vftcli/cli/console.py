@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from vftcli.cli.config import effective
+from vftcli.cli.config import effective, typed
 from vftcli.cli.progress import STAGES
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
@@ -51,7 +51,7 @@ PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 
 def command_line() -> str:
     """The command for `run.json` and the report: as typed, with what a file of options gave it."""
-    return printable(shlex.join(["vftcli", *effective(sys.argv[1:])]))
+    return printable(shlex.join(["vftcli", *effective(typed())]))
 
 
 def say(text: str) -> None:

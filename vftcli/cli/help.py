@@ -10,10 +10,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import typer
 from typer.core import TyperCommand, TyperGroup
 
-from vftcli.cli.commands import COMMANDS, with_command
-from vftcli.cli.config import config_option, forget, is_configured, settle
+from vftcli.cli.commands import COMMANDS, former, renewed, with_command
+from vftcli.cli.config import begin, config_option, forget, is_configured, settle
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.letters import printable
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
 from vftcli.signals.parsing import did_you_mean, nearest
 
@@ -61,12 +64,23 @@ class JourneyGroup(TyperGroup):
         formatter.write(program_help(self, ctx))
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
-        """Parse the words; without a command they are of the default one."""
-        return super().parse_args(ctx, with_command(args))
+        """Parse the words: without a command of the default one, former words by today's."""
+        words = with_command(args)
+        if not ctx.resilient_parsing and words and (command := self.commands.get(words[0])):
+            there = [name for param in command.params for name in param.opts]
+            words[1:], notes = renewed(words[1:], there)
+            if args[0] not in {words[0], *COMMANDS} and args[0] in former()["commands"]:
+                notes.insert(0, f"{args[0]} is now {former()['commands'][args[0]]}")
+            for note in notes:
+                typer.echo(printable(f"note: {note}"), err=True)
+        begin(words)
+        return super().parse_args(ctx, words)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """The command that is asked for; of one that there is not, the nearest if it is near."""
         if args[0] not in self.commands:
+            if args[0] in former()["gone"]:
+                raise ParameterError(f"{args[0]} is gone; {former()['gone'][args[0]]}")
             ctx.fail(f"No such command '{args[0]}'.{did_you_mean(args[0], self.commands)}")
         return super().resolve_command(ctx, args)
 
@@ -76,22 +90,20 @@ def columns() -> int:
     return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
 
 
-def command_help(ctx: Any) -> str:  # noqa: ANN401
+def command_help(ctx: typer.Context) -> str:
     """The help of a command: how it is called, what it does, its options by group."""
     command, width = ctx.command, columns()
     lines = [" ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)]), ""]
     for paragraph in (command.help or "").split("\n\n"):
         lines += textwrap.wrap(" ".join(paragraph.split()), width)
-    for group, rows in grouped(command, ctx):
+    for group, rows in grouped(ctx):
         lines += [f"{group}:", *two_columns(rows, width)]
     return "\n".join(lines) + "\n"
 
 
-def grouped(
-    command: GroupedCommand,
-    ctx: Any,  # noqa: ANN401
-) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+def grouped(ctx: typer.Context) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """The options of each heading that has any, as they are typed and what they mean."""
+    command: Any = ctx.command
     found: dict[str, list[tuple[str, str]]] = {}
     for param in command.get_params(ctx):
         option = command.option(param)
@@ -105,7 +117,7 @@ def grouped(
             yield group, found[group]
 
 
-def row_of(param: Any, ctx: Any) -> tuple[str, str] | None:  # noqa: ANN401
+def row_of(param: Any, ctx: typer.Context) -> tuple[str, str] | None:  # noqa: ANN401
     """How a parameter is typed, and what it means; None for one that is hidden."""
     if param.param_type_name == "argument":
         return (param.metavar or param.name.upper(), param.help) if param.help else None
@@ -125,7 +137,7 @@ def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
         yield from (f"{'':{left + 4}}{line}" for line in lines)
 
 
-def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
+def program_help(group: TyperGroup, ctx: typer.Context) -> str:
     """The commands by what one sets out to do, one line each; then the program's options."""
     width = columns()
     lines = ["Usage: vftcli [COMMAND] LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
