@@ -121,7 +121,7 @@ def mimicking(folder: Path) -> list[Any]:
     parts = text.split("</joint>")
     parts[2] += '<mimic joint="' + re.findall('<joint name="([^"]+)"', text)[1] + '"/>'
     (folder / "arm.urdf").write_text("</joint>".join(parts), encoding="utf-8")
-    return ["robots", folder / "arm.urdf"]
+    return ["help", "robots", folder / "arm.urdf"]
 
 
 def xacro(folder: Path) -> list[Any]:

@@ -236,10 +236,6 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
         (lambda f: ["contacts", f / "made" / "estimates.parquet"],
          lambda f: ["admit", f / "made" / "estimates.parquet", "--robot", "ur5"]),
     ),
-    "`vftcli estimate LOG --rrd -o DIR` a recording": (
-        lambda _: ["open", "out"],
-        (on(same, "estimate", "--rrd", "-o", "out", *GMO),),
-    ),
     "of another log `vftcli estimate` writes": (
         on(same, "annotate", "-o", "out", "--robot", "ur5"),
         (on(same, "estimate", "-o", "out", *GMO),),

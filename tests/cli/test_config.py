@@ -147,7 +147,7 @@ def test_a_file_with_bytes_that_are_no_letters_is_refused(run, here: Path) -> No
     assert (code, err.count("\n")) == (1, 1)
     # Help needs no such file.
     assert run("inspect", "--help")[0] == 0
-    assert run("robots")[0] == 0
+    assert run("help", "robots")[0] == 0
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ READING = {
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
        ("init", "--output"), ("compare", "--output"),
-       ("annotate", "--output"),
+       ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""

@@ -83,7 +83,7 @@ class ControlChoice(Choice):
         tuple[str, ...],
         setting(
             NUMBERS,
-            "NUMBER",
+            "AXIS.NUMBER",
             "As position.stiffness=12, rz.threshold=4, admittance.xi=1, "
             "admittance.threshold_mode=soft.",
             several=True,

@@ -63,8 +63,7 @@ def admit(
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
-    from vftcli.cli.console import command_line, say, say_left_out
-    from vftcli.cli.opening import open_made
+    from vftcli.cli.console import command_line, open_made, say, say_left_out
     from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
@@ -101,7 +100,7 @@ def admit(
             form=form,
         )
         if not (shown.json or shown.latex):
-            say(f"wrote {output}: vftcli open {output}")
+            say(f"wrote {output}: open {output / 'index.html'}")
         say_left_out(files_of_replay(form))
         if show_made:
             open_made(output)

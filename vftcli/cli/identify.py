@@ -104,8 +104,15 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, detail, health_of, say, say_recording, say_robots
-    from vftcli.cli.opening import open_made
+    from vftcli.cli.console import (
+        command_line,
+        detail,
+        health_of,
+        open_made,
+        say,
+        say_recording,
+        say_robots,
+    )
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification import (

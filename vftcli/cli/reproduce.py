@@ -1,5 +1,6 @@
 """`vftcli reproduce`: a paper's experiments run again, beside what it prints."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -11,27 +12,25 @@ from vftcli.signals.option import WRITE, Option
 @opt.command
 def reproduce(
     paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
-    output: opt.Folder,
+    output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: huang2025.vft.")],
     figures: opt.Figures,
     only: Annotated[
         str | None,
-        Option(
-            "--only", "NAME,…", "Only these: table1…table4, fig1…fig13, guidelines.", group=WRITE
-        ),
+        Option("--only", "NAME,…", "Run only these: table1...table4, fig1...fig13.", group=WRITE),
     ],
     fast: Annotated[
-        bool, Option("--fast", "", "One seed a scenario rather than five.", group=WRITE)
+        bool, Option("--fast", "", "Use one seed a scenario instead of five.", group=WRITE)
     ],
     force: opt.Force,
     _talk: opt.TalkOptions,
 ) -> None:
-    """Run a paper's experiments again, beside what it prints.
+    """Run the paper's experiments beside its numbers.
 
     On simulated equivalents, with stated seeds. Writes DIR/index.html, reproduction.md and
     run.json. An experiment that fails is told in its row; the others are written, and the exit
     code is 1.
 
-    Example: vftcli reproduce huang2025 --only table3 -o paper
+    Example: vftcli reproduce huang2025 --only table3
     """
     from vftcli.cli.console import command_line, say, show, stages
     from vftcli.outputs.files import OutputFolder
@@ -44,6 +43,7 @@ def reproduce(
     check_installed("pinocchio", "vftcli reproduce")
     wanted = paper_of(paper)
     names = wanted.chosen(only)
+    output = output or Path(f"{paper}.vft")
     folder = OutputFolder(output, force, files_of(wanted, names, figures))
     folder.check()
     jobs, progress = jobs_of(wanted, names, fast), stages()
@@ -56,6 +56,6 @@ def reproduce(
     with folder:
         write_reproduction(folder, wanted, found, jobs, command_line(), figures)
     show(terminal(short_overview(found)))
-    say(f"wrote {output}: vftcli open {output}")
+    say(f"wrote {output}: open {output / 'index.html'}")
     if any(shown.failures for shown in found.values()):
         raise typer.Exit(1)

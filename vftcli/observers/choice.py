@@ -80,7 +80,7 @@ class ObserverChoice(Choice):
         "Settings",
         setting(
             NUMBERS,
-            "NUMBER(S)",
+            "OBSERVER.NUMBER",
             "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
             settings_of,
             several=True,
