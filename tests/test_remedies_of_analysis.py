@@ -152,7 +152,7 @@ def gains(folder: Path) -> Path:
 
 
 def tuned(folder: Path) -> str:
-    """What `vftcli tune` writes."""
+    """What `vftcli identify --method gains` writes."""
     before(cut(0, 4, *TUNE))(folder)
     return "g.toml"
 
@@ -167,8 +167,9 @@ EST = ("estimate", "-o", "out", "--json", "--no-contacts", "--observer", "gmo")
 SMOOTHED = (*EST[:-1], "rts-auto")
 TWO = ("compare", "--observer", "gmo", "--no-contacts", "--reference", "two-cycle")
 SENSOR = (*TWO[:-1], "sensor", "--wrench")
-TUNE = ("tune", "-o", "g.toml", "--free", "0.3:3.9")
+TUNE = ("identify", "--method", "gains", "-o", "g.toml", "--free", "0.3:3.9")
 MAKE = ("identify", "-o", "own.toml")
+CONSTANTS = ("--set", "identify.constants=yes")
 BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--workers", "0")
 W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
 TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
@@ -211,9 +212,10 @@ ROWS = [
     Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd", AWAY),
     Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd-detail",
         AWAY),
-    Row("add --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1"), "threshold", "5"),
-    Row("raise --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1", "--threshold", "0.001"),
-        "threshold", "50"),
+    Row("add --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1"), "set",
+        "alarm.threshold=5"),
+    Row("raise --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1", "--set",
+                                 "alarm.threshold=0.001"), "set", "alarm.threshold=50"),
     Row("are for cycles of one log", ONE_LOG, "period", AWAY),
     Row("are for cycles of one log", ONE_LOG, "free", AWAY),
     Row("alignment commanded needs", cut(0, 12, *TWO, "--alignment", "commanded"), "period", "4"),
@@ -245,7 +247,7 @@ ROWS = [
 ]  # fmt: skip
 DEARER = [
     Row("is an option of --method friction", cut(
-        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
+        0, 8, *MAKE, *CONSTANTS, "--method", "base"), "method", "friction"),
     Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
         "t=t,q=q{i},-dq=dq{i},current=current{i}"),
     Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--contacts",
@@ -253,8 +255,8 @@ DEARER = [
     Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, "--sensor-pose",
                                       "fit", "--columns", f"wrench[base]={W}"), "columns",
         f"wrench[sensor]={W}"),
-    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
-                                                    robot="panda"), "fit-constants", AWAY),
+    Row("--set identify.constants=yes needs motor currents", cut(0, 8, *MAKE, *CONSTANTS,
+                                                    robot="panda"), "set", AWAY),
     Row("is not a free run of the trajectory", beside(
         cut(4.5, 9, *TWO), "--free", lambda folder: moved().write(folder / "other.csv")),
         "free", free_log),
@@ -262,8 +264,8 @@ DEARER = [
         0, 9, "report", "-o", "out", "--observer", "gmo", "--published", "table1"), "reference"),
     Row("torque behind the gears", cut(0, 8, *MAKE, "--friction", "none", robot="panda"),
         "method"),
-    Row("leave out --fit-constants", of(
-        against_gravity, *MAKE, "--fit-constants", "--anyway"), "fit-constants", AWAY),
+    Row("leave out --set identify.constants=yes", of(
+        against_gravity, *MAKE, *CONSTANTS, "--anyway"), "set", AWAY),
 ]  # fmt: skip
 """Rows over a second of processor time."""
 
@@ -286,7 +288,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "less than the period of", "no whole cycle of"),
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
-        "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),
+        "… has … joints, … has …: a free run must be"),
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "no log that provokes it is known": (

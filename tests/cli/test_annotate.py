@@ -27,7 +27,7 @@ def test_it_says_what_was_written(tmp_path: Path) -> None:
 def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["identify", str(FIXTURE), "--find-payload", "-o", str(tmp_path / "robot.toml")]
+    words = ["identify", str(FIXTURE), "--method", "payload", "-o", str(tmp_path / "robot.toml")]
     monkeypatch.setattr("sys.argv", ["vftcli", *words])
     with pytest.raises(SystemExit):
         main()

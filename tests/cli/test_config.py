@@ -174,7 +174,7 @@ def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: 
 
 def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
     kept = keep(here, 'robot = "ur5"\n')
-    code, _, err = run("tune", LOG, "-o", kept, "--force")
+    code, _, err = run("identify", LOG, "--method", "gains", "-o", kept, "--force")
     assert (code, kept.read_text("utf-8")) == (1, 'robot = "ur5"\n')
     assert "what this command reads" in err
 

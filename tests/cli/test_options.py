@@ -16,9 +16,8 @@ READING = {
     "estimate": ("-o", "out"),
     "compare": ("--reference", "zero"),
     "report": ("-o", "out"),
-    "tune": ("-o", "gains.toml"),
     "admit": (),
-    "identify": ("-o", "robot.toml", "--find-payload"),
+    "identify": ("-o", "robot.toml", "--method", "payload"),
     "inspect": (),
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
@@ -28,7 +27,7 @@ READING = {
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
-       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
+       ("identify", "--output"), ("convert", "--output"),
        ("init", "--output"), ("compare", "--output"),
        ("annotate", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip

@@ -36,7 +36,6 @@ JOURNEYS = {
         "init": "init:write_config",
         "identify": "identify:identify_robot",
         "annotate": "annotate:annotate_dataset",
-        "tune": "tune:tune_gains",
         "convert": "convert:convert_log",
     },
     "Study further": {

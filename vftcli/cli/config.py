@@ -29,7 +29,7 @@ NONE = "none"  #: Value of ``--config`` with which no file is read.
 TYPED = frozenset({"config", "force", "help", "set"})
 #: Command → options that it takes otherwise than the rest: only its own table gives them.
 OTHERWISE = {
-    "identify": {"free"},  # the motion without the load that is sought
+    "identify": {"free", "gains"},  # the motion without the load, what gains are found for
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"log.derive"},  # it writes what was logged
 }

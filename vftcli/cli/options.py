@@ -64,6 +64,9 @@ Anyway = Annotated[
         group=LOG,
     ),
 ]
+Check = Annotated[
+    list[Path] | None, Option("--check", "LOG", "Try the result on this log. Repeatable.")
+]
 Wrench = Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.", group=WRENCH)]
 
 
