@@ -234,9 +234,9 @@ ROWS = [
 
 BAG = Path(__file__).parent.parent / "fixtures/panda_bag/panda_bag.mcap"
 COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
-    "vftcli init LOG writes one": (
+    "vftcli inspect LOG -o FILE writes one": (
         on(same, "inspect", "--config", "my.toml"),
-        (on(same, "init", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
+        (on(same, "inspect", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
     ),
     "holds estimates, not what the drives measured": (
         lambda f: ["estimate", estimated(f), "--robot", "ur5", "-o", "out"],

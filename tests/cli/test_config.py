@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli import config
+from vftcli.cli.options import settings_by_name
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 LOG = FIXTURES / "ur5_circle.csv"
@@ -180,7 +181,17 @@ def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
 
 
 def test_every_option_kept_otherwise_exists() -> None:
-    known = config.known_options()
-    assert "init" not in known
+    known, choices = config.known_options()
     for command, keys in config.OTHERWISE.items():
-        assert keys <= set(known[command])
+        assert keys <= {*known[command], *settings_by_name(choices)}
+
+
+def test_settings_stand_in_a_table_of_their_group_also_where_a_command_is_called_so(
+    run, here: Path
+) -> None:
+    keep(here, 'robot = "ur5"\n[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n')
+    code, _, err = run("identify", LOG)
+    assert (code, "there is friction, base" in err) == (1, True)
+    for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):
+        assert word in err
+    assert "--method" not in run("compare", LOG, "--reference", "zero", "--interval", "0:1")[2]

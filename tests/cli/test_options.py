@@ -22,13 +22,12 @@ READING = {
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
     "contacts": (),
-    "init": (),
 }
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
        ("identify", "--output"), ("convert", "--output"),
-       ("init", "--output"), ("compare", "--output"),
+       ("inspect", "--output"), ("compare", "--output"),
        ("annotate", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which

@@ -119,7 +119,7 @@ def test_residuals_are_cut_apart_log_by_log(recording):
 def test_drive_constants_need_currents(recording):
     torque = replace(recording, current=None, torque=recording.q)
     with pytest.raises(
-        IdentificationError, match="--set identify.constants=yes needs motor currents"
+        IdentificationError, match=r"--set identify\.constants=yes needs motor currents"
     ):
         prepare_training([torque], UR5, Processing(), fit_constants=True)
 

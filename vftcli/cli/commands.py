@@ -33,7 +33,6 @@ JOURNEYS = {
     },
     "Prepare a robot and its logs": {
         "inspect": "inspect:inspect_log",
-        "init": "init:write_config",
         "identify": "identify:identify_robot",
         "annotate": "annotate:annotate_dataset",
         "convert": "convert:convert_log",
