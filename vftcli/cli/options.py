@@ -272,7 +272,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
-    how["metavar"] = option.metavar or None
+    how |= {"metavar": option.metavar or None, "show_default": False}
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
     single = inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]
