@@ -220,7 +220,7 @@ ROWS = [
     Row("leave --interval and --episode out", annotated("--interval", "0:1"), "--interval",
         LEFT_OUT),
     Row("leave --interval and --episode out", annotated("--episode", "1"), "--episode", LEFT_OUT),
-    Row("states no standard deviation", annotated("--sd", "--observer", "gmo"), "--observer",
+    Row("states no standard deviation", annotated("--add", "sd", "--observer", "gmo"), "--observer",
         "kfo-zoh"),
     Row("exists; give another -o, or --force", two_copies, "--force", FLAG),
     Row("--force removes no other folder", lambda f: [

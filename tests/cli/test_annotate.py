@@ -13,7 +13,7 @@ FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
 
 @pytest.mark.slow
 def test_it_says_what_was_written(tmp_path: Path) -> None:
-    words = ["annotate", str(FIXTURE), "-o", str(tmp_path / "copy"), "--wrench", "--contact"]
+    words = ["annotate", str(FIXTURE), "-o", str(tmp_path / "copy"), "--add", "wrench,contact"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert "3 episodes (3 done), 540 frames, panda, kfo-zoh, causal" in result.stderr
@@ -43,6 +43,7 @@ def test_refusals_are_one_line(
     for words, said in (
         (["-o", inside], "one inside the other"),
         (["-o", str(tmp_path / "c"), "--episode", "1"], "leave --interval and --episode out"),
+        (["-o", str(tmp_path / "c"), "--add", "sd,force"], "--add force; there is wrench, sd,"),
         (["-o", str(tmp_path / "c"), "--robot", "ur5"], "Choose the arm of this log with --robot"),
     ):
         monkeypatch.setattr("sys.argv", ["vftcli", "annotate", str(FIXTURE), *words])

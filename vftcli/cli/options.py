@@ -35,6 +35,7 @@ Log = Annotated[Path, Option("", "LOG", "A log file or bag folder, recognised by
 Logs = Annotated[
     list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
+Output = Annotated[Path, Option("-o/--output", "PATH", "Write here; required.", group=WRITE)]
 Folder = Annotated[Path, Option("-o/--output", "DIR", "Folder to write into.", group=WRITE)]
 Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
 Json = Annotated[
