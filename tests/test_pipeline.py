@@ -142,7 +142,7 @@ def asked(name: str, *free: Path, **more: object) -> AnalysisChoice:
         ("compare LOAD --reference two-cycle --set two-cycle.free-cycles=1", 1, 1, 0),
         ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
         ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
-        ("tune LOAD --free FREE -o OUT.toml", 2, 2, 1),
+        ("identify LOAD --method gains --free FREE -o OUT.toml", 2, 2, 1),
     ],
 )
 def test_every_log_is_read_modelled_and_aligned_once(

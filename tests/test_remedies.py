@@ -452,8 +452,8 @@ def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     path, own = table.write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
     said = told("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
     assert said is not None
-    name, option = re.search(r"(identify) (--find-payload)", said).groups()  # type: ignore[union-attr]
-    code, text = printed([name, path, option, "--robot", "ur5", "-o", own])
+    name, *how = re.search(r"(identify) (--method) (payload)", said).groups()  # type: ignore[union-attr]
+    code, text = printed([name, path, *how, "--robot", "ur5", "-o", own])
     assert code == 0, text
     assert told("unmodelled-load", printed(["inspect", path, "--robot", own])[1]) is None
 
@@ -488,7 +488,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
 def test_a_load_that_one_motion_does_not_show_is_found_in_a_pair(tmp_path: Path) -> None:
     """As the refusal says."""
     loaded, free = payload(sound()).write(tmp_path / "a.csv"), sound().write(tmp_path / "b.csv")
-    search = ["--find-payload", "--robot", "ur5", "-o", tmp_path / "loaded.toml"]
+    search = ["--method", "payload", "--robot", "ur5", "-o", tmp_path / "loaded.toml"]
     code, text = printed(["identify", loaded, *search])
     assert code == 1
     assert "in a pair of logs of one motion with and without it" in text

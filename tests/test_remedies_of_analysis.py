@@ -167,7 +167,7 @@ def gains(folder: Path) -> Path:
 
 
 def tuned(folder: Path) -> str:
-    """What `vftcli tune` writes."""
+    """What `vftcli identify --method gains` writes."""
     before(cut(0, 4, *TUNE))(folder)
     return "g.toml"
 
@@ -182,8 +182,9 @@ EST = ("estimate", "-o", "out", "--json", *NO_LIST, "--observer", "gmo")
 SMOOTHED = (*EST[:-1], "rts-auto")
 TWO = ("compare", "--observer", "gmo", *NO_LIST, "--reference", "two-cycle")
 SENSOR = (*TWO[:-1], "sensor", "--wrench")
-TUNE = ("tune", "-o", "g.toml", "--free", "0.3:3.9")
+TUNE = ("identify", "--method", "gains", "-o", "g.toml", "--free", "0.3:3.9")
 MAKE = ("identify", "-o", "own.toml")
+CONSTANTS = ("--set", "identify.constants=yes")
 BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--jobs", "0")
 W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
 TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
@@ -229,9 +230,10 @@ ROWS = [
     Row("writes no recording", NO_RECORDING, "rrd", AWAY),
     Row("writes no recording", NO_RECORDING, "recording.detail",
         AWAY),
-    Row("add --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1"), "threshold", "5"),
-    Row("raise --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1", "--threshold", "0.001"),
-        "threshold", "50"),
+    Row("add --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1"), "set",
+        "alarm.threshold=5"),
+    Row("raise --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1", "--set",
+                                 "alarm.threshold=0.001"), "set", "alarm.threshold=50"),
     Row("are for cycles of one log", ONE_LOG, "period", AWAY),
     Row("are for cycles of one log", ONE_LOG, "free", AWAY),
     Row("alignment commanded needs", COMMANDED, "two-cycle.period", "4"),
@@ -263,7 +265,7 @@ ROWS = [
 ]  # fmt: skip
 DEARER = [
     Row("is an option of --method friction", cut(
-        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
+        0, 8, *MAKE, *CONSTANTS, "--method", "base"), "method", "friction"),
     Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
         "t=t,q=q{i},-dq=dq{i},current=current{i}"),
     Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--details",
@@ -271,8 +273,8 @@ DEARER = [
     Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, *FIT,
                                       "--columns", f"wrench[base]={W}"), "columns",
         f"wrench[sensor]={W}"),
-    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
-                                                    robot="panda"), "fit-constants", AWAY),
+    Row("--set identify.constants=yes needs motor currents", cut(0, 8, *MAKE, *CONSTANTS,
+                                                    robot="panda"), "set", AWAY),
     Row("is not a free run of the trajectory", beside(
         cut(4.5, 9, *TWO), "--free", lambda folder: moved().write(folder / "other.csv")),
         "free", free_log),
@@ -280,8 +282,8 @@ DEARER = [
         0, 9, "report", "-o", "out", "--observer", "gmo", *PRINT), "reference"),
     Row("torque behind the gears", cut(0, 8, *MAKE, "--set", "model.friction=none", robot="panda"),
         "method"),
-    Row("leave out --fit-constants", of(
-        against_gravity, *MAKE, "--fit-constants", "--anyway"), "fit-constants", AWAY),
+    Row("leave out --set identify.constants=yes", of(
+        against_gravity, *MAKE, *CONSTANTS, "--anyway"), "set", AWAY),
 ]  # fmt: skip
 """Rows over a second of processor time."""
 
@@ -304,7 +306,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "less than the period of", "no whole cycle of"),
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
-        "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),
+        "… has … joints, … has …: a free run must be"),
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "no log that provokes it is known": (

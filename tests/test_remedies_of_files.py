@@ -213,7 +213,7 @@ ROWS = [
     Row("leave --interval and --episode out", annotated("--interval", "0:1"), "--interval",
         LEFT_OUT),
     Row("leave --interval and --episode out", annotated("--episode", "1"), "--episode", LEFT_OUT),
-    Row("states no standard deviation", annotated("--sd", "--observer", "gmo"), "--observer",
+    Row("states no standard deviation", annotated("--add", "sd", "--observer", "gmo"), "--observer",
         "kfo-zoh"),
     Row("exists; give another -o, or --force", two_copies, "--force", FLAG),
     Row("--force removes no other folder", lambda f: [
@@ -227,9 +227,9 @@ ROWS = [
 
 BAG = Path(__file__).parent.parent / "fixtures/panda_bag/panda_bag.mcap"
 COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
-    "vftcli init LOG writes one": (
+    "vftcli inspect LOG -o FILE writes one": (
         on(same, "inspect", "--config", "my.toml"),
-        (on(same, "init", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
+        (on(same, "inspect", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
     ),
     "holds estimates, not what the drives measured": (
         lambda f: ["estimate", estimated(f), "--robot", "ur5", "-o", "out"],

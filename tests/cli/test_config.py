@@ -176,7 +176,7 @@ def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: 
 
 def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
     kept = keep(here, 'robot = "ur5"\n')
-    code, _, err = run("tune", LOG, "-o", kept, "--force")
+    code, _, err = run("identify", LOG, "--method", "gains", "-o", kept, "--force")
     assert (code, kept.read_text("utf-8")) == (1, 'robot = "ur5"\n')
     assert "what this command reads" in err
 
@@ -195,3 +195,14 @@ def test_a_typed_setting_goes_before_a_kept_one(run, here: Path) -> None:
     assert "gives --set fdo.omega=8 --robot ur5 (" in err
     typed = ("--set", "gmo.gain=9", "--set", "fdo.omega=8", "--robot", "ur5", "--config", "none")
     assert kept == run("compare", LOG, *words, *typed)[1]
+
+
+def test_settings_stand_in_a_table_of_their_group_also_where_a_command_is_called_so(
+    run, here: Path
+) -> None:
+    keep(here, 'robot = "ur5"\n[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n')
+    code, _, err = run("identify", LOG)
+    assert (code, "there is friction, base" in err) == (1, True)
+    for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):
+        assert word in err
+    assert "--method" not in run("compare", LOG, "--reference", "zero", "--interval", "0:1")[2]

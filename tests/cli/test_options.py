@@ -17,21 +17,19 @@ READING = {
     "estimate": ("-o", "out"),
     "compare": ("--reference", "zero"),
     "report": ("-o", "out"),
-    "tune": ("-o", "gains.toml"),
     "admit": (),
-    "identify": ("-o", "robot.toml", "--find-payload"),
+    "identify": ("-o", "robot.toml", "--method", "payload"),
     "inspect": (),
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
     "contacts": (),
-    "init": (),
 }
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
-       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
-       ("init", "--output"), ("compare", "--output"),
-       ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
+       ("identify", "--output"), ("convert", "--output"), ("inspect", "--output"),
+       ("compare", "--output"), ("annotate", "--output"), ("batch", "--output"),
+       ("reproduce", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
 the contract makes a file of `estimate` and a table of the others."""

@@ -18,14 +18,13 @@ EPISODES = "panda_episodes"
 RATE, SECONDS = 50.0, 12.0
 """Of a seed [Hz, s]: `best` runs on it, and most commands take about a second."""
 
-ENDINGS = {"identify": "out.toml", "tune": "out.toml"}
+ENDINGS = {"identify": "out.toml"}
 CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
     "report": {
         "--reference": ("zero", "two-cycle", "vendor"),
         "recording.detail": ("levels", "none"),
     },
-    "identify": {"--method": ("auto", "friction", "base", "targets")},
-    "tune": {"--goal": ("rmse", "delay=0.05", "bandwidth=5", "false-alarms=60")},
+    "identify": {"--method": ("friction", "base", "targets", "payload", "gains")},
     "admit": {"admittance.controller": ("variable", "traditional")},
     "contacts": {"--free": ("0:3", "9:12")},
     "thresholds": {"--rate": ("1", "60")},

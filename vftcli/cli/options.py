@@ -41,7 +41,7 @@ Logs = Annotated[
     list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
 OUT = Option("-o/--output", "PATH", "Write here; required.", group=WRITE)
-Folder = Annotated[Path, OUT]
+Output = Annotated[Path, OUT]
 #: A folder that `folder_of` names where it is not given.
 LogFolder = Annotated[
     Path | None, OUT._replace(help="Write here; default: LOG.vft in this folder.")
@@ -73,6 +73,9 @@ Anyway = Annotated[
         "Continue despite errors; the outputs are marked.",
         group=LOG,
     ),
+]
+Check = Annotated[
+    list[Path] | None, Option("--check", "LOG", "Try the result on this log. Repeatable.")
 ]
 Wrench = Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.", group=WRENCH)]
 
@@ -296,7 +299,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
-    how["metavar"] = option.metavar or None
+    how |= {"metavar": option.metavar or None, "show_default": False}
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
     single = inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]

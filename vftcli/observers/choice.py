@@ -216,3 +216,16 @@ class ObserverChoice(Choice):
         if self.gains_file is None:
             return gains
         return overlay_gains(gains, load_gains(self.gains_file, sections()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalChoice(Choice):
+    """What gains are found for."""
+
+    GROUP = ESTIMATE
+
+    gains: Annotated[str, ObserverChoice.option("gains", reads=None)] = LOG_GAINS
+    threshold: Annotated[
+        str | None,
+        setting("alarm.threshold", "NUMBER(S)", "Torque of an alarm [N·m], one or one a joint."),
+    ] = None

@@ -166,7 +166,7 @@ class Baselines:
         plain = self.plain.tunable
         called_for = None
         if gains and plain is not None:
-            least = tune_all(plain, Goal("rmse"))
+            least = tune_all(plain, Goal("auto"))
             called_for = {line.section: dict(line.gains) for line in least}
         return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
 
