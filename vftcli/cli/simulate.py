@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.signals.option import WRITE, Option
+from vftcli.signals.option import WRITE, Option, names_at
 
 WIDTH = 30  #: Width of the progress bar. [characters]
 QUICK = 1.0  #: Runs shorter than this show no bar. [s]
@@ -26,8 +26,8 @@ def simulate_log(
         Option(
             "--as",
             "FORMAT",
-            "rtde, ur-rtde, libfranka, rosbag2 or parquet; default: the vendor's own, else "
-            "parquet.",
+            "Write rtde, ur-rtde, libfranka, rosbag2 or parquet.",
+            completes=names_at("simulation.writers:WRITERS"),
         ),
     ] = "",
     settings: Annotated[
