@@ -35,7 +35,8 @@ Log = Annotated[Path, Option("", "LOG", "A log file or bag folder, recognised by
 Logs = Annotated[
     list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
-Output = Annotated[Path, Option("-o/--output", "PATH", "Write here; required.", group=WRITE)]
+PLACE = Option("-o/--output", "PATH", "Write here.", group=WRITE)  # typer adds: required
+Output = Annotated[Path, PLACE]
 Folder = Annotated[Path, Option("-o/--output", "DIR", "Folder to write into.", group=WRITE)]
 Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
 Json = Annotated[
@@ -93,17 +94,8 @@ Figures = Annotated[
     ),
 ]
 #: The option for every setting of a command.
-SET = (
-    Annotated[
-        list[str] | None,
-        Option(
-            "--set",
-            "NAME=VALUE",
-            "Change any setting (help settings). Repeatable.",
-            group=ESTIMATE,
-        ),
-    ],
-    None,
+SET = Option(
+    "--set", "NAME=VALUE", "Change any setting (help settings). Repeatable.", group=ESTIMATE
 )
 LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).")
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
@@ -166,7 +158,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     arguments = inspect.signature(function).parameters.values()
     part = members("", {a.name: (a.annotation, a.default) for a in arguments})
     if any(option.is_setting for kind in part.choices for _, _, option in kind.options().values()):
-        part.parameters.extend(taken_apart("set", *SET).parameters)
+        part.parameters.extend(
+            taken_apart("set", Annotated[list[str] | None, SET], None).parameters
+        )
 
     def called(**values: Any) -> None:  # noqa: ANN401
         from vftcli.cli.config import taken

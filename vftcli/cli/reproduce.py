@@ -1,33 +1,32 @@
 """`vftcli reproduce`: a paper's experiments run again, beside what it prints."""
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.signals.option import WRITE, Option
+from vftcli.signals.option import Option
 
 
 @opt.command
 def reproduce(
     paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
-    output: opt.Folder,
+    output: Annotated[
+        Path | None, opt.PLACE._replace(help="Write here; default: huang2025.vft in this folder.")
+    ],
     figures: opt.Figures,
     only: Annotated[
         str | None,
-        Option(
-            "--only", "NAME,…", "Only these: table1…table4, fig1…fig13, guidelines.", group=WRITE
-        ),
+        Option("--only", "NAME,...", "Run only these: table1...table4, fig1...fig13."),
     ],
-    fast: Annotated[
-        bool, Option("--fast", "", "One seed a scenario rather than five.", group=WRITE)
-    ],
+    fast: Annotated[bool, Option("--fast", "", "Use one seed a scenario instead of five.")],
     force: opt.Force,
     _talk: opt.TalkOptions,
 ) -> None:
-    """Run a paper's experiments again, beside what it prints.
+    """Run the paper's experiments beside its numbers.
 
-    On simulated equivalents, with stated seeds. Writes DIR/index.html, reproduction.md and
+    On simulated equivalents, with stated seeds. Writes PATH/index.html, reproduction.md and
     run.json. An experiment that fails is told in its row; the others are written, and the exit
     code is 1.
 
@@ -44,6 +43,7 @@ def reproduce(
     check_installed("pinocchio", "vftcli reproduce")
     wanted = paper_of(paper)
     names = wanted.chosen(only)
+    output = output or Path(f"{paper}.vft")
     folder = OutputFolder(output, force, files_of(wanted, names, figures))
     folder.check()
     jobs, progress = jobs_of(wanted, names, fast), stages()
