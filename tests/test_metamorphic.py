@@ -257,7 +257,15 @@ def observers_permuted(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None
     equal(one, ask(logs.load, "--observer", "kfo-fe", "--observer", "gmo", *more))
 
 
-SENSOR = ("--reference", "sensor", "--wrench", "--zero", "start", "--sensor-pose", "0,0,0.03")
+SENSOR = (
+    "--reference",
+    "sensor",
+    "--wrench",
+    "--zero",
+    "start",
+    "--set",
+    "virtual-sensor.sensor=0,0,0.03",
+)
 
 
 def observers_permuted_before_a_sensor(ask: Ask, logs: Logs) -> None:

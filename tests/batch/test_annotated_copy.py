@@ -177,7 +177,9 @@ def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> No
     edited(dataset, "observation.state", stretch)
     edited(dataset, "observation.velocity", still)
     by_map = ForceChoice(wrench=WrenchChoice(solver="map"))
-    with pytest.raises(LogError, match="--solver smoother has a wrench in every pose"):
+    with pytest.raises(
+        LogError, match=r"--set virtual-sensor\.solver=smoother has a wrench in every pose"
+    ):
         made(dataset, tmp_path / "copy", by_map)
 
 
@@ -193,7 +195,7 @@ def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_p
     turned = "q=observation.state,dq=observation.velocity,-tau=observation.effort"
     with pytest.raises(LogError, match="effort"):
         made(dataset, copy, ForceChoice(read=ReadChoice(columns=turned)))
-    with pytest.raises(LogError, match=r"no joint velocities\. --derive dq"):
+    with pytest.raises(LogError, match=r"no joint velocities\. --set log.derive=dq"):
         made(
             dataset,
             copy,

@@ -71,7 +71,7 @@ def test_every_table_shows_both_logs(logs, option):
 
 @pytest.mark.slow
 def test_significance_names_both_logs(logs):
-    text = compared(logs, "--significance")
+    text = compared(logs, "--details")
     assert "a/log.csv" in text
     assert "b/log.csv" in text
 

@@ -126,7 +126,7 @@ def test_every_output_of_a_report_carries_what_was_overridden(
 
 @pytest.mark.slow
 def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> None:
-    words = ("--observer", "gmo", "--effort", "auto", "-o", "out", "--json")
+    words = ("--observer", "gmo", "--set", "log.effort=auto", "-o", "out", "--json")
     code, out, err = run("estimate", turned, *UR5, *words)
     assert code == 0, err
     record = json.loads(out)

@@ -77,12 +77,11 @@ def test_inspect_of_what_is_no_log(tmp_path: Path) -> None:
 
 
 def test_formats_lists_every_reader() -> None:
-    code, out = run("formats")
+    code, out = run("help", "formats")
     assert code == 0
     assert all(name in out for name in FORMATS)
-    assert [row["name"] for row in json.loads(run("formats", "--json")[1])] == list(FORMATS)
-    assert "record:" in run("formats", "mcap")[1]
-    assert "no format 'nonsense'" in run("formats", "nonsense")[1]
+    assert "record:" in run("help", "formats", "mcap")[1]
+    assert "no format 'nonsense'" in run("help", "formats", "nonsense")[1]
 
 
 @pytest.mark.parametrize("ending", ["parquet", "csv", "mcap"])

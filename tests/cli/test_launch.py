@@ -23,7 +23,7 @@ def launched(*words: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.parametrize(
-    ("words", "code"), [(("robots",), 0), (("robots", "nobody"), 1), (("estimate",), 2)]
+    ("words", "code"), [(("help",), 0), (("help", "robots", "nobody"), 1), (("estimate",), 2)]
 )
 def test_exit_codes(words: tuple[str, ...], code: int) -> None:
     done = launched(*words)
@@ -59,7 +59,7 @@ def test_files_are_complete_when_it_has_left(tmp_path: Path) -> None:
     ("words", "code", "said"),
     [
         (("--help",), 1, "error: standard output is closed\n"),
-        (("robots",), 1, "error: standard output is closed\n"),
+        (("help", "robots"), 1, "error: standard output is closed\n"),
         (("estimate",), 2, "Missing argument"),
     ],
 )

@@ -1,14 +1,16 @@
-"""`vftcli open` and `--open`: no browser and no viewer is started here."""
+"""What `--open` does: no browser and no viewer is started here."""
 
+import subprocess
 import sys
+import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from vftcli.cli import opening
-
 Run = Callable[..., tuple[int, str, str]]
+
+RELEASED = ("admit", "--release", "x=0.1", "--robot", "ur5", "--set", "admittance.duration=1")
 
 
 @pytest.fixture
@@ -24,74 +26,39 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         assert words[:3] == [sys.executable, "-m", "rerun"]
         found.append(words[3])
 
-    monkeypatch.setattr(opening.webbrowser, "open", browse)
-    monkeypatch.setattr(opening.subprocess, "Popen", start)
+    monkeypatch.setattr(webbrowser, "open", browse)
+    monkeypatch.setattr(subprocess, "Popen", start)
     return found
 
 
-def made(folder: Path, *names: str) -> Path:
-    folder.mkdir(exist_ok=True)
-    for name in names:
-        (folder / name).touch()
-    return folder
-
-
-def test_a_folders_page_is_opened_and_its_recording_told(
+def test_a_page_goes_before_the_recording_and_that_is_named(
     run: Run, opened: list[str], tmp_path: Path
 ) -> None:
-    out = made(tmp_path / "o t", "index.html", "a.html", "recording.rrd")
-    code, _, err = run("open", out)
+    out = tmp_path / "o t"
+    out.mkdir()
+    (out / "recording.rrd").touch()
+    code, _, err = run(*RELEASED, "-o", out, "--open")
     assert code == 0
     assert opened == [(out / "index.html").resolve().as_uri()]
-    assert f"vftcli open {out / 'recording.rrd'}" in err
+    assert f"wrote {out}: open {out / 'index.html'}\n" in err
+    assert f"the recording: rerun {out / 'recording.rrd'}\n" in err
 
 
-def test_without_a_page_the_recording_is_opened(
-    run: Run, opened: list[str], tmp_path: Path
-) -> None:
-    out = made(tmp_path / "out", "recording.rrd")
-    assert run("open", out)[0] == 0
-    assert opened == [str(out / "recording.rrd")]
-
-
-def test_a_file_is_opened_itself(run: Run, opened: list[str], tmp_path: Path) -> None:
-    """A robot file stands for the page that was written beside it."""
-    out = made(tmp_path / "out", "index.html", "recording.rrd", "my.toml", "my.html")
-    run("open", out / "recording.rrd")
-    run("open", out / "my.toml")
-    assert opened == [str(out / "recording.rrd"), (out / "my.html").resolve().as_uri()]
-
-
-@pytest.mark.parametrize(("name", "words"), [("", "holds no page"), ("no", "does not exist")])
-def test_where_there_is_nothing_one_line_says_so(
-    run: Run, opened: list[str], tmp_path: Path, name: str, words: str
-) -> None:
-    code, out, err = run("open", tmp_path / name)
-    assert (code, out, opened) == (1, "", [])
-    assert words in err
-    assert err.count("\n") == 1
-
-
-def test_no_browser_is_said(
-    run: Run, opened: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(opening.webbrowser, "open", lambda _address: False)
-    out = made(tmp_path / "out", "index.html")
-    code, _, err = run("open", out)
+def test_no_browser_is_said(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(webbrowser, "open", lambda _address: False)
+    code, _, err = run(*RELEASED, "-o", tmp_path / "out", "--open")
     assert code == 0
-    assert "no browser could be started" in err
-    assert not opened
+    assert f"no browser could be started: open {tmp_path / 'out' / 'index.html'} in one" in err
 
 
 def test_a_command_opens_what_it_made(run: Run, opened: list[str], tmp_path: Path) -> None:
     """A release makes a page; of estimate --open implies the recording."""
-    released = ("--release", "x=0.1", "--robot", "ur5", "--duration", "1")
+    released = ("--release", "x=0.1", "--robot", "ur5", "--set", "admittance.duration=1")
     assert run("admit", *released, "-o", tmp_path / "a", "--open")[0] == 0
     log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
     fast = ("--robot", "ur5", "--causal", "--observer", "gmo", "--interval", "0:4")
     assert run("estimate", log, *fast, "-o", tmp_path / "e", "--open")[0] == 0
-    page = (tmp_path / "a" / "index.html").resolve().as_uri()
-    assert opened == [page, str(tmp_path / "e" / "recording.rrd")]
+    assert opened == [str(tmp_path / "e" / "recording.rrd")]
 
 
 def test_without_a_folder_there_is_nothing_to_open(run: Run, opened: list[str]) -> None:

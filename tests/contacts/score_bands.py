@@ -62,7 +62,7 @@ def asked(free: str | None, robot: str | None = None, **more: object) -> Analysi
     return AnalysisChoice(
         robot=RobotChoice(name=robot),
         observers=ObserverChoice(names=("best",)),
-        free=FreeChoice.parsed(free_part=free),
+        free=FreeChoice.parsed(free=[free] if free else ()),
         wrench=WrenchChoice(frame="base"),
         **more,  # type: ignore[arg-type]
     )

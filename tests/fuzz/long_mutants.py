@@ -22,13 +22,13 @@ ENDINGS = {"identify": "out.toml"}
 CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
     "report": {
         "--reference": ("zero", "two-cycle", "vendor"),
-        "--rrd-detail": ("levels", "none"),
+        "recording.detail": ("levels", "none"),
     },
     "identify": {"--method": ("friction", "base", "targets", "payload", "gains")},
-    "admit": {"--controller": ("variable", "traditional")},
+    "admit": {"admittance.controller": ("variable", "traditional")},
     "contacts": {"--free": ("0:3", "9:12")},
     "thresholds": {"--rate": ("1", "60")},
-    "batch": {"--do": ("estimate", "compare", "report", "contacts"), "--workers": ("0",)},
+    "batch": {"--do": ("estimate", "compare", "report", "contacts"), "--jobs": ("0",)},
 }
 """Command → its options and their values, one of each is drawn."""
 
@@ -64,7 +64,7 @@ def long_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
 def long_words(seed: Seed, place: Path, rng: Rng, folder: Path) -> list[str]:
     """A command on a mutant."""
     if seed.model is None:
-        words = ["annotate", str(place), "--robot", "panda", "--workers", "0"]
+        words = ["annotate", str(place), "--robot", "panda", "--jobs", "0"]
     else:
         command = pick(rng, list(CHOICES))
         words = [command, str(place), "--robot", seed.model.robot]

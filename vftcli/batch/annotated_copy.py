@@ -204,7 +204,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
     if record["status"] == "part":
         name, count = next(iter(record["missing_frames"].items()))
         why = (
-            "these poses hide it; --solver smoother has a wrench in every pose"
+            "these poses hide it; --set virtual-sensor.solver=smoother has a wrench in every pose"
             if name == "wrench"
             else "a value of the log is no number there"
         )

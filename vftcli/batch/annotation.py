@@ -157,8 +157,8 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
     """See that velocities and efforts are there, and that the efforts were measured."""
     if recording.dq is None:
         raise MissingSignalError(
-            f"{recording.name}: no joint velocities. --derive dq makes them of the positions over "
-            "the complete episode, so that the forces are not causal, and that is recorded"
+            f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "
+            "over the complete episode, so that the forces are not causal, and that is recorded"
         )
     efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
     if not efforts:

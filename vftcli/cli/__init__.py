@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 
-from vftcli.cli.commands import COMMANDS
+from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable
@@ -97,7 +97,8 @@ def asked_for() -> set[str]:
     """The command of this call, the one it wants explained, or whose words a shell completes."""
     typed = os.environ.get("_TYPER_COMPLETE_ARGS") or os.environ.get("COMP_WORDS")
     words = typed.split() if typed and "_VFTCLI_COMPLETE" in os.environ else sys.argv
-    return set(words[1:3] if words[1:2] == ["help"] else words[1:2])
+    words = with_command(words[1:])
+    return set(words[:2] if words[:1] == ["help"] else words[:1])
 
 
 def launch() -> None:

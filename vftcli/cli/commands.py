@@ -1,8 +1,13 @@
 """The commands: where each is, what it does in a sentence, and what one sets out to do with it."""
 
+import os
 import re
+from collections.abc import Container, Mapping
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
+
+from vftcli.signals.errors import ParameterError
 
 
 class ListedCommand(NamedTuple):
@@ -29,7 +34,6 @@ JOURNEYS = {
         "compare": "compare:compare",
         "batch": "batch:batch",
         "thresholds": "thresholds:contact_thresholds",
-        "open": "opening:open_folder",
     },
     "Prepare a robot and its logs": {
         "inspect": "inspect:inspect_log",
@@ -44,10 +48,7 @@ JOURNEYS = {
         "bench": "bench:bench",
     },
     "Look up": {
-        "robots": "listings:robots",
-        "observers": "listings:observers",
-        "formats": "listings:list_formats",
-        "help": "help:show_help",
+        "help": "listings:show_help",
     },
 }
 #: Name → the command.
@@ -56,3 +57,95 @@ COMMANDS = {
     for journey, places in JOURNEYS.items()
     for name, place in places.items()
 }
+
+DEFAULT = "contacts"  #: The command of words that name none.
+#: Options of the program itself.
+OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
+
+#: Former commands and options, and what each is now.
+FORMER = Path(__file__).parent / "former.toml"
+
+
+@cache
+def former() -> Mapping[str, Mapping[str, str]]:
+    """What the `commands` and `options` of the release before are now, and what is `gone`."""
+    import tomllib
+
+    return tomllib.loads(FORMER.read_text(encoding="utf-8"))
+
+
+def with_command(words: list[str]) -> list[str]:
+    """The words of a call with its command, also where a log or options come first."""
+    if not words or words[0] in COMMANDS or words[0] in OF_PROGRAM:
+        return words
+    first = words[0]
+    if first in former()["gone"]:
+        return words
+    if now := former()["commands"].get(first, "").split():
+        # `init -o FILE` has said where.
+        own = now[1] != "-o" or not any(word.startswith(("-o", "--output")) for word in words)
+        return [now[0], *(now[1:] * own), *words[1:]]
+    is_log = not {".", "/", os.sep}.isdisjoint(first) or Path(first).exists()
+    return [DEFAULT, *words] if is_log or first.startswith("-") else words
+
+
+class Renewed(NamedTuple):
+    """Words of a call with today's in place of former ones."""
+
+    words: list[str]  #: The words.
+    notes: list[str]  #: What each former one is now.
+
+
+def renewed(words: list[str], options: Container[str]) -> Renewed:
+    """Options of the release before by what they are now; one that the command has stays.
+
+    Raises:
+        ParameterError: If one is gone, or lacks its value.
+    """
+    found, arguments, rest = Renewed([], []), [], iter(words)
+    for word in rest:
+        name, equals, value = word.partition("=")
+        if word == "--":
+            found.words.extend([word, *rest])
+        elif name in options or (now := now_of(name, value)) is None:
+            found.words.append(word)
+        else:
+            if "VALUE" in now and not equals:
+                if (value := next(rest, "")) == "":
+                    raise ParameterError(f"{name} is now {now.replace('VALUE', '…')}; give a value")
+                now = now_of(name, value) or now
+            found.notes.append(f"{name} is now {now.replace('VALUE', '…')}")
+            if name == "--robot-arg":
+                arguments.append(value.replace("=", ":=", 1))
+            else:
+                found.words.extend(each.replace("VALUE", value) for each in now.split())
+    if arguments:
+        add_arguments(found.words, arguments)
+    return found
+
+
+def now_of(name: str, value: str) -> str | None:
+    """What a former option of a value is now, None of any other word.
+
+    Raises:
+        ParameterError: If it is gone.
+    """
+    if not name.startswith("-") or len(name) < len("--sd"):
+        return None
+    if name in former()["gone"]:
+        raise ParameterError(f"{name} is gone; {former()['gone'][name]}")
+    there, key = former()["options"], name[2:]
+    return there.get(f"{key}={value}") or there.get(key)
+
+
+def add_arguments(words: list[str], arguments: list[str]) -> None:
+    """Add the arguments of a xacro to the robot that the words name.
+
+    Raises:
+        ParameterError: If they name none.
+    """
+    for k, word in enumerate(words):
+        if word.startswith("--robot=") or (k and words[k - 1] == "--robot"):
+            words[k] = " ".join([word, *arguments])
+            return
+    raise ParameterError(f"--robot-arg is now --robot 'FILE {' '.join(arguments)}'; give --robot")

@@ -5,7 +5,7 @@ and typed ones go before them. What was taken is said, and stands in the command
 """
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from contextvars import ContextVar
 from importlib import import_module
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import typer
 from typer.core import TyperOption
 
-from vftcli.cli.commands import COMMANDS
+from vftcli.cli.commands import COMMANDS, now_of
 from vftcli.cli.options import settings_by_name
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
@@ -47,12 +47,23 @@ class Taken(NamedTuple):
 
 NOTHING = Taken()  #: What a command took that read no file.
 
+_words: ContextVar[Sequence[str]] = ContextVar("words", default=())
 _taken: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
 
 
 def taken() -> Taken:
     """What this command took from a file."""
     return _taken.get()
+
+
+def begin(words: Sequence[str]) -> None:
+    """Begin a call of these words."""
+    _words.set(words)
+
+
+def typed() -> list[str]:
+    """The words of this call, former ones by what they are now."""
+    return list(_words.get())
 
 
 def forget() -> None:
@@ -173,24 +184,36 @@ def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
     for name, table in tables.items():
         if not isinstance(table, dict):
             raise ParameterError(f"{path}: {name} = {shown(table)} is no table of options")
-        # The settings of a group may have a command's name, as those of identify.
-        group = {k for k in table if any(kind.takes(f"{name}.{k}") for kind in choices)}
-        content |= {name: {key: table.pop(key) for key in group}} if group else {}
-        check_keys(path, f"of {name}", flattened(path, table, choices), known[name])
-    top = flattened(path, content, choices)
+        # [contacts] is the command's table, and the group of contacts.list.
+        group = [key for key in table if any(kind.takes(f"{name}.{key}") for kind in choices)]
+        if group:
+            content[name] = {key: table.pop(key) for key in group}
+        tables[name] = flattened(path, table, choices, known[name])
+        check_keys(path, f"of {name}", tables[name], known[name])
     every = dict.fromkeys(key for options in known.values() for key in options)
+    top = flattened(path, content, choices, every)
     check_keys(path, "of a command that reads a log", top, every)
     others = OTHERWISE.get(command.name, set())
-    own = flattened(path, tables.get(command.name, {}), choices)
-    return {key: value for key, value in top.items() if key not in others} | own
+    kept = {key: value for key, value in top.items() if key not in others}
+    return {**kept, **tables.get(command.name, {})}
 
 
 def flattened(
-    path: Path, table: Mapping[str, Any], choices: Iterable[type[Choice]]
+    path: Path,
+    table: Mapping[str, Any],
+    choices: Iterable[type[Choice]],
+    known: Container[str],
 ) -> dict[str, Any]:
-    """A table with the settings of each group in it by their dotted names, as texts."""
+    """A table with the settings of each group in it by their dotted names, as texts.
+
+    A former key is read as what it is now.
+    """
     found: dict[str, Any] = {}
-    for key, value in table.items():
+    now = [
+        {key: value} if key in known or isinstance(value, dict) else key_now(path, key, value)
+        for key, value in table.items()
+    ]
+    for key, value in (pair for each in now for pair in each.items()):
         if not isinstance(value, dict):
             found[key] = value
             continue
@@ -208,6 +231,22 @@ def flattened(
             setting = settings_by_name(choices).get(dotted)
             found[dotted] = beside(path.parent, text, setting[0]) if setting else text
     return found
+
+
+def key_now(path: Path, key: str, value: Any) -> dict[str, Any]:  # noqa: ANN401 - of TOML
+    """A former key as the option or setting that it is now, with a note; any other as it is."""
+    text = next(words_in(value), "")
+    now = None if key in TYPED or isinstance(value, list) else now_of(f"--{key}", text)
+    # An argument, of a command or of a xacro, has no key of its own.
+    if now is None or not now.startswith("--") or "'" in now or (not text and "VALUE" in now):
+        return {key: value}
+    typer.echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
+    option, _, taken = now.removeprefix("--").partition(" ")
+    if option == "set":
+        name, _, taken = taken.partition("=")
+        group, _, own = name.partition(".")
+        return {} if value is False else {group: {own: taken.replace("VALUE", text)}}
+    return {option: taken.replace("VALUE", text) if taken else value}
 
 
 def check_keys(

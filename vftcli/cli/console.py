@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from vftcli.cli.config import effective
+from vftcli.cli.config import effective, typed
 from vftcli.cli.progress import STAGES
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
+from vftcli.signals.packages import check_installed
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -50,7 +51,7 @@ PARTS = frozenset({"episode-taken", "episode-taken-first", "arm-side-taken"})
 
 def command_line() -> str:
     """The command for `run.json` and the report: as typed, with what a file of options gave it."""
-    return printable(shlex.join(["vftcli", *effective(sys.argv[1:])]))
+    return printable(shlex.join(["vftcli", *effective(typed())]))
 
 
 def say(text: str) -> None:
@@ -83,6 +84,29 @@ def show(text: str) -> None:
     if _level.get() > QUIET:
         STAGES.clear()
         typer.echo(text, nl=not text.endswith("\n"), color=True)
+
+
+def open_made(path: Path) -> None:
+    """Open a page, a folder's page or its recording in what shows it, and say what was opened."""
+    page, recording = path, path / "recording.rrd"
+    if path.is_dir():
+        page = path / "index.html"
+    if page.exists():
+        import webbrowser
+
+        if not webbrowser.open(page.resolve().as_uri()):
+            say(f"no browser could be started: open {page} in one")
+        if recording.exists():
+            say(f"the recording: rerun {recording}")
+    elif recording.exists():
+        import subprocess
+
+        check_installed("rerun", f"the viewer of {recording}")
+        words = [sys.executable, "-m", "rerun", str(recording)]
+        quiet = subprocess.DEVNULL
+        # It goes on when the command has ended.
+        subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet, start_new_session=True)
+        say(f"{recording} opens in the Rerun viewer; a click on a time of its log goes there")
 
 
 def canvas() -> "Canvas":

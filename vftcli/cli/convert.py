@@ -9,7 +9,7 @@ from vftcli.readers.reader import ReadChoice
 @opt.command
 def convert_log(
     log: opt.Log,
-    output: opt.Output,
+    output: opt.Folder,
     reading: opt.Typed[ReadChoice],
     _talk: opt.TalkOptions,
     json: opt.Json,
@@ -31,7 +31,9 @@ def convert_log(
     check_conversion(output, force)
     choice = reading.choice()
     if choice.derive == "dq":
-        raise ParameterError("convert writes what was logged; --derive dq belongs to an estimate")
+        raise ParameterError(
+            "convert writes what was logged; --set log.derive=dq belongs to an estimate"
+        )
     recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.

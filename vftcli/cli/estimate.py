@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 @opt.command
 def estimate(
     log: opt.Log,
-    output: opt.Folder,
+    output: opt.LogFolder,
     analysis: AnalysisOptions,
     also: ExtraOptions,
     csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.", group=WRITE)],
@@ -29,12 +29,12 @@ def estimate(
     force: opt.Force,
     show: opt.Open,
 ) -> None:
-    """Estimate the external joint torques along a log.
+    """Write the external torques and wrench.
 
     Writes DIR/estimates.parquet (t, q/1…, tau_ext/OBSERVER/1…, wrench/best/fx…, contact) and
     DIR/run.json.
 
-    Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5 -o out
+    Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
     """
     from vftcli.batch.kinds import for_estimates
     from vftcli.cli.console import command_line, say_left_out
@@ -48,7 +48,8 @@ def estimate(
     from vftcli.signals.packages import check_installed
     from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
-    written = also.choice(csv=csv, rrd=rrd or show)
+    output = opt.folder_of(output, [log], analysis.log.reading)
+    library, written = Library([log]), also.choice(csv=csv, rrd=rrd or show)
     if "rrd" in written.extras:
         check_installed("rerun", "recording.rrd (--rrd, --open)")
     # Of a large log only the columns that are looked at are read; outputs show the others too.
@@ -56,11 +57,10 @@ def estimate(
     signals = EXAMINED if causal and not (analysis.asks_wrench or written.extras) else None
     if analysis.log.reading.words["columns"] is None:
         refuse_estimates(log)
-    library, chosen = Library([log]), replace(analysis.log.reading.choice(), signals=signals)
     OutputFolder(output, force, estimate_files(written.extras)).check()
     choice = for_estimates(analysis.choice(library))
     try:
-        recording = library.open(log, chosen)
+        recording = library.open(log, replace(choice.read, signals=signals))
         # What needs no complete log comes in blocks, so that memory does not grow with it.
         if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
             found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
@@ -78,7 +78,7 @@ def estimate(
     else:
         show_estimates(made, output, estimate_files(written.extras))
     if show:
-        from vftcli.cli.opening import open_made
+        from vftcli.cli.console import open_made
 
         open_made(output)
 

@@ -8,20 +8,20 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from vftcli.cli import options
-from vftcli.cli.commands import COMMANDS
-from vftcli.cli.config import config_option, forget, is_configured, settle
+from vftcli.cli.commands import COMMANDS, former, renewed, with_command
+from vftcli.cli.config import begin, config_option, forget, is_configured, settle
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.letters import printable
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
 from vftcli.signals.parsing import did_you_mean, nearest
 
 OWN = "This command"  #: Heading of the options that only one command has.
-NARROWEST, WIDEST, LEFT = 72, 100, 33  #: Columns of a help text, and of its left half at most.
+NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left half at most.
 
 
 class GroupedCommand(TyperCommand):
@@ -65,9 +65,24 @@ class JourneyGroup(TyperGroup):
         """Write the list of commands."""
         formatter.write(program_help(self, ctx))
 
+    def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
+        """Parse the words: without a command of the default one, former words by today's."""
+        words = with_command(args)
+        if not ctx.resilient_parsing and words and (command := self.commands.get(words[0])):
+            there = [name for param in command.params for name in param.opts]
+            words[1:], notes = renewed(words[1:], there)
+            if args[0] not in {words[0], *COMMANDS} and args[0] in former()["commands"]:
+                notes.insert(0, f"{args[0]} is now {former()['commands'][args[0]]}")
+            for note in notes:
+                typer.echo(printable(f"note: {note}"), err=True)
+        begin(words)
+        return super().parse_args(ctx, words)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """The command that is asked for; of one that there is not, the nearest if it is near."""
-        if args and not args[0].startswith("-") and args[0] not in self.commands:
+        if args[0] not in self.commands:
+            if args[0] in former()["gone"]:
+                raise ParameterError(f"{args[0]} is gone; {former()['gone'][args[0]]}")
             ctx.fail(f"No such command '{args[0]}'.{did_you_mean(args[0], self.commands)}")
         return super().resolve_command(ctx, args)
 
@@ -77,22 +92,20 @@ def columns() -> int:
     return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
 
 
-def command_help(ctx: Any) -> str:  # noqa: ANN401
+def command_help(ctx: typer.Context) -> str:
     """The help of a command: how it is called, what it does, its options by group."""
     command, width = ctx.command, columns()
     lines = [" ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)]), ""]
     for paragraph in (command.help or "").split("\n\n"):
         lines += textwrap.wrap(" ".join(paragraph.split()), width)
-    for group, rows in grouped(command, ctx):
+    for group, rows in grouped(ctx):
         lines += [f"{group}:", *two_columns(rows, width)]
     return "\n".join(lines) + "\n"
 
 
-def grouped(
-    command: GroupedCommand,
-    ctx: Any,  # noqa: ANN401
-) -> Iterator[tuple[str, list[tuple[str, str]]]]:
+def grouped(ctx: typer.Context) -> Iterator[tuple[str, list[tuple[str, str]]]]:
     """The options of each heading that has any, as they are typed and what they mean."""
+    command: Any = ctx.command
     found: dict[str, list[tuple[str, str]]] = {}
     for param in command.get_params(ctx):
         option = command.option(param)
@@ -106,7 +119,7 @@ def grouped(
             yield group, found[group]
 
 
-def row_of(param: Any, ctx: Any) -> tuple[str, str] | None:  # noqa: ANN401
+def row_of(param: Any, ctx: typer.Context) -> tuple[str, str] | None:  # noqa: ANN401
     """How a parameter is typed, and what it means; None for one that is hidden."""
     if param.param_type_name == "argument":
         return (param.metavar or param.name.upper(), param.help) if param.help else None
@@ -126,10 +139,10 @@ def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
         yield from (f"{'':{left + 4}}{line}" for line in lines)
 
 
-def program_help(group: Any, ctx: Any) -> str:  # noqa: ANN401
+def program_help(group: TyperGroup, ctx: typer.Context) -> str:
     """The commands by what one sets out to do, one line each; then the program's options."""
     width = columns()
-    lines = ["Usage: vftcli COMMAND LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
+    lines = ["Usage: vftcli [COMMAND] LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
     left = max(map(len, group.commands))
     for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
         lines += ["", journey]
@@ -151,28 +164,3 @@ def topics() -> Mapping[str, Mapping[str, str]]:
     import tomllib
 
     return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
-
-
-@options.command
-def show_help(
-    ctx: typer.Context,
-    topic: Annotated[str | None, Option("", "[TOPIC]", "A topic or a command; none: the list.")],
-) -> None:
-    """Explain a topic, as columns or frames, or a command.
-
-    Example: vftcli help columns
-    """
-    found = topics()
-    if topic is None:
-        lines = [f"  {name:<10} {entry['summary']}" for name, entry in found.items()]
-        typer.echo("\n".join(["vftcli help TOPIC, of", *lines, "or of a command's name."]))
-    elif topic in found:
-        typer.echo(found[topic]["text"].rstrip())
-    elif topic in COMMANDS:
-        root: Any = ctx.find_root()
-        asked = root.command.commands[topic]
-        of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
-        typer.echo(asked.get_help(of_command))
-    else:
-        near = did_you_mean(topic, [*found, *COMMANDS])
-        raise ParameterError(f"no topic {topic!r}; there is {', '.join(found)}.{near}")

@@ -61,7 +61,7 @@ def identify_robot(
     logs: opt.Logs,
     output: Annotated[
         Path | None,
-        opt.PLACE._replace(help="Write here; default: my_ROBOT.toml in this folder."),
+        opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder."),
     ],
     logged: LogOptions,
     asked: opt.Typed[Task],
@@ -82,8 +82,15 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
-    from vftcli.cli.console import command_line, detail, health_of, say, say_recording, say_robots
-    from vftcli.cli.opening import open_made
+    from vftcli.cli.console import (
+        command_line,
+        detail,
+        health_of,
+        open_made,
+        say,
+        say_recording,
+        say_robots,
+    )
     from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification import (

@@ -23,7 +23,7 @@ def inspect_log(
     _talk: opt.TalkOptions,
     output: Annotated[
         Path | None,
-        opt.PLACE._replace(help="Write here; the options that the log calls for."),
+        opt.OUT._replace(help="Write here; the options that the log calls for."),
     ],
     strict: Annotated[bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")],
     json: opt.Json,

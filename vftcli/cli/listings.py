@@ -1,99 +1,134 @@
-"""`vftcli robots`, `vftcli observers`, `vftcli formats`: what there is, with its sources."""
+"""`vftcli help`: topics and commands, and what there is, with its sources."""
 
-from typing import Annotated
+from collections.abc import Iterator
+from typing import Annotated, Any
 
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.commands import COMMANDS
+from vftcli.cli.help import columns, topics, two_columns
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import Option
+from vftcli.signals.errors import ParameterError, UnknownFormatError
+from vftcli.signals.option import NUMBERS, Choice, Option
+from vftcli.signals.parsing import did_you_mean
+
+#: What is listed → what its list shows.
+LISTS = {
+    "robots": "the robot profiles; NAME or FILE: one robot in full",
+    "observers": "the observers, their equations and their numbers",
+    "formats": "the log formats; NAME: how to record it",
+    "settings": "every setting of --set NAME=VALUE and vftcli.toml",
+}
 
 
 @opt.command
-def robots(
+def show_help(
+    ctx: typer.Context,
+    topic: Annotated[str | None, Option("", "[TOPIC]", "A topic or a command; none: the list.")],
+    name: Annotated[str | None, Option("", "[NAME]", "One robot, robot file or format.")],
     tip: Annotated[str | None, RobotChoice.option("tip")],
-    name: Annotated[str | None, Option("", "[NAME|FILE]", "Show one robot in full.")],
-    json: opt.Json,
 ) -> None:
-    """List the robot profiles, or show one and its sources.
+    """Explain a topic, or list robots, observers, formats.
 
-    Example: vftcli robots ur5
+    Example: vftcli help columns
     """
-    from vftcli.cli.console import say_json
+    if name is not None and topic not in {"robots", "formats"}:
+        raise ParameterError(f"help {topic} {name}: a name follows robots or formats only")
+    root: Any = ctx.find_root()
+    if topic is None:
+        typer.echo("\n".join(contents()))
+    elif topic == "robots":
+        typer.echo(robots(name, tip))
+    elif topic == "formats":
+        typer.echo("\n".join(formats(name)))
+    elif topic == "observers":
+        typer.echo("\n".join(observers()))
+    elif topic == "settings":
+        typer.echo("\n".join(settings()))
+    elif topic in topics():
+        typer.echo(topics()[topic]["text"].rstrip())
+    elif topic in COMMANDS:
+        asked = root.command.commands[topic]
+        of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
+        typer.echo(asked.get_help(of_command))
+    else:
+        there = [*topics(), *LISTS]
+        near = did_you_mean(topic, [*there, *COMMANDS])
+        raise ParameterError(f"no topic {topic!r}; there is {', '.join(there)}.{near}")
+
+
+def contents() -> Iterator[str]:
+    """What can be asked for: topics, lists and commands."""
+    explained = {name: entry["summary"] for name, entry in topics().items()}
+    yield "vftcli help TOPIC, of"
+    yield from two_columns([*explained.items(), *LISTS.items()], columns())
+    yield "or of a command:"
+    yield from two_columns([(name, each.summary) for name, each in COMMANDS.items()], columns())
+
+
+def robots(name: str | None, tip: str | None) -> str:
+    """The robot profiles by maker, or one robot and its sources."""
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import robot_row, robot_text, robots_grid
     from vftcli.robots import MAKERS, load_robot
 
-    if name is None:
-        rows = {m: [robot_row(load_robot(p)) for p in names] for m, names in MAKERS.items()}
-        if json:
-            say_json([{"maker": maker, **row} for maker in rows for row in rows[maker]])
-            return
-        for maker, each in rows.items():
-            typer.echo(f"{maker}\n{terminal(robots_grid(each))}", nl=False)
-        return
-    robot = RobotChoice.parsed(robot=name, tip=tip).named()
-    if json:
-        say_json(robot.document or robot_row(robot))
-    else:
-        typer.echo(robot_text(robot))
+    if name is not None:
+        return robot_text(RobotChoice.parsed(robot=name, tip=tip).named())
+    rows = {maker: [robot_row(load_robot(p)) for p in names] for maker, names in MAKERS.items()}
+    return "".join(f"{m}\n{terminal(robots_grid(each))}" for m, each in rows.items()).rstrip("\n")
 
 
-@opt.command
-def observers(json: opt.Json) -> None:
-    """List the observers, their equations and their parameters.
-
-    Example: vftcli observers
-    """
-    from vftcli.cli.console import say_json
+def observers() -> Iterator[str]:
+    """The observers, their equations and their parameters."""
     from vftcli.observers.table import OBSERVERS, PARAMETERS
 
-    rows = [
-        {
-            "name": name,
-            "title": entry.title,
-            "equations": entry.equations,
-            "summary": entry.summary,
-            "parameters": [f"{entry.section}.{p}" for p in PARAMETERS[entry.section]],
-        }
-        for name, entry in OBSERVERS.items()
-    ]
-    if json:
-        say_json(rows)
-        return
-    for row in rows:
-        typer.echo(f"{row['name']:<8} {row['title']} {row['equations']}")
-        typer.echo(f"{'':<8} {row['summary']}; --set {', '.join(row['parameters'])}")
+    rows = []
+    for name, entry in OBSERVERS.items():
+        numbers = ", ".join(f"{entry.section}.{each}" for each in PARAMETERS[entry.section])
+        rows += [(name, f"{entry.title} {entry.equations}"), ("", entry.summary)]
+        rows.append(("", f"--set {numbers}"))
+    yield from two_columns(rows, columns())
 
 
-@opt.command
-def list_formats(
-    name: Annotated[str | None, Option("", "[NAME]", "Show one format.")], json: opt.Json
-) -> None:
-    """List the log formats, or show how to record one.
-
-    Example: vftcli formats
-    """
-    from vftcli.cli.console import say_json
+def formats(name: str | None) -> Iterator[str]:
+    """The log formats, or how to record one."""
     from vftcli.readers import FORMATS
-    from vftcli.signals.errors import UnknownFormatError
-    from vftcli.signals.parsing import did_you_mean
 
-    if name is not None and name not in FORMATS:
+    if name is None:
+        yield from two_columns([(form.name, form.title) for form in FORMATS.values()], columns())
+        yield "\nvftcli help formats NAME: how to record one; gzip and zstd are taken off."
+    elif name in FORMATS:
+        form = FORMATS[name]
+        yield f"{form.name}: {form.title}"
+        rows = {"record:": form.recording, "read:": form.takes, "pitfalls:": form.pitfalls}
+        yield from two_columns([*rows.items()], columns())
+    else:
         near = did_you_mean(name, FORMATS)
         raise UnknownFormatError(f"no format {name!r}; there is {', '.join(FORMATS)}.{near}")
-    shown = [FORMATS[name]] if name else list(FORMATS.values())
-    if json:
-        words = ("name", "title", "recording", "takes", "pitfalls")
-        say_json([{w: getattr(f, w) for w in words} | {"columns": f.takes_columns} for f in shown])
-        return
-    for form in shown:
-        if name is None:
-            typer.echo(f"{form.name:<18} {form.title}")
-            continue
-        typer.echo(f"{form.name}: {form.title}")
-        typer.echo(f"  record:   {form.recording}")
-        typer.echo(f"  taken:    {form.takes}")
-        typer.echo(f"  pitfalls: {form.pitfalls}")
-    if name is None:
-        typer.echo("\nvftcli formats NAME tells how to record one; gzip and zstd are taken off.")
+
+
+def settings() -> Iterator[str]:
+    """Every setting of all commands: name, unit, meaning and default."""
+    from vftcli.cli import app
+
+    commands: dict[str, Any] = vars(typer.main.get_command(app))["commands"]
+    every = {kind: None for c in commands.values() for kind in vars(c.callback)["choices"]}
+    rows = sorted(row for kind in every for row in settings_of(kind))
+    yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
+    yield from two_columns(rows, columns())
+    yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."
+
+
+def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
+    """How each setting of a choice is given, and what it means."""
+    for field, _, option in kind.options().values():
+        if option.is_setting:
+            default = getattr(kind, field, None)
+            if isinstance(default, bool):
+                default = "yes" if default else "no"
+            kept = f"; default {default}" if isinstance(default, str | int | float) else ""
+            if option.name == NUMBERS:
+                yield option.metavar, option.help
+            else:
+                yield option.name, f"{option.help} ({option.metavar}{kept})"

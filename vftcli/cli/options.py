@@ -8,10 +8,12 @@ that has it. A command is handed one object for all options of a choice::
 """
 
 import inspect
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
 from typing import (
+    TYPE_CHECKING,
     Annotated,
     Any,
     Generic,
@@ -28,6 +30,9 @@ from vftcli.signals.option import ESTIMATE, LOG, OUTPUT, WRENCH, WRITE, Choice, 
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import assignment, did_you_mean
 
+if TYPE_CHECKING:
+    from vftcli.readers.reader import ReadChoice
+
 C = TypeVar("C", bound=Choice)
 EMPTY = inspect.Parameter.empty
 
@@ -35,9 +40,12 @@ Log = Annotated[Path, Option("", "LOG", "A log file or bag folder, recognised by
 Logs = Annotated[
     list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
-PLACE = Option("-o/--output", "PATH", "Write here.", group=WRITE)  # typer adds: required
-Output = Annotated[Path, PLACE]
-Folder = Annotated[Path, Option("-o/--output", "DIR", "Folder to write into.", group=WRITE)]
+OUT = Option("-o/--output", "PATH", "Write here; required.", group=WRITE)
+Folder = Annotated[Path, OUT]
+#: A folder that `folder_of` names where it is not given.
+LogFolder = Annotated[
+    Path | None, OUT._replace(help="Write here; default: LOG.vft in this folder.")
+]
 Force = Annotated[bool, Option("--force", "", "Overwrite what exists.", group=WRITE)]
 Json = Annotated[
     bool,
@@ -99,6 +107,22 @@ SET = Option(
 )
 LATEX = Option("--latex", "", "Print the table as LaTeX (booktabs).")
 SEED = Option("--seed", "N", "Seed everything random.", least=0)
+
+
+#: What a log's name ends with and its folder's does not; of `run_1.5` the number belongs to it.
+ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
+
+
+def folder_of(output: Path | None, logs: Sequence[Path], reading: "Typed[ReadChoice]") -> Path:
+    """Where a command writes: as typed, else into a folder here that is named after the log."""
+    if output is not None:
+        return output
+    if len(logs) > 1:
+        return Path("report.vft")
+    name = logs[0].resolve().name
+    part = (reading.words["episode"], reading.words["arm"])
+    stem = name if logs[0].is_dir() else ENDING.sub("", name, count=1)
+    return Path("-".join([stem, *filter(None, part)]) + ".vft")
 
 
 class Typed(Generic[C]):
@@ -168,8 +192,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         from vftcli.outputs.files import protected
 
         kept = taken().path
-        typed = values.get("set") or ()
-        values["settings"] = {**taken().settings, **settings_of(typed, part.choices)}
+        if part.choices:
+            typed = settings_of(values.get("set") or (), part.choices)
+            values["settings"] = {**taken().settings, **typed}
         inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}

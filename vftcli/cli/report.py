@@ -31,7 +31,7 @@ class PrintChoice(Choice):
 @opt.command
 def report(
     logs: opt.Logs,
-    output: opt.Folder,
+    output: opt.LogFolder,
     reference: opt.Typed[ReferenceChoice],
     analysis: AnalysisOptions,
     also: ExtraOptions,
@@ -41,16 +41,15 @@ def report(
     force: opt.Force,
     show: opt.Open,
 ) -> None:
-    """Write a page, a recording, tables and estimates into one folder.
+    """Write page, recording, tables and estimates.
 
     Writes index.html (opens offline), recording.rrd, contacts.{json,csv}, estimates.parquet,
     errors.{csv,json,md,tex} and run.json; several logs get a sub-folder each and an index.
 
-    Example: vftcli report fixtures/ur5_circle.csv --robot ur5 -o out
+    Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.cli.console import LeftOut, command_line, say_left_out
+    from vftcli.cli.console import LeftOut, command_line, open_made, say_left_out
     from vftcli.cli.jacobian import write_by_jacobian
-    from vftcli.cli.opening import open_made
     from vftcli.evaluation.print_table import check_published
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
@@ -60,6 +59,7 @@ def report(
 
     library, published = Library(logs), beside.choice().table
     written = also.choice()
+    output = opt.folder_of(output, logs, analysis.log.reading)
     names = report_files([library.label(log) for log in logs], written.extras, figures)
     OutputFolder(output, force, names).check()
     choice = analysis.choice(library, reference, on_screen=not json)
@@ -143,7 +143,7 @@ def show_report(
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
     names = (*names, "figures/")
-    below = written_lines(output, names, screen, "vftcli open", several=several)
+    below = written_lines(output, names, screen, several=several)
     if several:
         show(logs_screen(analyses, screen, failed, below, every=details))
     else:

@@ -12,9 +12,7 @@ from vftcli.signals.option import Option
 @opt.command
 def reproduce(
     paper: Annotated[str, Option("", "PAPER", "Which: huang2025.")],
-    output: Annotated[
-        Path | None, opt.PLACE._replace(help="Write here; default: huang2025.vft in this folder.")
-    ],
+    output: Annotated[Path | None, opt.OUT._replace(help="Write here; default: huang2025.vft.")],
     figures: opt.Figures,
     only: Annotated[
         str | None,
@@ -30,7 +28,7 @@ def reproduce(
     run.json. An experiment that fails is told in its row; the others are written, and the exit
     code is 1.
 
-    Example: vftcli reproduce huang2025 --only table3 -o paper
+    Example: vftcli reproduce huang2025 --only table3
     """
     from vftcli.cli.console import command_line, say, show, stages
     from vftcli.outputs.files import OutputFolder
@@ -56,6 +54,6 @@ def reproduce(
     with folder:
         write_reproduction(folder, wanted, found, jobs, command_line(), figures)
     show(terminal(short_overview(found)))
-    say(f"wrote {output}: vftcli open {output}")
+    say(f"wrote {output}: open {output / 'index.html'}")
     if any(shown.failures for shown in found.values()):
         raise typer.Exit(1)

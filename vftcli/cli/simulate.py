@@ -23,7 +23,7 @@ def simulate_log(
         str, Option("--as", "FORMAT", "Write rtde, ur-rtde, libfranka, rosbag2 or parquet.")
     ] = "",
     changes: Annotated[list[str] | None, opt.SET._replace(group="")],
-    output: Annotated[Path | None, opt.PLACE._replace(help="Write here; required.")],
+    output: Annotated[Path | None, opt.OUT],
     json: opt.Json,
     force: opt.Force,
 ) -> None:

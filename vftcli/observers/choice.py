@@ -33,12 +33,13 @@ def settings_of(words: Sequence[str]) -> "Settings":
     return parse_settings(words, sections())
 
 
-def source_of(text: str) -> "str | Path | Goal":
+def source_of(source: str | Path) -> "str | Path | Goal":
     """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file.
 
     Raises:
         ParameterError: If a goal is malformed, or `vftcli identify` alone serves it.
     """
+    text = str(source)
     if text in {PAPER_GAINS, LOG_GAINS}:
         return text
     if text.startswith(("delay=", "bandwidth=")):
@@ -79,7 +80,7 @@ class ObserverChoice(Choice):
         "Settings",
         setting(
             NUMBERS,
-            "NUMBER(S)",
+            "OBSERVER.NUMBER",
             "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
             settings_of,
             several=True,

@@ -76,8 +76,8 @@ def match_observers(
     """
     if setup.as_printed:
         raise ParameterError(
-            "--match tunes the corrected observers; the printed ones have another response. Leave "
-            "--match or --as-printed away"
+            "--gains tunes the corrected observers; the printed ones have another response. Leave "
+            "--gains or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
     remarks = [
@@ -94,7 +94,7 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
     """One observer with the gain that reaches a delay or bandwidth on every joint."""
     if type(observer) not in KNOBS:
         raise ParameterError(
-            f"--match cannot tune {observer.name}: it has no {goal.name} of its own to set; "
+            f"--gains cannot tune {observer.name}: it has no {goal.name} of its own to set; "
             "choose fdo, gmo, kfo-fe or kfo-zoh with --observer"
         )
     knob, low, high = KNOBS[type(observer)]

@@ -111,18 +111,17 @@ def written_lines(
     folder: Path,
     names: Iterable[str],
     canvas: Canvas,
-    open_with: str = "",
     *,
     several: bool = False,
 ) -> list[str]:
-    """Written files, if present, and the way to open them."""
+    """Written files, if present, and the page to open."""
     there = [name for name in names if (folder / name).exists()]
     there += ["one folder a log"] * several
     lines = canvas.wrapped(printable(f"{folder}/  {'  '.join(there)}"), 2)
     # A page that this run did not write is another run's.
-    if open_with or "index.html" in there:
-        what = f"{open_with} {folder}" if open_with else str(folder / "index.html")
-        lines.append(f"Open: {printable(what)}        More here: --details")
+    if "index.html" in there:
+        page = printable(str(folder / "index.html"))
+        lines.append(f"Open: {page}        More here: --details")
     return lines
 
 

@@ -2,7 +2,7 @@
 
 The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
 `best` runs on what is left, tuned on the spectra of that; the other observers do where
-``--remove-bias whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
+``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
 and `best` is made of what is left.
 """
 

@@ -22,7 +22,7 @@ def check_joints(recording: Recording, robot: Robot) -> None:
     if recording.joints != robot.joints:
         raise RobotError(
             f"{recording.name}: the log has {recording.joints} joints but robot {robot.name!r} has "
-            f"{robot.joints}; choose another with --robot (vftcli robots lists them)"
+            f"{robot.joints}; choose another with --robot (vftcli help robots lists them)"
         )
 
 

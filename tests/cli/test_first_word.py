@@ -1,0 +1,46 @@
+"""Without a command the words are of `contacts`: a log or options may come first."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+LOG = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
+
+
+@pytest.mark.parametrize("words", [(LOG, "--robot", "ur5"), ("--robot", "ur5", LOG)])
+def test_a_log_alone_is_asked_what_touched_the_arm(run: Run, words: tuple[object, ...]) -> None:
+    asked = ("--interval", "0:3", "--csv", "-q")
+    expected = run("contacts", *words, *asked)
+    assert expected[0] == 0
+    assert run(*words, *asked) == expected
+
+
+@pytest.mark.parametrize("name", ["nowhere.csv", "no/where", "-"])
+def test_a_word_that_looks_as_a_path_is_a_log(run: Run, name: str) -> None:
+    code, out, err = run(name)
+    assert (code, out) == (1, "")
+    assert err.startswith(f"error: {name}: ")
+
+
+def test_a_file_of_the_folder_is_a_log_and_a_command_goes_before_it(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("push", "report"):
+        (tmp_path / name).write_text("no log\n")
+    assert run("push")[2].startswith("error: push: ")
+    assert "Missing argument" in run("report")[2]
+    assert run("./report")[2].startswith("error: report: ")
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [("reprot", "No such command 'reprot'. Did you mean report?"), ("dance", "command 'dance'.")],
+)
+def test_any_other_word_is_refused_with_the_nearest_command(run: Run, word: str, said: str) -> None:
+    code, out, err = run(word, "x.csv")
+    assert (code, out) == (2, "")
+    assert said in err
