@@ -264,7 +264,7 @@ ROWS = [
     Row("or take it all with --anyway", touched_late, "anyway", FLAG),
 ]  # fmt: skip
 DEARER = [
-    Row("is an option of --method friction", cut(
+    Row("is for --method friction", cut(
         0, 8, *MAKE, *CONSTANTS, "--method", "base"), "method", "friction"),
     Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
         "t=t,q=q{i},-dq=dq{i},current=current{i}"),

@@ -178,7 +178,7 @@ def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> No
     edited(dataset, "observation.velocity", still)
     by_map = ForceChoice(wrench=WrenchChoice(solver="map"))
     with pytest.raises(
-        LogError, match="solver=smoother has a wrench in every pose"
+        LogError, match=r"--set virtual-sensor\.solver=smoother has a wrench in every pose"
     ):
         made(dataset, tmp_path / "copy", by_map)
 

@@ -37,7 +37,7 @@ def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
     ],
-    output: opt.Output,
+    output: opt.Folder,
     logged: LogOptions,
     observers: opt.Typed[ObserverChoice],
     wrench: opt.Typed[WrenchChoice],

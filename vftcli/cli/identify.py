@@ -14,7 +14,6 @@ from vftcli.observers.choice import GoalChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRITE, Option
 
 if TYPE_CHECKING:
     from vftcli.readers.reader import ReadChoice
@@ -62,9 +61,7 @@ def identify_robot(
     logs: opt.Logs,
     output: Annotated[
         Path | None,
-        Option(
-            "-o/--output", "PATH", "Write here; default: my_ROBOT.toml in this folder.", group=WRITE
-        ),
+        opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder."),
     ],
     logged: LogOptions,
     asked: opt.Typed[Task],

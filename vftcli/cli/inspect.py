@@ -10,7 +10,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.config import NAME
-from vftcli.signals.option import WRITE, Option
+from vftcli.signals.option import Option
 
 if TYPE_CHECKING:
     from vftcli.proposal import ProposedOption
@@ -23,12 +23,7 @@ def inspect_log(
     _talk: opt.TalkOptions,
     output: Annotated[
         Path | None,
-        Option(
-            "-o/--output",
-            "PATH",
-            "Write here; the options that the log calls for.",
-            group=WRITE,
-        ),
+        opt.OUT._replace(help="Write here; the options that the log calls for."),
     ],
     strict: Annotated[bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")],
     json: opt.Json,

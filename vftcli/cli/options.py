@@ -41,7 +41,7 @@ Logs = Annotated[
     list[Path], Option("", "LOG...", "Log files or bag folders, recognised by content.")
 ]
 OUT = Option("-o/--output", "PATH", "Write here; required.", group=WRITE)
-Output = Annotated[Path, OUT]
+Folder = Annotated[Path, OUT]
 #: A folder that `folder_of` names where it is not given.
 LogFolder = Annotated[
     Path | None, OUT._replace(help="Write here; default: LOG.vft in this folder.")
