@@ -28,7 +28,7 @@ def batch(
         list[Path],
         Option("", "LOG|FOLDER|DATASET...", "Logs, folders, data sets; an episode is a log."),
     ],
-    output: opt.Output,
+    output: opt.Folder,
     do: Annotated[
         str,
         Option(
