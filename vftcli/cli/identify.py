@@ -4,10 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import interval
@@ -157,6 +156,6 @@ def identify_robot(
     for remark in found.remarks:
         detail(f"note: {remark}")
     say(f"wrote {', '.join(map(str, beside(output).values()))}")
-    typer.echo(record.rstrip("\n") if made.json else tables_text(found))
+    echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))

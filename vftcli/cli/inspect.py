@@ -6,6 +6,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.signals.option import Option
 
 
@@ -39,8 +40,8 @@ def inspect_log(
     if json:
         say_json(examination_record(examination))
     else:
-        typer.echo(examination_text(examination))
+        echo(examination_text(examination))
     warnings = len(examination.warnings)
     if strict and warnings:
-        typer.echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
+        echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
         raise typer.Exit(1)

@@ -8,6 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS
 from vftcli.cli.help import columns, topics, two_columns
+from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
 from vftcli.signals.option import NUMBERS, Choice, Option
@@ -45,21 +46,21 @@ def show_help(
         raise ParameterError(f"help {topic} {name}: a name follows robots or formats only")
     root: Any = ctx.find_root()
     if topic is None:
-        typer.echo("\n".join(contents()))
+        echo("\n".join(contents()))
     elif topic == "robots":
-        typer.echo(robots(name, tip))
+        echo(robots(name, tip))
     elif topic == "formats":
-        typer.echo("\n".join(formats(name)))
+        echo("\n".join(formats(name)))
     elif topic == "observers":
-        typer.echo("\n".join(observers()))
+        echo("\n".join(observers()))
     elif topic == "settings":
-        typer.echo("\n".join(settings()))
+        echo("\n".join(settings()))
     elif topic in topics():
-        typer.echo(topics()[topic]["text"].rstrip())
+        echo(topics()[topic]["text"].rstrip())
     elif topic in COMMANDS:
         asked = root.command.commands[topic]
         of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
-        typer.echo(asked.get_help(of_command))
+        echo(asked.get_help(of_command))
     else:
         there = [*topics(), *LISTS]
         near = did_you_mean(topic, [*there, *COMMANDS])
