@@ -79,13 +79,13 @@ def contents() -> Iterator[str]:
 def robots(name: str | None, tip: str | None) -> str:
     """The robot profiles by maker, or one robot and its sources."""
     from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import robot_row, robot_text, robots_grid
+    from vftcli.outputs.listings import robot_text, robots_grid
     from vftcli.robots import MAKERS, load_robot
 
     if name is not None:
         return robot_text(RobotChoice.parsed(robot=name, tip=tip).named())
-    rows = {maker: [robot_row(load_robot(p)) for p in names] for maker, names in MAKERS.items()}
-    return "".join(f"{m}\n{terminal(robots_grid(each))}" for m, each in rows.items()).rstrip("\n")
+    grids = {maker: robots_grid(map(load_robot, names)) for maker, names in MAKERS.items()}
+    return "".join(f"{maker}\n{terminal(grid)}" for maker, grid in grids.items()).rstrip("\n")
 
 
 def observers() -> Iterator[str]:
