@@ -24,7 +24,7 @@ def simulate_log(
             completes=names_at("simulation.writers:WRITERS"),
         ),
     ] = "",
-    settings: Annotated[
+    changes: Annotated[
         list[str] | None,
         Option(
             "--set",
@@ -58,7 +58,7 @@ def simulate_log(
             echo(f"{name:<{width}} {title}")
         return
     check_installed("pinocchio", "vftcli simulate")
-    setup = load_scenario(scenario, settings or ())
+    setup = load_scenario(scenario, changes or ())
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
