@@ -88,7 +88,7 @@ def without_clock(folder: Path) -> list[Any]:
     """A conversion of an RTDE log without its timestamp, read as what it was."""
     table = pl.read_csv(UR5, separator=" ").head(250).drop("timestamp")
     table.write_csv(folder / "log.csv", separator=" ", float_precision=9)
-    return ["convert", folder / "log.csv", "-o", "out.csv", "--format", "ur-csv"]
+    return ["convert", folder / "log.csv", "-o", "out.csv", "--set", "log.format=ur-csv"]
 
 
 def on(log: Change, *words: Any) -> Command:
@@ -130,7 +130,7 @@ def xacro(folder: Path) -> list[Any]:
     text = re.sub("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', text, count=1)
     text = re.sub('<mass value="[^"]*"', '<mass value="$(arg heavy)"', text, count=1)
     (folder / "arm.urdf.xacro").write_text(text, encoding="utf-8")
-    return ["help", "robots", folder / "arm.urdf.xacro"]
+    return ["inspect", written(folder, same), "--robot", folder / "arm.urdf.xacro"]
 
 
 def gripping(folder: Path) -> list[Any]:

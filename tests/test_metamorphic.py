@@ -141,8 +141,9 @@ def identify(folder: Path, *words: object) -> Numbers:
     return dict(flat({key: found[key] for key in ("parameters", "residuals")}))
 
 
-def tune(folder: Path, log: Path, *words: object) -> Numbers:
-    out = run("tune", log, "--robot", "ur5", "-o", folder / "gains.toml", "--json", *words)
+def gains(folder: Path, log: Path, *words: object) -> Numbers:
+    method = ("--method", "gains", "-o", folder / "gains.toml")
+    out = run("identify", log, "--robot", "ur5", *method, "--json", *words)
     return dict(flat(json.loads(out)))
 
 
@@ -156,7 +157,7 @@ def admit(_: Path, log: Path, *words: object) -> Numbers:
 
 
 COMMANDS: dict[str, Callable[..., Numbers]] = {
-    f.__name__: f for f in (inspect, estimate, compare, report, identify, tune, convert, admit)
+    f.__name__: f for f in (inspect, estimate, compare, report, identify, gains, convert, admit)
 }
 
 Ask = Callable[..., Numbers]
@@ -256,7 +257,15 @@ def observers_permuted(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None
     equal(one, ask(logs.load, "--observer", "kfo-fe", "--observer", "gmo", *more))
 
 
-SENSOR = ("--reference", "sensor", "--wrench", "--zero", "start", "--sensor-pose", "0,0,0.03")
+SENSOR = (
+    "--reference",
+    "sensor",
+    "--wrench",
+    "--zero",
+    "start",
+    "--set",
+    "virtual-sensor.sensor=0,0,0.03",
+)
 
 
 def observers_permuted_before_a_sensor(ask: Ask, logs: Logs) -> None:
@@ -345,7 +354,7 @@ def same_clock(ask: Ask, logs: Logs, more: tuple[str, ...] = ()) -> None:
 
 
 TWO_CYCLE = ("--reference", "two-cycle")
-SINGLE = ("inspect", "estimate", "compare", "report", "identify", "tune", "convert", "admit")
+SINGLE = ("inspect", "estimate", "compare", "report", "identify", "gains", "convert", "admit")
 MANY = ("compare", "report", "identify")
 OBSERVED = ("estimate", "compare", "report")
 FREE = ("estimate", "compare", "report")
@@ -354,7 +363,7 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "rename": (renamed, SINGLE),
     "rename: two logs of one name": (of_one_name, MANY),
     "copy: as a second log": (copy_is_no_second_log, MANY),
-    "copy: as a free run": (copy_is_no_free_run, ("estimate", "tune")),
+    "copy: as a free run": (copy_is_no_free_run, ("estimate", "gains")),
     "copy: as a free run of the reference": (
         partial(copy_is_no_free_run, more=TWO_CYCLE),
         ("compare", "report"),
@@ -365,14 +374,14 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
         partial(free_runs_permuted, more=TWO_CYCLE),
         ("compare", "report"),
     ),
-    "permute free runs of the gains": (free_runs_permuted, ("tune",)),
+    "permute free runs of the gains": (free_runs_permuted, ("gains",)),
     "permute observers": (observers_permuted, OBSERVED),
     "permute observers of wrenches": (
         partial(observers_permuted, more=("--wrench", "--zero", "0.5:3.5")),
         OBSERVED,
     ),
     "permute observers before a sensor": (observers_permuted_before_a_sensor, ("compare",)),
-    "repeat a free run": (free_run_repeated, ("estimate", "tune")),
+    "repeat a free run": (free_run_repeated, ("estimate", "gains")),
     "repeat a free run of the reference": (
         partial(free_run_repeated, more=TWO_CYCLE),
         ("compare", "report"),
@@ -386,7 +395,7 @@ RELATIONS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
     "split reading: another format": (split, SINGLE),
     "split reading: two parts": (in_two_parts, ("convert",)),
     "same clock": (partial(same_clock, more=TUNED), FREE),
-    "same clock of the gains": (same_clock, ("tune",)),
+    "same clock of the gains": (same_clock, ("gains",)),
 }
 """Relation → what it tries, and the commands that take it."""
 

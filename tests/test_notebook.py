@@ -27,11 +27,11 @@ def analysis() -> vft.Analysis:
 @pytest.mark.slow
 def test_contacts_are_those_of_the_pipeline() -> None:
     choice = AnalysisChoice(
-        robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free_part="0.3:4")
+        robot=RobotChoice.parsed(robot="ur5"), free=FreeChoice.parsed(free=["0.3:4"])
     )
     (made,) = analyse_logs([TAPS], choice, work=list_touches)
     assert (expected := made.contacts) is not None
-    found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
+    found = vft.contacts(TAPS, robot="ur5", free=["0.3:4"])
     rows = [(contact.start, contact.stop, contact.peak_force) for contact in found]
     assert rows == [(c.start, c.stop, c.peak_force) for c in expected.contacts]
     assert len(rows) == len(found) == 2
@@ -42,8 +42,8 @@ def test_contacts_are_those_of_the_pipeline() -> None:
 @pytest.mark.slow
 def test_a_log_and_a_robot_may_be_files_or_objects() -> None:
     recording, robot = vft.read(TAPS), vft.load_robot("ur5")
-    named = vft.contacts(TAPS, "ur5", free_part="0.3:4", interval="0:6").to_polars()
-    held = vft.contacts(recording, robot, free_part="0.3:4", interval="0:6").to_polars()
+    named = vft.contacts(TAPS, "ur5", free=["0.3:4"], interval="0:6").to_polars()
+    held = vft.contacts(recording, robot, free=["0.3:4"], interval="0:6").to_polars()
     assert named.equals(held)
 
 

@@ -139,10 +139,10 @@ def asked(name: str, *free: Path, **more: object) -> AnalysisChoice:
         ("compare LOAD --reference two-cycle --free FREE --free MORE", 3, 3, 2),
         ("compare LOAD MORE --reference two-cycle --free FREE", 3, 3, 2),
         ("compare LOAD --reference TRUTH --free FREE", 2, 2, 1),
-        ("compare LOAD --reference two-cycle --free-cycles 1", 1, 1, 0),
+        ("compare LOAD --reference two-cycle --set two-cycle.free-cycles=1", 1, 1, 0),
         ("estimate LOAD --free FREE -o OUT", 2, 2, 1),
         ("report LOAD --reference two-cycle --free FREE -o OUT", 2, 2, 1),
-        ("tune LOAD --free FREE -o OUT.toml", 2, 2, 1),
+        ("identify LOAD --method gains --free FREE -o OUT.toml", 2, 2, 1),
     ],
 )
 def test_every_log_is_read_modelled_and_aligned_once(
@@ -196,9 +196,11 @@ def test_a_free_run_as_long_as_the_log_is_told_from_it(runs: list[Path]) -> None
 
 def test_what_needs_the_complete_log_does_not_go_with_causal_observers() -> None:
     online = AnalysisChoice(observers=ObserverChoice(causal=True), wrench=WrenchChoice())
-    with pytest.raises(ParameterError, match="--remove-bias whole-log needs the complete log"):
-        replace(online, refinement=RefinementChoice(remove_bias="whole-log"))
-    with pytest.raises(ParameterError, match="--solver smoother needs the complete log"):
+    with pytest.raises(ParameterError, match=r"bias\.method=whole-log needs the complete log"):
+        replace(online, refinement=RefinementChoice(bias="whole-log"))
+    with pytest.raises(
+        ParameterError, match=r"virtual-sensor\.solver=smoother needs the complete log"
+    ):
         replace(online, wrench=WrenchChoice(solver="smoother"))
 
 
@@ -218,8 +220,8 @@ def test_what_is_derived_from_the_complete_log_is_said_and_kept_from_what_runs_o
     for command in (["estimate", *words, "--causal", "-o", str(tmp_path / "o")], ["admit", *words]):
         with pytest.raises(MissingSignalError, match="need the complete log"):
             CliRunner().invoke(app, command, catch_exceptions=False)
-    never = ["estimate", *words, "--derive", "none", "-o", str(tmp_path / "o")]
-    with pytest.raises(MissingSignalError, match="--derive dq"):
+    never = ["estimate", *words, "--set", "log.derive=none", "-o", str(tmp_path / "o")]
+    with pytest.raises(MissingSignalError, match=r"--set log\.derive=dq"):
         CliRunner().invoke(app, never, catch_exceptions=False)
 
 
@@ -242,7 +244,7 @@ def test_mujoco_ur5e_with_its_own_model(logs: Path) -> None:
     folder = logs / "mujoco_ur5e"
     request = AnalysisChoice(
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(set=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}),
         reference=ReferenceChoice(name="vendor"),
     )
     rmse = rmse_of(analyse_log(folder / "circle.csv", request))
@@ -259,7 +261,7 @@ def test_libfranka_simulation_against_its_truth(logs: Path, tmp_path: Path) -> N
     request = AnalysisChoice(
         read=ReadChoice(interval=(1.5, 27.5)),
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(set=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(settings={"gmo.gain": "30"}),
         reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     rmse = rmse_of(analyse_log(tmp_path / "pushes.csv", request))

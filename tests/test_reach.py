@@ -191,8 +191,12 @@ def test_an_arm_is_laid_on_its_log_by_name(samples: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "columns", "words"),
     [
-        ("ros2_ur_effort_torque", None, "torque-without-gravity.*--effort torque-without-gravity"),
-        ("ros2_ur_effort_full_torque", None, "current-as-torque.*--effort torque"),
+        (
+            "ros2_ur_effort_torque",
+            None,
+            "torque-without-gravity.*--set log.effort=torque-without-gravity",
+        ),
+        ("ros2_ur_effort_full_torque", None, "current-as-torque.*--set log.effort=torque"),
         ("ur5_degrees_turned.csv", DEGREES.replace("-tau", "tau"), "effort-sign.*-tau"),
         ("ur5_degrees_turned.csv", "q[deg]=q{i},-tau=tau{i}", "velocity-unit.*deg/s"),
     ],

@@ -45,6 +45,9 @@ LOGS = {"ur5": "ur5_circle.csv", "panda": "panda_bearing.csv"}
 
 Command = Callable[[Path], list[Any]]
 PUSHED = ("estimate", "-o", "out", "--observer", "gmo", "--json")
+NO_LIST = ("--set", "contacts.list=no")
+WHOLE_LOG = ("--set", "bias.method=whole-log")
+TOOL = ("--set", "virtual-sensor.tool=0,0,0.1")
 
 
 @cache
@@ -159,7 +162,7 @@ def controlled(folder: Path, left_out: str = "") -> list[Any]:
 
 def sensed(folder: Path) -> list[Any]:
     """The wrench of a log that says its payload."""
-    return ["estimate", rtde(folder), "--robot", "ur5", *PUSHED[1:], "--wrench", "--no-contacts"]
+    return ["estimate", rtde(folder), "--robot", "ur5", *PUSHED[1:], "--wrench", *NO_LIST]
 
 
 def checked_thresholds(folder: Path) -> list[Any]:
@@ -238,8 +241,8 @@ ROWS = [
     Row("torque-without-gravity", planted("gravity_compensated"), "effort"),
     Row("torque-without-gravity", planted("gravity_compensated", robot="panda"), "effort"),
     Row("torque-with-gravity", of(
-        lambda t: replace(t, effort=t.torque, signal="tau"), "inspect", "--effort",
-        "torque-without-gravity"), "effort"),
+        lambda t: replace(t, effort=t.torque, signal="tau"), "inspect", "--set",
+        "log.effort=torque-without-gravity"), "log.effort"),
     Row("current-as-torque", planted("torque_called_current"), "effort"),
     Row("torque-as-current", planted("current_called_torque"), "effort"),
     Row("current-as-turned-torque", of(lambda t: replace(t, effort=-t.torque)), "effort"),
@@ -256,12 +259,12 @@ ROWS = [
     Row("vendor-sign", planted("tau_ext_inverted", robot="panda"), "columns"),
     Row("effort-sign", planted("all_signs"), "columns"),
     Row("time-reset", planted("time_reset"), "columns"),
-    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, "--remove-bias", "whole-log"),
+    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, *WHOLE_LOG),
         "free-part", "0:0.5"),
-    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, "--remove-bias", "whole-log"),
+    Row("no-free-part", of(lambda t: t.between(4.5, 9.0), *PUSHED, *WHOLE_LOG),
         "free", free_log),
     Row("no-spectra", of(lambda t: t.between(0.0, 8.0), *PUSHED[:3], "--observer", "rts-auto",
-                         "--json", "--free-part", "0.3:0.35"), "free-part", "0.3:3.9"),
+                         "--json", "--free", "0.3:0.35"), "free", "0.3:3.9"),
     Row("free-part-loaded", gripping(lambda t: payload(t.between(0.0, 12.0)), 2.8, *PUSHED,
                                      "--free", "0.3:6", "--anyway"), "payload", "gripper"),
     Row("wrench-noise-assumed", of(lambda t: t.between(4.5, 9.0), *PUSHED[:3], "--wrench",
@@ -269,17 +272,18 @@ ROWS = [
     Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"), "zero", "0.3:3"),
     Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"), "free",
         "0.3:3"),
-    Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"), "torque-sd",
-        "1"),
+    Row("no-wrench-band", of(lambda t: t.between(0.0, 5.0), *PUSHED, "--wrench"),
+        "virtual-sensor.torque-sd", "1"),
     Row("reference-zero-touched", of(lambda t: t, "compare", "--reference", "zero", "--observer",
                                      "gmo", "--details"), "interval"),
     Row("drag-at-rest", of(partial(holding, kg=3.0), "admit", "--anyway", "--details"), "zero",
         "1.5:2.5"),
-    Row("travel-implausible-hard", of(touched, "admit", "--anyway", "--details"), "threshold-mode"),
+    Row("travel-implausible-hard", of(touched, "admit", "--anyway", "--details"),
+        "admittance.threshold_mode"),
     Row("wrench-frame-unstated", with_wrench, "columns", "wrench[base]=fx|fy|fz|mx|my|mz"),
-    Row("sensor-pose-unstated", with_wrench, "sensor-pose", "0,0,0.05"),
+    Row("sensor-pose-unstated", with_wrench, "virtual-sensor.sensor", "0,0,0.05"),
     Row("tool-pose-unstated", lambda f: with_wrench(
-        f, "--columns", "wrench[tool]=fx|fy|fz|mx|my|mz"), "tool", "0,0,0.05"),
+        f, "--columns", "wrench[tool]=fx|fy|fz|mx|my|mz"), "virtual-sensor.tool", "0,0,0.05"),
     Row("degrees", of(lambda t: replace(t, q=np.rad2deg(t.q), dq=np.rad2deg(t.dq)), "inspect",
                       "--columns", "q[rad]=q{i},dq[rad]=dq{i}"), "columns",
         "q[deg]=q{i},dq[deg/s]=dq{i}"),
@@ -294,15 +298,15 @@ ROWS = [
         t, q=t.q[:, :5], dq=t.dq[:, :5], effort=t.effort[:, :5])), "robot",
         str(FIXTURES / "arm.urdf")),
     Row("free-by-the-fit", of(lambda t: t.between(4.5, 20.0), *PUSHED[:3], "--json",
-                              "--no-contacts"), "free", free_log),
+                              *NO_LIST), "free", free_log),
     Row("check-without-truth", checked_thresholds, "reference", "zero"),
     Row("payload-not-mounted", lambda f: ["inspect", rtde(f), "--robot", "ur5"], "payload"),
     Row("payload-differs", sensed, "zero", "0:1"),
     Row("payload-differs", lambda f: [*sensed(f), "--anyway"], "payload", "log"),
-    Row("controller-point-without-tool", controlled, "tool", "0,0,0.1"),
-    Row("controller-point-open", lambda f: [*controlled(f), "--tool", "0,0,0.1"], "columns"),
+    Row("controller-point-without-tool", controlled, "virtual-sensor.tool", "0,0,0.1"),
+    Row("controller-point-open", lambda f: [*controlled(f), *TOOL], "columns"),
     Row("controller-point-without-currents", lambda f: [
-        *controlled(f, "target_current"), "--tool", "0,0,0.1"], "columns"),
+        *controlled(f, "target_current"), *TOOL], "columns"),
     Row("episode-taken", lambda _: ["inspect", FIXTURES / "panda_episodes"], "episode", "1"),
 ]  # fmt: skip
 
@@ -358,12 +362,38 @@ def test_the_remedy_heals(row: Row, tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def with_option(words: list[Any], said: str, row: Row) -> list[Any]:
     """The command with the option that was printed, over what was made before."""
-    found = re.search(rf"--{row.option}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)]+))?", said)
-    assert found is not None, said
     value = row.value(Path.cwd()) if callable(row.value) else row.value
-    value = value or found[1].rstrip(".:")
+    value = value or value_of(row.option, said)
     again = ["--force"] if "-o" in words else []
-    return [*words, *again, f"--{row.option}", value]
+    return [*words, *again, *typed(row.option, value)]
+
+
+def value_of(option: str, said: str) -> str:
+    """What a text says behind an option or a setting that it must name."""
+    name = re.escape(option if "." in option else f"--{option}")
+    found = re.search(rf"{name}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)|]+))?", said)
+    assert found is not None, said
+    return (found[1] or "").rstrip(".:").strip("'")
+
+
+def typed(option: str, value: object) -> list[Any]:
+    """The words of an option or a setting with a value."""
+    return ["--set", f"{option}={value}"] if "." in option else [f"--{option}", value]
+
+
+def dropped(words: list[Any], option: str) -> list[Any]:
+    """A command without an option or a setting, and its value."""
+    left: list[Any] = []
+    rest = list(words)
+    while rest:
+        word = rest.pop(0)
+        if word == "--set" and rest and str(rest[0]).startswith(f"{option}="):
+            rest.pop(0)
+        elif word == f"--{option}":
+            del rest[: bool(rest) and not str(rest[0]).startswith("-")]
+        else:
+            left.append(word)
+    return left
 
 
 UNREAD = "the reader refuses such a file first; only a log made in memory gets as far"
@@ -422,8 +452,8 @@ def test_a_load_that_a_log_shows_is_found_and_mounted(tmp_path: Path) -> None:
     path, own = table.write(tmp_path / "log.csv"), tmp_path / "loaded.toml"
     said = told("unmodelled-load", printed(["inspect", path, "--robot", "ur5"])[1])
     assert said is not None
-    name, option = re.search(r"(identify) (--find-payload)", said).groups()  # type: ignore[union-attr]
-    code, text = printed([name, path, option, "--robot", "ur5", "-o", own])
+    name, *how = re.search(r"(identify) (--method) (payload)", said).groups()  # type: ignore[union-attr]
+    code, text = printed([name, path, *how, "--robot", "ur5", "-o", own])
     assert code == 0, text
     assert told("unmodelled-load", printed(["inspect", path, "--robot", own])[1]) is None
 
@@ -443,7 +473,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
     assert code == 0, text
 
     def mean(arm: str, plant: Callable[[Table], Table]) -> float:
-        words = of(plant, *PUSHED, "--no-contacts", "--force")(tmp_path)
+        words = of(plant, *PUSHED, *NO_LIST, "--force")(tmp_path)
         code, text = printed([arm if word == "ur5" else word for word in words])
         assert code == 0, text
         estimate = pl.read_parquet("out/estimates.parquet").filter(pl.col("t").is_between(4, 20))
@@ -458,7 +488,7 @@ def test_an_offset_is_taken_out_with_the_remedy(
 def test_a_load_that_one_motion_does_not_show_is_found_in_a_pair(tmp_path: Path) -> None:
     """As the refusal says."""
     loaded, free = payload(sound()).write(tmp_path / "a.csv"), sound().write(tmp_path / "b.csv")
-    search = ["--find-payload", "--robot", "ur5", "-o", tmp_path / "loaded.toml"]
+    search = ["--method", "payload", "--robot", "ur5", "-o", tmp_path / "loaded.toml"]
     code, text = printed(["identify", loaded, *search])
     assert code == 1
     assert "in a pair of logs of one motion with and without it" in text
@@ -484,7 +514,8 @@ REFUSALS = [
         "q=zz{i},dq=dzz{i}"),
     Row("no repetition found", of(lambda t: t.between(4.5, 9.0), *TWO_CYCLE), "free", free_log),
     Row("there is no Jacobian for it", of(
-        lambda t: t.between(0.0, 4.0), *PUSHED, "--frame", "tool"), "tool", "0,0,0.1"),
+        lambda t: t.between(0.0, 4.0), *PUSHED, "--frame", "tool"),
+        "virtual-sensor.tool", "0,0,0.1"),
     Row("a release needs an arm", lambda _: ["admit", "--release", "x=0.3"], "robot", "ur5"),
 ]  # fmt: skip
 

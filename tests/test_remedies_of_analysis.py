@@ -15,7 +15,22 @@ import polars as pl
 import pytest
 from moving_arms import moving
 from planted_faults import Table, gravity_torque, with_more_torque
-from test_remedies import FIXTURES, REFUSALS, Command, Row, free_log, of, printed, robot_file, sound
+from test_remedies import (
+    FIXTURES,
+    NO_LIST,
+    REFUSALS,
+    WHOLE_LOG,
+    Command,
+    Row,
+    dropped,
+    free_log,
+    of,
+    printed,
+    robot_file,
+    sound,
+    typed,
+    value_of,
+)
 
 import vftcli
 from vftcli.robots import load_robot
@@ -142,7 +157,7 @@ def stored(folder: Path) -> list[Any]:
     """A replay of estimates that a command wrote."""
     before(cut(0, 4, *EST))(folder)
     return ["admit", folder / "out" / "estimates.parquet", "--robot", "ur5", "--observer", "gmo",
-            "--solver", "smoother"]  # fmt: skip
+            "--set", "virtual-sensor.solver=smoother"]  # fmt: skip
 
 
 def gains(folder: Path) -> Path:
@@ -152,7 +167,7 @@ def gains(folder: Path) -> Path:
 
 
 def tuned(folder: Path) -> str:
-    """What `vftcli tune` writes."""
+    """What `vftcli identify --method gains` writes."""
     before(cut(0, 4, *TUNE))(folder)
     return "g.toml"
 
@@ -163,25 +178,31 @@ def no_batch(folder: Path) -> list[Any]:
     return BATCH(folder)
 
 
-EST = ("estimate", "-o", "out", "--json", "--no-contacts", "--observer", "gmo")
+EST = ("estimate", "-o", "out", "--json", *NO_LIST, "--observer", "gmo")
 SMOOTHED = (*EST[:-1], "rts-auto")
-TWO = ("compare", "--observer", "gmo", "--no-contacts", "--reference", "two-cycle")
+TWO = ("compare", "--observer", "gmo", *NO_LIST, "--reference", "two-cycle")
 SENSOR = (*TWO[:-1], "sensor", "--wrench")
-TUNE = ("tune", "-o", "g.toml", "--free", "0.3:3.9")
+TUNE = ("identify", "--method", "gains", "-o", "g.toml", "--free", "0.3:3.9")
 MAKE = ("identify", "-o", "own.toml")
-BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--workers", "0")
+CONSTANTS = ("--set", "identify.constants=yes")
+BATCH = cut(0, 4, "batch", "--do", "estimate", "--observer", "gmo", "-o", "b", "--jobs", "0")
 W = "wrench/fx|wrench/fy|wrench/fz|wrench/mx|wrench/my|wrench/mz"
 TRUTH = f"file:{FIXTURES / 'ur5_circle.csv.truth.parquet'}"
-ONE_LOG = beside(cut(0, 9, *TWO, "--period", "4"), "--free", free_log)
-BOTH_GAINS = beside(beside(cut(0, 4, *EST), "--gains", gains), "--set-file", gains)
-WHOLE_CAUSAL = cut(0, 4, *EST, "--remove-bias", "whole-log", "--causal")
-PRINTED_MATCHED = cut(0, 4, *EST, "--match", "delay=0.05", "--as-printed")
+ONE_LOG = beside(cut(0, 9, *TWO, "--set", "two-cycle.period=4"), "--free", free_log)
+WHOLE_CAUSAL = cut(0, 4, *EST, *WHOLE_LOG, "--causal")
+PRINTED_MATCHED = cut(0, 4, *EST, "--gains", "delay=0.05", "--as-printed")
 LOG_AS_ZERO = beside(cut(0, 4, *EST, "--wrench"), "--zero", free_log)
-TOO_LONG = cut(0, 9, *TWO, "--period", "30")
+NO_RECORDING = cut(0, 4, *EST, "--rrd", "--set", "recording.detail=none")
+COMMANDED = cut(0, 12, *TWO, "--set", "two-cycle.alignment=commanded")
+SMOOTHER = ("--set", "virtual-sensor.solver=smoother")
+PRINT = ("--set", "report.published=table1")
+FIT = ("--set", "virtual-sensor.sensor=fit")
+TOO_LONG = cut(0, 9, *TWO, "--set", "two-cycle.period=30")
 
 ROWS = [
-    Row("has no admittance.start", released("start"), "start", "0,-1.35,1.9,-2.12,-1.57,0"),
-    Row("no admittance.period", released("period"), "set"),
+    Row("has no admittance.start", released("start"), "admittance.start",
+        "0,-1.35,1.9,-2.12,-1.57,0"),
+    Row("no admittance.period", released("period"), "admittance.period"),
     Row(": no admittance ", released("mass = 3.0"), "set", "3"),
     Row("a release needs a deviation", lambda _: [
         "admit", "--release", "x=0", "--robot", "ur5"], "release"),
@@ -191,16 +212,14 @@ ROWS = [
     Row("can be compared with its", by_jacobian("", "--reference", "vendor"), "reference"),
     Row("no wrench of a sensor to compare", by_jacobian("a", "--reference", "sensor"), "columns",
         "wrench=afx|afy|afz|amx|amy|amz"),
-    Row("leave out --friction none", fixture("ur5_circle.csv", "0:8", *MAKE, "--method", "targets",
-                                             "--friction", "none"), "friction", AWAY),
+    Row("leave model.friction=none away", fixture("ur5_circle.csv", "0:8", *MAKE, "--method",
+        "targets", "--set", "model.friction=none"), "model.friction", AWAY),
     Row("has no torque constants", cut(0, 8, *MAKE, "--method", "targets", robot="panda"),
         "method"),
-    Row("is the old name of --gains", BOTH_GAINS, "gains", AWAY),
-    Row("is the old name of --gains", BOTH_GAINS, "set-file", AWAY),
     Row("--causal leaves out", cut(0, 4, *SMOOTHED, "--causal"), "observer", "gmo"),
-    Row("Leave --match or", PRINTED_MATCHED, "match", AWAY),
-    Row("Leave --match or", PRINTED_MATCHED, "as-printed", AWAY),
-    Row("--match cannot tune", cut(0, 4, *SMOOTHED, "--match", "delay=0.05"), "observer", "gmo"),
+    Row("Leave --gains or", PRINTED_MATCHED, "gains", AWAY),
+    Row("Leave --gains or", PRINTED_MATCHED, "as-printed", AWAY),
+    Row("--gains cannot tune", cut(0, 4, *SMOOTHED, "--gains", "delay=0.05"), "observer", "gmo"),
     Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", "paper"),
     Row("no such file of gains", cut(0, 4, *EST, "--gains", "mine.toml"), "gains", tuned),
     Row("which no batch wrote", no_batch, "force", FLAG),
@@ -208,15 +227,16 @@ ROWS = [
     Row("exists; give another -o", before(cut(0, 4, *TUNE)), "force", FLAG),
     Row("exists; give another -o", before(simulated("ur5-circle", "-o", "sim.csv")), "force",
         FLAG),
-    Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd", AWAY),
-    Row("writes no recording", cut(0, 4, *EST, "--rrd", "--rrd-detail", "none"), "rrd-detail",
+    Row("writes no recording", NO_RECORDING, "rrd", AWAY),
+    Row("writes no recording", NO_RECORDING, "recording.detail",
         AWAY),
-    Row("add --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1"), "threshold", "5"),
-    Row("raise --threshold", cut(0, 4, *TUNE, "--goal", "false-alarms=1", "--threshold", "0.001"),
-        "threshold", "50"),
+    Row("add --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1"), "set",
+        "alarm.threshold=5"),
+    Row("raise --set alarm", cut(0, 4, *TUNE, "--gains", "false-alarms=1", "--set",
+                                 "alarm.threshold=0.001"), "set", "alarm.threshold=50"),
     Row("are for cycles of one log", ONE_LOG, "period", AWAY),
     Row("are for cycles of one log", ONE_LOG, "free", AWAY),
-    Row("alignment commanded needs", cut(0, 12, *TWO, "--alignment", "commanded"), "period", "4"),
+    Row("alignment commanded needs", COMMANDED, "two-cycle.period", "4"),
     Row("nearly all of that is a gap", of(gap_at_the_end, *TWO, "--anyway"), "interval", "0:9"),
     Row("does not fit into", TOO_LONG, "period", "4"),
     Row("the arm does not move", of(still, *TWO, "--anyway"), "free",
@@ -227,7 +247,7 @@ ROWS = [
         "libfranka"),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "remove-bias", AWAY),
     Row("whole-log needs the complete log", WHOLE_CAUSAL, "causal", AWAY),
-    Row("give another solver", cut(0, 4, *EST, "--wrench", "--solver", "smoother", "--causal"),
+    Row("give another solver", cut(0, 4, *EST, "--wrench", *SMOOTHER, "--causal"),
         "solver", "pinv"),
     Row("--zero takes either start or", cut(0, 4, *EST, "--wrench", "--zero", "start", "--zero",
                                             "0:1"), "zero", "0:1"),
@@ -236,7 +256,7 @@ ROWS = [
     Row("no frame known here", fixture("ur5_sensor.parquet", "0:5", *SENSOR, "--columns",
                                        f"wrench[world]={W}"), "columns", f"wrench[base@tool]={W}"),
     Row("the forces lie on one line", fixture("ur5_sensor.parquet", "0:5", *SENSOR,
-                                              "--sensor-pose", "fit"), "sensor-pose", "0,0,0.05"),
+                                              *FIT), "virtual-sensor.sensor", "0,0,0.05"),
     Row("six components of a wrench", of_five_joints, "wrench", AWAY),
     Row("name a log of free motion by --free", LOG_AS_ZERO, "zero", "0:1"),
     Row("no unloaded start", cut(4.5, 9, *EST, "--wrench", "--zero", "start"), "zero", "0:1"),
@@ -244,26 +264,26 @@ ROWS = [
     Row("or take it all with --anyway", touched_late, "anyway", FLAG),
 ]  # fmt: skip
 DEARER = [
-    Row("is an option of --method friction", cut(
-        0, 8, *MAKE, "--fit-constants", "--method", "base"), "method", "friction"),
+    Row("is for --method friction", cut(
+        0, 8, *MAKE, *CONSTANTS, "--method", "base"), "method", "friction"),
     Row("it would push", of(backwards, *MAKE, "--anyway"), "columns",
         "t=t,q=q{i},-dq=dq{i},current=current{i}"),
-    Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--contacts",
+    Row("no free part to learn the band", fixture("ur5_circle.csv", "5:12", *TWO[:3], "--details",
                                                   "--reference", TRUTH), "free", "5:6"),
-    Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, "--sensor-pose",
-                                      "fit", "--columns", f"wrench[base]={W}"), "columns",
+    Row("not in sensor axes", fixture("ur5_sensor.parquet", "0:18", *SENSOR, *FIT,
+                                      "--columns", f"wrench[base]={W}"), "columns",
         f"wrench[sensor]={W}"),
-    Row("--fit-constants needs motor currents", cut(0, 8, *MAKE, "--fit-constants",
-                                                    robot="panda"), "fit-constants", AWAY),
+    Row("--set identify.constants=yes needs motor currents", cut(0, 8, *MAKE, *CONSTANTS,
+                                                    robot="panda"), "set", AWAY),
     Row("is not a free run of the trajectory", beside(
         cut(4.5, 9, *TWO), "--free", lambda folder: moved().write(folder / "other.csv")),
         "free", free_log),
     Row("sets errors beside the paper's", cut(
-        0, 9, "report", "-o", "out", "--observer", "gmo", "--published", "table1"), "reference"),
-    Row("torque behind the gears", cut(0, 8, *MAKE, "--friction", "none", robot="panda"),
+        0, 9, "report", "-o", "out", "--observer", "gmo", *PRINT), "reference"),
+    Row("torque behind the gears", cut(0, 8, *MAKE, "--set", "model.friction=none", robot="panda"),
         "method"),
-    Row("leave out --fit-constants", of(
-        against_gravity, *MAKE, "--fit-constants", "--anyway"), "fit-constants", AWAY),
+    Row("leave out --set identify.constants=yes", of(
+        against_gravity, *MAKE, *CONSTANTS, "--anyway"), "set", AWAY),
 ]  # fmt: skip
 """Rows over a second of processor time."""
 
@@ -272,10 +292,10 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "no such admittance parameter. Sections", "--release … is not …",
         "rad; it must be less than π", "holds no sample of the log",
         "is not a positive number of false alarms per hour", "--method …; there is …",
-        "--set … is not …", "--figures … is not", "--rrd-detail … is none of",
+        "--set … is not …", "--figures … is not", "recording.detail … is none of",
         "is not a positive number or one a joint [N·m]", "values; give one, or one for each of",
         "is not a positive time in seconds", "is not a positive cutoff in Hz",
-        "is not a list of cycle numbers such as", "names no cycle; they count from 1",
+        "is no list of cycle numbers as", "names no cycle; they begin at 1",
         "s; it must be positive", "is shorter than four samples", "is not a cutoff between 0 and",
         "one positive number, or one for each of"),
     "says what cannot be combined, or not here; there is nothing to try": (
@@ -286,7 +306,7 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
         "less than the period of", "no whole cycle of"),
     "only Python gets as far; the command line refuses such a log or word first": (
         "samples are not finite; leave them out with --interval",
-        "nothing to identify: give --method", "… has … joints, … has …: a free run must be"),
+        "… has … joints, … has …: a free run must be"),
     "needs a free run of another maker's arm with as many joints": ("is a log of …, … of …",),
     "its command is tried where there is no such file of gains": ("no [observers.*] tables",),
     "no log that provokes it is known": (
@@ -296,26 +316,16 @@ WITHOUT_ROW: dict[str, tuple[str, ...]] = {
 """Reason → texts, by words that only they have, that name an option and have no row."""
 
 
-def without(words: list[Any], option: str) -> list[Any]:
-    """A command without an option and its value."""
-    at = [k for k, word in enumerate(words) if word == option]
-    values = [k + 1 for k in at if not str([*words, "-"][k + 1]).startswith("-")]
-    return [word for k, word in enumerate(words) if k not in {*at, *values}]
-
-
 def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
     """The command with what the error says of an option."""
-    found = re.search(rf"--{row.option}(?![-a-z])(?:[ =]('[^']+'|[^\s,;)|]+))?", refused)
-    assert found is not None, refused
-    option, value = f"--{row.option}", row.value
-    left = without(words, option)
+    said, value = value_of(row.option, refused), row.value
+    left = dropped(words, row.option)
     if value in {AWAY, FLAG}:
-        return left if value == AWAY else [*left, option]
+        return left if value == AWAY else [*left, f"--{row.option}"]
     given = value(Path.cwd()) if callable(value) else value
-    said = (found[1] or "").rstrip(".:")
     if "=VALUE" in said:
         given = said.replace("VALUE", given)
-    return [*left, option, given or said]
+    return [*left, *typed(row.option, given or said)]
 
 
 @pytest.mark.slow
@@ -340,10 +350,10 @@ def test_a_remedy_of_two_options_is_taken(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     words = TOO_LONG(tmp_path)
     assert "in its place a free run in another log with --free" in printed(words)[1]
-    assert printed([*without(words, "--period"), "--free", free_log(tmp_path)])[0] == 0
-    words = [*of_five_joints(tmp_path), "--solver", "smoother"]
+    assert printed([*dropped(words, "two-cycle.period"), "--free", free_log(tmp_path)])[0] == 0
+    words = [*of_five_joints(tmp_path), *SMOOTHER]
     assert "leave --wrench and its options out" in printed(words)[1]
-    assert printed(without(without(words, "--wrench"), "--solver"))[0] == 0
+    assert printed(dropped(dropped(words, "wrench"), "virtual-sensor.solver"))[0] == 0
 
 
 def test_no_free_run_is_asked_for_where_none_helps(tmp_path: Path) -> None:

@@ -23,7 +23,6 @@ from refused_commands import (
     PLAIN,
     PULL,
     RELEASE,
-    SENSOR,
     UR5,
     annotated,
     arrays,
@@ -50,7 +49,7 @@ from refused_commands import (
     xacro,
 )
 from seed_logs import ur_binary
-from test_remedies import Command, free_log, printed
+from test_remedies import Command, dropped, free_log, printed, typed
 
 import vftcli
 from vftcli.readers import FORMATS
@@ -87,28 +86,22 @@ ROWS = [
     Row("s force drives the replay", on(same, "admit", *GMO, "--observer", "kfo-zoh"),
         "--observer", "gmo"),
     Row("leave --frame away", on(same, "admit", *GMO, "--frame", "tool"), "--frame", LEFT_OUT),
-    Row("choose one of --sensor and --truth", lambda _: [
-        "admit", SENSOR, "--interval", "0:2", "--robot", "ur5", "--sensor", "--truth",
-        f"{SENSOR}.truth.parquet"], "--truth", LEFT_OUT),
     Row("holds still over a span", lambda f: [
-        "admit", "--closed-loop", short_scenario(f), "--zero", "start"], "--zero", "0:1"),
+        "admit", short_scenario(f), "--zero", "start"], "--zero", "0:1"),
     Row("the closed loop runs", lambda f: [
-        "admit", "--closed-loop", short_scenario(f), "--observer", "gmo"], "--observer",
+        "admit", short_scenario(f), "--observer", "gmo"], "--observer",
         "kfo-zoh"),
     Row("--do compare needs --reference", on(same, "batch", *GMO, "--do", "compare", "-o", "out",
-                                             "--workers", "0"), "--reference", "zero"),
+                                             "--jobs", "0"), "--reference", "zero"),
     Row("--figures and -o DIR need each other", on(
         same, "compare", *GMO, "--reference", "zero", "--figures", "svg"), "-o", "out"),
-    Row("leave --significance away", on(
-        same, "compare", *GMO, "--reference", "zero", "--figures", "svg", "-o", "out",
-        "--significance"), "--significance", LEFT_OUT),
     Row("choose one of --details, --quiet", converted(same, "--details", "--quiet"), "--quiet",
         LEFT_OUT),
     Row("choose one of --json, --csv", on(
         same, "contacts", "--robot", "ur5", "--json", "--csv"), "--csv",
         LEFT_OUT),
-    Row("--derive dq belongs to an estimate", converted(same, "--derive", "dq"), "--derive",
-        LEFT_OUT),
+    Row("--set log.derive=dq belongs to an estimate", converted(same, "--set", "log.derive=dq"),
+        "log.derive", LEFT_OUT),
     Row("free motion to identify the arm from", lambda f: [
         "identify", UR5, "-o", "my.toml", "--robot", "ur5", "--free", free_log(f)], "--free",
         LEFT_OUT),
@@ -159,7 +152,7 @@ ROWS = [
         "--reference-columns", "t,tau_ext:6"),
     Row("the reference torques cannot be told", judged(PULL), "--reference-columns",
         "t=t,tau_ext=pull{i}"),
-    Row("The header was edited", edited_header, "--format --columns",
+    Row("The header was edited", edited_header, "log.format --columns",
         "t[ms]=time,q=" + "|".join(f"state.{'x' if j == 3 else 'q'}[{j}]" for j in range(7))),
     Row("--columns does not apply to", lambda f: [
         "convert", ur_binary(f / "log.bin"), "-o", "out.csv", "--columns", PLAIN], "--columns",
@@ -201,9 +194,7 @@ ROWS = [
     Row("positions alone carry no force", on(
         lambda _: PULL(circle()), "identify", "-o", "my.toml", "--robot", "ur5"), "--columns",
         PLAIN.replace("=current", "=pull")),
-    Row("the xacro needs", xacro, "--robot-arg", "heavy=1"),
-    Row("the xacro takes no argument", lambda f: [*xacro(f), "--robot-arg", "heavi=1"],
-        "--robot-arg", "heavy=1"),
+    Row("the xacro needs", xacro, "--robot", "arm.urdf.xacro heavy:=1"),
     # signals
     Row("the log waits", on(
         lambda _: waiting(circle()), "identify", "-o", "my.toml", "--robot", "ur5"), "--interval",
@@ -211,8 +202,10 @@ ROWS = [
     Row("leave --free away", lambda f: ["compare", written(f, same), *GMO, "--reference", "zero",
                                         "--free", written(f, same)], "--free", LEFT_OUT),
     Row("Record them, or name their columns with --columns….", on(
-        renamed({"dq": "speed"}), "estimate", "-o", "out", *GMO, "--derive", "none"), "--derive"),
-    Row("so none of it can be", on(PULL, "inspect", "--robot", "ur5", "--effort", "current"),
+        renamed({"dq": "speed"}), "estimate", "-o", "out", *GMO, "--set",
+        "log.derive=none"), "log.derive"),
+    Row("so none of it can be", on(
+        PULL, "inspect", "--robot", "ur5", "--set", "log.effort=current"),
         "--columns", PLAIN.replace("=current", "=pull")),
     # batch
     Row("the torques of one observer; give --observer once", annotated(
@@ -220,7 +213,7 @@ ROWS = [
     Row("leave --interval and --episode out", annotated("--interval", "0:1"), "--interval",
         LEFT_OUT),
     Row("leave --interval and --episode out", annotated("--episode", "1"), "--episode", LEFT_OUT),
-    Row("states no standard deviation", annotated("--sd", "--observer", "gmo"), "--observer",
+    Row("states no standard deviation", annotated("--add", "sd", "--observer", "gmo"), "--observer",
         "kfo-zoh"),
     Row("exists; give another -o, or --force", two_copies, "--force", FLAG),
     Row("--force removes no other folder", lambda f: [
@@ -234,9 +227,9 @@ ROWS = [
 
 BAG = Path(__file__).parent.parent / "fixtures/panda_bag/panda_bag.mcap"
 COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
-    "vftcli init LOG writes one": (
+    "vftcli inspect LOG -o FILE writes one": (
         on(same, "inspect", "--config", "my.toml"),
-        (on(same, "init", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
+        (on(same, "inspect", "-o", "my.toml"), on(same, "inspect", "--config", "my.toml")),
     ),
     "holds estimates, not what the drives measured": (
         lambda f: ["estimate", estimated(f), "--robot", "ur5", "-o", "out"],
@@ -248,7 +241,7 @@ COMMANDS: dict[str, tuple[Command, tuple[Command, ...]]] = {
         (on(same, "estimate", "-o", "out", *GMO),),
     ),
     "not a table of text": (
-        lambda _: ["inspect", BAG, "--format", "table"], (lambda _: ["inspect", BAG],),
+        lambda _: ["inspect", BAG, "--set", "log.format=table"], (lambda _: ["inspect", BAG],),
     ),
 }  # fmt: skip
 """Error that names a command → what it refuses, and the commands that it names."""
@@ -268,6 +261,10 @@ def mended(words: list[Any], refused: str, row: Row) -> list[Any]:
         value = row.value if option == last else ""
         if value == "":
             value = (found[1] or "").rstrip(".:").strip("'")
+        if "." in option:
+            words = dropped(words, option)
+            words = words if value is None else [*words, *typed(option, value)]
+            continue
         while option in words:
             at = words.index(option)
             takes = len(words) > at + 1 and not str(words[at + 1]).startswith("-")
@@ -330,7 +327,7 @@ WITHOUT_ROW = {
     ),
     NOTHING: (
         "and none ran", "is what an MJCF gives its joints", "the xacro cannot be expanded",
-        "do not tell those of robot", "Say which with --format.",
+        "do not tell those of robot", "Say which: --set log.format=NAME.",
     ),
     ELSEWHERE: (
         "a load is found from one pair of logs", "--reference says where a log was touched",
@@ -338,11 +335,11 @@ WITHOUT_ROW = {
     ),
     DATASET: (
         "no joint positions among", "the positions are of", "arm alone; leave --arm out",
-        "--derive dq makes them", "gravity would be written as force",
+        "--set log.derive=dq makes them", "gravity would be written as force",
     ),
     CLUSTER: (
-        "add --scheduler ADDRESS", "need Dask and cryptography",
-        "(all three) belong together", "leave --workers out", "are given together",
+        "add --set cluster.address=ADDRESS", "need Dask and cryptography",
+        "(all three) belong together", "leave --jobs out", "are given together",
         "can run code as you", "workers need a certificate", "no Dask scheduler answers",
         "has no worker; start some",
     ),

@@ -47,7 +47,7 @@ def estimated(
         ("--causal",),
         ("--causal", "--as-printed"),
         ("--causal", "--wrench", "--observer", "kfo-zoh"),
-        ("--no-contacts", "--observer", "gmo"),
+        ("--set", "contacts.list=no", "--observer", "gmo"),
         ("--causal", "--interval", "2:9"),
     ],
 )

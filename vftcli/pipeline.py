@@ -68,12 +68,12 @@ class AnalysisChoice:
     def __post_init__(self) -> None:
         if self.observers.causal and self.refinement.corrects_all:
             raise ParameterError(
-                "--remove-bias whole-log needs the complete log, which --causal leaves out; "
+                "bias.method=whole-log needs the complete log, which --causal leaves out; "
                 "give one of them"
             )
         if self.observers.causal and self.wrench is not None and self.wrench.looks_back:
             raise ParameterError(
-                "--solver smoother needs the complete log, which --causal leaves out; "
+                "virtual-sensor.solver=smoother needs the complete log, which --causal leaves out; "
                 "give another solver, as pinv"
             )
 

@@ -1,4 +1,4 @@
-"""Proposal: the options that a log calls for, each with its reason; `vftcli init` writes them."""
+"""Proposal: the options that a log calls for, each with its reason, as inspect writes them."""
 
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -35,7 +35,7 @@ class ProposedOption(NamedTuple):
     """One option for a file of options, or a remark alone."""
 
     why: str  #: Its reason.
-    key: str = ""  #: The option without its dashes; "" of a remark.
+    key: str = ""  #: The option without its dashes, or a setting; "" of a remark.
     value: str | list[str] = ""  #: Its value: a text or several.
     taken: bool = True  #: Whether it holds, or is only there to be taken.
 
@@ -59,7 +59,7 @@ def propose(
     if "robot" not in given:
         fits = [remark.values["fit"] for remark in robot.remarks if remark.code == "robot-guessed"]
         yield ProposedOption(f"by {fits[0]}" if fits else "the log names it", "robot", robot.name)
-    if "effort" not in given:
+    if "log.effort" not in given:
         effort = effort_of(recording, robot, choice)
         yield effort
         if effort.taken:
@@ -92,7 +92,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
     source = recording.source
     yield ProposedOption(
         f"{source.label} is recognised by its content; a file that is not needs this",
-        "format",
+        "log.format",
         source.format,
         taken=False,
     )
@@ -100,7 +100,7 @@ def read_so(recording: Recording) -> Iterator[ProposedOption]:
         if remark.code == "columns-by-value":
             yield ProposedOption(remark.values["why"], "columns", remark.values["columns"])
     if "dq" in source.derived:
-        yield ProposedOption("the log has no velocities", "derive", "dq")
+        yield ProposedOption("the log has no velocities", "log.derive", "dq")
     if recording.payload_mass:
         words = f"the controller assumes {recording.payload_mass:.3g} kg"
         yield ProposedOption(words, "payload", "log", taken=False)
@@ -113,7 +113,7 @@ def possible_robots(recording: Recording, error: RobotError) -> Iterator[Propose
         yield ProposedOption(str(error))
     else:
         yield ProposedOption(
-            "the log does not settle which arm it is: take one, then run init again with --robot. "
+            "the log does not settle which arm it is: take one, then inspect again with --robot. "
             "What each leaves unexplained:"
         )
     for fit in fits:
@@ -127,10 +127,10 @@ def effort_of(recording: Recording, robot: Robot, choice: AnalysisChoice) -> Pro
         if (right := CORRECTIONS.get(finding.code)) is not None:
             # A sign or a unit has no name of its own.
             named = right.kind.replace("_", "-") if right.factor == 1.0 else "auto"
-            return ProposedOption(in_words(finding).evidence, "effort", named)
+            return ProposedOption(in_words(finding).evidence, "log.effort", named)
     called = effort_name(recording, robot).replace("_", "-")
     words = "as the log calls it; the robot's model explains no other reading clearly better"
-    return ProposedOption(words, "effort", called, taken=False)
+    return ProposedOption(words, "log.effort", called, taken=False)
 
 
 def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
@@ -165,7 +165,8 @@ def free_part(
 
 #: Why a difference of cycles may tell nothing.
 ONE_CYCLE = (
-    "the log holds one whole cycle, which has to be free of contact: say so with free-cycles"
+    "the log holds one whole cycle, which has to be free of contact: say so with "
+    "two-cycle.free-cycles"
 )
 
 
@@ -205,19 +206,26 @@ def reasons(recording: Recording) -> dict[str, str]:
 HEADING = """\
 # Options of every command that reads a log, as they are typed, without their dashes. What is typed
 # goes before them; --config none leaves them out. Files are named from this file's folder on.
-# Tables as [compare] hold what is for one command. More: vftcli help config
+# Tables hold what is for one command, as [compare], or settings. More: vftcli help config
 """
 WIDTH = 98  #: Letters of a reason's line.
 
 
 def config_text(options: Iterable[ProposedOption]) -> str:
-    """A file of options, each under its reason, those to be taken behind a ``#``."""
-    parts = [HEADING]
-    for option in options:
+    """A file of options, each under its reason, those to be taken behind a ``#``.
+
+    Settings stand last, in the table of their group.
+    """
+    parts, table = [HEADING], ""
+    for option in sorted(options, key=lambda option: option.key.rpartition(".")[0]):
+        group, _, key = option.key.rpartition(".")
+        if group != table:
+            parts.append(f"[{group}]\n")
+            table = group
         why = printable(" ".join(option.why.split()))
         part = "".join(f"# {line}\n" for line in textwrap.wrap(why, WIDTH))
         if option.key:
-            line = "".join(lines_of({option.key: option.value}))
+            line = "".join(lines_of({key: option.value}))
             part += line if option.taken else f"# {line}"
         parts.append(part)
     return "\n".join(parts)

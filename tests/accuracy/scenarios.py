@@ -84,7 +84,7 @@ def planted_cases(logs, robot=None, seeds=(1, 2, 3)) -> Iterator[Case]:
         recording = read(logs / "ur10e" / log, COLUMNS)
         for seed in seeds:
             made = planted(recording, profile, seed)
-            free = FreeChoice.parsed(free_part="0:8")
+            free = FreeChoice.parsed(free=["0:8"])
             name = f"{log.split('.')[0]} {seed}"
             yield Case("planted", name, made.recording, arm, free, made.torque)
 
@@ -101,7 +101,7 @@ def piece_cases(logs, robot=None, length=10.0) -> Iterator[Case]:
             late = replace(cut, t=cut.t - cut.t[0] + 7.0)
             torque = planted_from(late, profile, number + 1)
             piece = with_torque(replace(cut, t=cut.t - cut.t[0]), profile, torque)
-            free = FreeChoice.parsed(free_part="0:1")
+            free = FreeChoice.parsed(free=["0:1"])
             yield Case("pieces", f"{log.split('.')[0]} {number}", piece, arm, free, torque)
 
 
@@ -144,7 +144,7 @@ def simulated_cases(name, more=STICKS) -> Iterator[Case]:
     scenario, settings, part, seeds = SIMULATED[name]
     for seed in seeds:
         run = simulate(load_scenario(scenario, [*settings, *more]), seed)
-        free = FreeChoice() if part is None else FreeChoice.parsed(free_part=part)
+        free = FreeChoice() if part is None else FreeChoice.parsed(free=[part])
         recording = run.recording
         truth = run.truth.tau_ext[np.unique(run.measured.rows)]
         yield Case(name, str(seed), recording, run.nominal, free, truth)
@@ -162,5 +162,5 @@ def bullet_cases(logs) -> Iterator[Case]:
         arm = load_robot(str(robot))
     for kind in ("const", "vary"):
         recording = read(folder / f"pushed_7_{kind}.csv.gz", TRUTH)
-        free = FreeChoice.parsed(free_part="0:8")
+        free = FreeChoice.parsed(free=["0:8"])
         yield Case("bullet", kind, recording, arm, free, recording.tau_ext)

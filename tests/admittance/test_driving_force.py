@@ -35,7 +35,7 @@ def test_a_stored_torque_is_turned_into_its_wrench_and_zeroed() -> None:
     assert [remark.code for remark in found.remarks] == ["zero-removed"]
     with pytest.raises(MissingSignalError):
         stored_force(Recording(t=T, q=Q), UR5, choice(), "kfo-fe")
-    with pytest.raises(ParameterError, match="takes the log itself"):
+    with pytest.raises(ParameterError, match="needs the log itself"):
         stored_force(log, UR5, WrenchChoice(frame="base", solver="smoother"), "kfo-fe")
 
 

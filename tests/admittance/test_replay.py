@@ -199,7 +199,7 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
     assert not np.any(found.motion.escaped)
     with pytest.raises(UnstableError, match=r"beyond 0\.385 m"):
         replay_release(2.0 * x, UR5, p, controllers(p), start=START)
-    studied = replay_release(3.0 * x, UR5, p, controllers(p), start=START, force_unstable=True)
+    studied = replay_release(3.0 * x, UR5, p, controllers(p), start=START, anyway=True)
     assert studied.motion.escaped[1]
     assert {"motion-escaped", "law-escapes"} <= codes(studied)
 

@@ -106,7 +106,7 @@ def test_unstable_settings_are_refused_with_the_number() -> None:
     slow = from_table(robot.admittance, "ur5", {"admittance": {"period": 0.5}})
     with pytest.raises(UnstableError, match=r"axis rx, drag phase: .* = 4\.25 must be below 4"):
         check_stable(controllers(slow))
-    _, complaints = check_stable(controllers(slow), force_unstable=True)
+    _, complaints = check_stable(controllers(slow), anyway=True)
     assert len(complaints) > 1
     free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
     with pytest.raises(UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):

@@ -33,7 +33,7 @@ TORQUE = "observation.external_torque"
 def made(
     path: Path, copy: Path, asked: ForceChoice | None = None, workers: int = 0, **how: Any
 ) -> dict[str, Any]:
-    here = WorkersChoice(workers=workers)
+    here = WorkersChoice(jobs=workers)
     return annotate(
         path,
         copy,
@@ -154,7 +154,7 @@ def test_frames_without_a_number_stop_it_or_are_marked(dataset: Path, tmp_path: 
     with pytest.raises(LogError, match="external_torque is missing in 2 of 200 frames") as error:
         made(dataset, tmp_path / "copy")
     assert "\n" not in str(error.value)
-    record = made(dataset, tmp_path / "copy", allow_missing=True)
+    record = made(dataset, tmp_path / "copy", ForceChoice(anyway=True))
     assert record["status"] == {"part": 1, "missing": 1, "done": 1}
     assert record["episodes"][0]["missing_frames"] == {"external_torque": 2}
     # a joint without any velocity is left out, and the arm has none without it
@@ -176,8 +176,10 @@ def test_poses_that_hide_the_wrench_stop_it(dataset: Path, tmp_path: Path) -> No
 
     edited(dataset, "observation.state", stretch)
     edited(dataset, "observation.velocity", still)
-    by_map = ForceChoice(wrench=WrenchChoice(solver="map"), anyway=True)
-    with pytest.raises(LogError, match="--solver smoother has a wrench in every pose"):
+    by_map = ForceChoice(wrench=WrenchChoice(solver="map"))
+    with pytest.raises(
+        LogError, match=r"--set virtual-sensor\.solver=smoother has a wrench in every pose"
+    ):
         made(dataset, tmp_path / "copy", by_map)
 
 
@@ -193,7 +195,7 @@ def test_what_tells_no_forces_is_refused_and_leaves_nothing(dataset: Path, tmp_p
     turned = "q=observation.state,dq=observation.velocity,-tau=observation.effort"
     with pytest.raises(LogError, match="effort"):
         made(dataset, copy, ForceChoice(read=ReadChoice(columns=turned)))
-    with pytest.raises(LogError, match=r"no joint velocities\. --derive dq"):
+    with pytest.raises(LogError, match=r"no joint velocities\. --set log.derive=dq"):
         made(
             dataset,
             copy,
@@ -296,8 +298,8 @@ def test_the_datasets_library_loads_it_by_its_own_description(
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     import datasets
 
-    asked = ForceChoice(wrench=WrenchChoice(), sd=True)
-    made(FIXTURE, tmp_path / "copy", asked, allow_missing=True)
+    asked = ForceChoice(wrench=WrenchChoice(), sd=True, anyway=True)
+    made(FIXTURE, tmp_path / "copy", asked)
     info = json.loads((tmp_path / "copy" / "meta" / "info.json").read_text())
     features = {}
     for name, told in info["features"].items():

@@ -69,7 +69,7 @@ def test_the_key_is_what_the_numbers_depend_on() -> None:
 
 def test_signals_that_are_not_there_or_were_not_measured() -> None:
     check_signals(LOG, anyway=False)
-    with pytest.raises(MissingSignalError, match=r"no joint velocities\. --derive dq"):
+    with pytest.raises(MissingSignalError, match=r"no joint velocities\. --set log.derive=dq"):
         check_signals(replace(LOG, dq=None), anyway=False)
     with pytest.raises(MissingSignalError, match="no joint torques or currents"):
         check_signals(replace(LOG, torque=None), anyway=False)

@@ -17,7 +17,7 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import REPLACED, Workers, connected, run_tasks
 from vftcli.batch.outcome import EngineError, Failure, Outcome, begin, failure_of, perform
 
-HERE = WorkersChoice(workers=0)
+HERE = WorkersChoice(jobs=0)
 
 
 def silent(_words: str) -> None:
@@ -63,7 +63,7 @@ def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
     groups = [(0,)] * 4 + [(0, signal.SIGKILL, 0)] + [(0, 0)] * 2 + [(0,)]
     # raise(0) does nothing, by POSIX; raise(9) cannot be caught.
     ended: list[Outcome[int]] = list(
-        run_tasks(groups, signal.raise_signal, WorkersChoice(workers=2), silent)
+        run_tasks(groups, signal.raise_signal, WorkersChoice(jobs=2), silent)
     )
     assert len(ended) == 12
     failed = [outcome for outcome in ended if outcome.failure is not None]
@@ -75,7 +75,7 @@ def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
 @pytest.mark.slow
 def test_workers_are_processes_with_one_thread_a_library() -> None:
     names = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "POLARS_MAX_THREADS")
-    ended = list(run_tasks([names], os.getenv, WorkersChoice(workers=1), silent))
+    ended = list(run_tasks([names], os.getenv, WorkersChoice(jobs=1), silent))
     assert sorted((outcome.task, outcome.value) for outcome in ended) == sorted(
         (name, "1") for name in names
     )
@@ -151,7 +151,7 @@ def test_nobody_without_the_run_s_certificate_reaches_its_workers() -> None:
     own = psutil.Process()
     before = {where.laddr for where in own.net_connections("tcp")}
     with (
-        connected(WorkersChoice(workers=1), (), silent) as client,
+        connected(WorkersChoice(jobs=1), (), silent) as client,
         LocalCluster(
             n_workers=1, processes=False, protocol="tcp://", dashboard_address="127.0.0.1:0"
         ) as opened,

@@ -66,7 +66,7 @@ def test_files_are_found_in_paths_references_and_robots(tmp_path: Path) -> None:
         robot=RobotChoice(name=str(robot)),
         free=FreeChoice(logs=(Path("free.csv"),)),
         reference=ReferenceChoice(name="file:truth.parquet"),
-        observers=ObserverChoice(gains_file=Path("gains.toml")),
+        observers=ObserverChoice(gains=Path("gains.toml")),
     )
     there = with_files(choice, lambda path: Path("/there") / path.name)
     assert there.robot.name == "/there/arm.toml"

@@ -25,7 +25,15 @@ def admit(run: Run) -> Run:
 
 def test_release_rows(admit: Run) -> None:
     code, out, err = admit(
-        "--release", "x=0.3", "--robot", "ur5", "--alpha", "1,1.3,1.6,1.9", "--xi", "1", "--json"
+        "--release",
+        "x=0.3",
+        "--robot",
+        "ur5",
+        "--alpha",
+        "1,1.3,1.6,1.9",
+        "--set",
+        "admittance.xi=1",
+        "--json",
     )
     rows = json.loads(out)
     assert (code, err) == (0, "")
@@ -97,7 +105,9 @@ def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypa
     from_estimates = json.loads(admit(estimates, *asked)[1])
     for one, other in zip(from_log, from_estimates, strict=True):
         assert one["peak"] == pytest.approx(other["peak"], abs=1e-9)  # the same torques, stored
-    truth = json.loads(admit(FIXTURE, "--truth", f"{FIXTURE}.truth.parquet", *asked)[1])
+    truth = json.loads(
+        admit(FIXTURE, "--set", f"admittance.force=file:{FIXTURE}.truth.parquet", *asked)[1]
+    )
     peaks = {row["axis"]: row["peak"] for row in truth if row["controller"] == "variable"}
     assert peaks["x"] > 0.05  # the guiding hand pulls along +x with 7 N
     code, _, err = admit(estimates, "--robot", "panda", "--observer", "kfo")
@@ -113,20 +123,24 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
     [
         ((*RELEASE, "--alpha", "0"), 1, "alpha of axis x is 0; it must be positive"),
         ((*RELEASE, "--alpha", "one"), 1, "is not a list of numbers"),
-        ((*RELEASE, "--xi", "0"), 1, "xi of axis x is 0; it must be positive"),
+        ((*RELEASE, "--set", "admittance.xi=0"), 1, "xi of axis x is 0; it must be positive"),
         ((*RELEASE, "--set", "position.mass=0"), 1, "mass of axis x is 0"),
         ((*RELEASE, "--set", "rx.K=-1"), 1, "stiffness of axis rx is -1"),
         ((*RELEASE, "--set", "rx.threshold=nan"), 1, "no admittance threshold for rx"),
-        ((*RELEASE, "--set", "foo.mass=3"), 1, "no observer 'foo' to set"),
+        ((*RELEASE, "--set", "foo.mass=3"), 1, "--set foo.mass: this command has no such setting"),
         ((*RELEASE, "--set", "period=0.5"), 1, "= 4.25 must be below 4"),
-        ((*RELEASE, "--start", "0,0,0,0,0,7"), 1, "start pose is outside the joint limits"),
-        ((*RELEASE, "--start", "0,0"), 1, "the start pose has 2 joints"),
-        ((*RELEASE, "--threshold-mode", "firm"), 1, "there is hard, soft"),
-        ((*RELEASE, "--controller", "fuzzy"), 1, "there is traditional, variable"),
+        (
+            (*RELEASE, "--set", "admittance.start=0,0,0,0,0,7"),
+            1,
+            "start pose is outside the joint limits",
+        ),
+        ((*RELEASE, "--set", "admittance.start=0,0"), 1, "the start pose has 2 joints"),
+        ((*RELEASE, "--set", "admittance.threshold_mode=firm"), 1, "there is hard, soft"),
+        ((*RELEASE, "--set", "admittance.controller=fuzzy"), 1, "there is traditional, variable"),
         (("--release", "w=1", "--robot", "ur5"), 1, "axis of x, y, z, rx, ry, rz"),
         (("--release", "x=0.3"), 1, "a release needs an arm"),
-        (("--robot", "ur5"), 2, "give one of LOG, --release"),
-        ((FIXTURE, "--robot", "panda", "--sensor"), 1, "wrench"),
+        (("--robot", "ur5"), 2, "give one of LOG, SCENARIO, --release"),
+        ((FIXTURE, "--robot", "panda", "--set", "admittance.force=sensor"), 1, "wrench"),
         ((FIXTURE, "--robot", "panda", "--observer", "nope"), 1, "no observer 'nope'"),
         (
             (FIXTURE, "--robot", "panda", "--observer", "gmo", "--observer", "fdo"),
@@ -134,9 +148,19 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
             "give --observer once",
         ),
         ((FIXTURE, "--robot", "panda", "--frame", "tool"), 1, "the replay is in base axes"),
-        ((FIXTURE, "--robot", "panda", "--sensor", "--truth", "x"), 2, "one of --sensor and"),
-        (("--closed-loop", "ur5-drag", "--zero", "start"), 1, "give it as --zero A:B"),
-        (("--closed-loop", "ur5-dragg"), 1, "ur5-drag"),
+        (
+            (
+                FIXTURE,
+                "--robot",
+                "panda",
+                "--set",
+                "admittance.force=x",
+            ),
+            1,
+            "admittance.force=x is neither sensor nor file:PATH",
+        ),
+        (("ur5-drag", "--zero", "start"), 1, "give it as --zero A:B"),
+        (("ur5-dragg",), 1, "ur5-drag"),
     ],
 )
 def test_bad_input_is_one_clear_line(

@@ -13,7 +13,7 @@ FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "panda_episodes"
 
 @pytest.mark.slow
 def test_it_says_what_was_written(tmp_path: Path) -> None:
-    words = ["annotate", str(FIXTURE), "-o", str(tmp_path / "copy"), "--wrench", "--contact"]
+    words = ["annotate", str(FIXTURE), "-o", str(tmp_path / "copy"), "--add", "wrench,contact"]
     result = CliRunner().invoke(app, words)
     assert result.exit_code == 0, result.output
     assert "3 episodes (3 done), 540 frames, panda, kfo-zoh, causal" in result.stderr
@@ -27,7 +27,7 @@ def test_it_says_what_was_written(tmp_path: Path) -> None:
 def test_a_load_is_sought_in_all_episodes_and_too_few_poses_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    words = ["identify", str(FIXTURE), "--find-payload", "-o", str(tmp_path / "robot.toml")]
+    words = ["identify", str(FIXTURE), "--method", "payload", "-o", str(tmp_path / "robot.toml")]
     monkeypatch.setattr("sys.argv", ["vftcli", *words])
     with pytest.raises(SystemExit):
         main()
@@ -43,6 +43,7 @@ def test_refusals_are_one_line(
     for words, said in (
         (["-o", inside], "one inside the other"),
         (["-o", str(tmp_path / "c"), "--episode", "1"], "leave --interval and --episode out"),
+        (["-o", str(tmp_path / "c"), "--add", "sd,force"], "--add force; there is wrench, sd,"),
         (["-o", str(tmp_path / "c"), "--robot", "ur5"], "Choose the arm of this log with --robot"),
     ):
         monkeypatch.setattr("sys.argv", ["vftcli", "annotate", str(FIXTURE), *words])

@@ -157,11 +157,11 @@ def test_an_output_that_is_a_file_is_one_line(tmp_path: Path, run: Run) -> None:
         (("--robot", "ur5", "--set", "gmo.gain=-3"), "must be positive"),
         (("--robot", "ur5", "--set", "gmo.gain=1,2"), "one for each of 6"),
         (("--robot", "ur5", "--set", "kfo.noise_convention=white"), "there is density"),
-        (("--robot", "ur5", "--friction", "some"), "there is profile, none"),
+        (("--robot", "ur5", "--set", "model.friction=some"), "there is profile, none"),
         (("--robot", "ur5", "--payload", "bucket"), "no payload 'bucket'"),
         (("--robot", "ur5", "--interval", "8:4"), "A:B with A < B"),
         (("--robot", "ur5", "--interval", "100:200"), "the log runs from 0 to"),
-        (("--robot", "ur5", "--format", "excel"), "known formats"),
+        (("--robot", "ur5", "--set", "log.format=excel"), "known formats"),
     ],
 )
 def test_a_wrong_option_is_one_line(

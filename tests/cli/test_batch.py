@@ -12,8 +12,8 @@ from vftcli.cli.batch import duration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
-ONE = ("--robot", "ur5", "--observer", "gmo", "--no-contacts")
-HERE = ("--do", "estimate", *ONE, "--workers", "0")
+ONE = ("--robot", "ur5", "--observer", "gmo", "--set", "contacts.list=no")
+HERE = ("--do", "estimate", *ONE, "--jobs", "0")
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +46,7 @@ def test_every_log_is_done_once_whatever_the_workers(run, folder: Path, tmp_path
     """A LocalCluster of two workers against this process against the command of one log."""
     out, cluster = tmp_path / "out", tmp_path / "cluster"
     assert run("batch", folder, *HERE, "-o", out)[0] == 0
-    done = run("batch", folder, "--do", "estimate", *ONE, "--workers", "2", "-o", cluster)
+    done = run("batch", folder, "--do", "estimate", *ONE, "--jobs", "2", "-o", cluster)
     assert done[0] == 0, done[2]
     assert (out / "batch.parquet").read_bytes() == (cluster / "batch.parquet").read_bytes()
     table = pl.read_parquet(out / "batch.parquet")
@@ -119,7 +119,7 @@ def test_what_failed_is_tried_again(run, folder: Path, tmp_path: Path) -> None:
 def test_compare_has_the_errors_of_compare(run, tmp_path: Path) -> None:
     words = (*ONE, "--reference", "zero", "--interval", "0:4")
     out = tmp_path / "out"
-    assert run("batch", CIRCLE, "--do", "compare", *words, "-o", out, "--workers", "0")[0] == 0
+    assert run("batch", CIRCLE, "--do", "compare", *words, "-o", out, "--jobs", "0")[0] == 0
     rows = json.loads(run("compare", CIRCLE, *words, "--json")[1])
     table = pl.read_parquet(out / "batch.parquet")
     assert table["rmse_Nm"].to_list() == [row["rmse_Nm"] for row in rows]
@@ -128,7 +128,7 @@ def test_compare_has_the_errors_of_compare(run, tmp_path: Path) -> None:
 
 def test_contacts_are_counted_and_listed(run, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = ("--robot", "ur5", "--interval", "3:8", "--workers", "0", "-o", out)
+    words = ("--robot", "ur5", "--interval", "3:8", "--jobs", "0", "-o", out)
     assert run("batch", CIRCLE, "--do", "contacts", *words)[0] == 0
     (row,) = pl.read_parquet(out / "batch.parquet").iter_rows(named=True)
     (listed,) = out.glob("logs/*/*/contacts.json")
@@ -136,7 +136,7 @@ def test_contacts_are_counted_and_listed(run, tmp_path: Path) -> None:
 
 
 def test_an_episode_is_a_log(run, samples: Path, tmp_path: Path) -> None:
-    out, words = tmp_path / "out", ("--observer", "gmo", "--workers", "0")
+    out, words = tmp_path / "out", ("--observer", "gmo", "--jobs", "0")
     done = run("batch", samples / "lerobot_v3_effort", "--do", "estimate", *words, "-o", out)
     assert done[0] == 0, done[2]
     table = pl.read_parquet(out / "batch.parquet").unique("log", maintain_order=True)
@@ -181,7 +181,7 @@ def test_what_describes_logs_is_passed_over_and_said_once(
 
 @pytest.mark.statistical
 def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> None:
-    address = ("--scheduler", "tcp://127.0.0.1:1")
+    address = ("--set", "cluster.address=tcp://127.0.0.1:1")
     asked = ("batch", CIRCLE, "--do", "estimate", *ONE, *address, "-o", tmp_path / "out")
     code, _, err = run(*asked)
     assert code == 1
@@ -196,7 +196,7 @@ def test_an_address_that_does_not_answer_is_one_line(run, tmp_path: Path) -> Non
 @pytest.mark.parametrize("do", ["estimate", "contacts"])
 def test_a_reference_that_nothing_is_compared_with_is_left_out(run, tmp_path: Path, do) -> None:
     """The log has no sensor: as a reference it would be refused."""
-    words = ("--do", do, *ONE, "--workers", "0", "--reference", "sensor", "-o", tmp_path / "out")
+    words = ("--do", do, *ONE, "--jobs", "0", "--reference", "sensor", "-o", tmp_path / "out")
     code, _, err = run("batch", CIRCLE, *words)
     assert (code, "--reference is left out" in err) == (0, True)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli import config
+from vftcli.cli.options import settings_by_name
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 LOG = FIXTURES / "ur5_circle.csv"
@@ -17,7 +18,7 @@ interval = "0:4"
 reference = "file:truth.csv"
 [compare]
 reference = "zero"
-contacts = false
+wrench = false
 """
 
 
@@ -64,10 +65,10 @@ def test_a_named_file_is_read_in_place_of_the_folder_s(run, here: Path) -> None:
 
 
 def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
-    keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nno-contacts = true\nwrench = false\n')
+    keep(here, 'robot = "ur5"\nobserver = ["gmo"]\nwrench = false\n[contacts]\nlist = false\n')
     assert run("estimate", LOG, "-o", "out")[0] == 0
     command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
-    kept = "--observer gmo --robot ur5 --no-contacts --config none"
+    kept = "--observer gmo --robot ur5 --set contacts.list=no --config none"
     assert sorted(command.split()) == sorted(f"vftcli estimate {LOG} -o out {kept}".split())
     (here / config.NAME).unlink()
     assert run(*command.split()[1:], "-o", "again")[0] == 0
@@ -77,7 +78,7 @@ def test_the_command_line_of_run_json_needs_no_file(run, here: Path) -> None:
 
 @pytest.mark.slow
 def test_kept_columns_are_not_those_of_estimates(run, here: Path) -> None:
-    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\nno-contacts = true\n')
+    keep(here, 'robot = "ur5"\ncolumns = "-t,q:6"\nobserver = ["gmo"]\n[contacts]\nlist = false\n')
     code, _, err = run("estimate", LOG, "-o", "out")
     assert (code, "--columns=-t,q:6" in err) == (1, True)
     assert run("estimate", LOG, "-o", "out", "--config", "none", "--robot", "ur5")[0] == 0
@@ -99,17 +100,19 @@ def test_logs_behind_two_dashes_stay_behind_them(monkeypatch: pytest.MonkeyPatch
         ('robt = "ur5"', "'robt' is no option of a command that reads a log. Did you mean robot?"),
         ("dance = 1", "A key is an option without its dashes, as robot."),
         ('[compare]\nrobt = "ur5"', "'robt' is no option of compare. Did you mean robot?"),
-        ("[compre]\nwrench = true", "[compre] is no command that reads a log; there is contacts"),
+        ("[compre]\nwrench = true", "compre.wrench is no setting; vftcli help settings lists them"),
         ("force = true", "force is not kept in a file; type --force"),
         ("robot = ", "not valid TOML"),
         ("robot = true", "robot = True is not a text or a number"),
         ('robot = ["ur5", "ur3"]', "is not a text or a number"),
-        ("robot = {name = 'ur5'}", "is not a text or a number"),
+        ("robot = {name = 'ur5'}", "robot.name is no setting"),
+        ("[two-cycle]\nperiot = 4", "is no setting; vftcli help settings lists them. Did you mean"),
         ("free = [[1, 2]]", "is not a text, a number or a list of them"),
         ("free = []", "is not a text, a number or a list of them"),
         ('wrench = "yes"', "wrench = 'yes' is neither true nor false"),
-        ('period = "long"', "period = 'long': 'long' is not a valid float"),
-        ('alignment = "odd"', "no alignment 'odd'"),
+        ('[two-cycle]\nperiod = "long"', "two-cycle.period=long is not a number"),
+        ('[two-cycle]\nalignment = "odd"', "no alignment 'odd'"),
+        ("two-cycle = 4", "'two-cycle' is no option of a command that reads a log"),
         ('robot = "mine.toml"', f"{Path('sub/mine.toml')}: no such robot file"),
     ],
 )
@@ -174,13 +177,32 @@ def test_an_option_that_a_command_takes_otherwise_is_its_own_table_s(run, here: 
 
 def test_the_file_is_an_input_that_nothing_writes_over(run, here: Path) -> None:
     kept = keep(here, 'robot = "ur5"\n')
-    code, _, err = run("tune", LOG, "-o", kept, "--force")
+    code, _, err = run("identify", LOG, "--method", "gains", "-o", kept, "--force")
     assert (code, kept.read_text("utf-8")) == (1, 'robot = "ur5"\n')
     assert "what this command reads" in err
 
 
 def test_every_option_kept_otherwise_exists() -> None:
-    known = config.known_options()
-    assert "init" not in known
+    known, choices = config.known_options()
     for command, keys in config.OTHERWISE.items():
-        assert keys <= set(known[command])
+        assert keys <= {*known[command], *settings_by_name(choices)}
+
+
+def test_settings_stand_in_a_table_of_their_group_also_where_a_command_is_called_so(
+    run, here: Path
+) -> None:
+    keep(here, 'robot = "ur5"\n[identify]\ncutoff = 5\nmethod = "guess"\n[two-cycle]\nperiod = 4\n')
+    code, _, err = run("identify", LOG)
+    assert (code, "there is friction, base" in err) == (1, True)
+    for word in ("--set identify.cutoff=5", "--set two-cycle.period=4", "--method guess"):
+        assert word in err
+    assert "--method" not in run("compare", LOG, "--reference", "zero", "--interval", "0:1")[2]
+
+
+def test_a_typed_setting_goes_before_a_kept_one(run, here: Path) -> None:
+    keep(here, 'robot = "ur5"\n[gmo]\ngain = [5, 5, 5, 5, 5, 5]\n[fdo]\nomega = 8\n')
+    words = ("--observer", "gmo", "--observer", "fdo", "--reference", "zero", "--json")
+    _, kept, err = run("compare", LOG, *words, "--set", "gmo.gain=9")
+    assert "gives --set fdo.omega=8 --robot ur5 (" in err
+    typed = ("--set", "gmo.gain=9", "--set", "fdo.omega=8", "--robot", "ur5", "--config", "none")
+    assert kept == run("compare", LOG, *words, *typed)[1]

@@ -32,7 +32,7 @@ def test_the_answer_is_on_stdout_and_nothing_is_written(
 
 @pytest.mark.slow
 def test_json_and_csv_hold_the_same_rows(run: Run) -> None:
-    words = ("contacts", TAPS, "--robot", "ur5", "--free-part", "0.3:4")
+    words = ("contacts", TAPS, "--robot", "ur5", "--free", "0.3:4")
     code, out, _ = run(*words, "--json")
     record = json.loads(out)
     assert code == 0
@@ -75,7 +75,7 @@ def test_estimates_are_listed_as_they_were_written(run: Run, tmp_path: Path) -> 
 
 
 def test_a_notebook_asks_the_same() -> None:
-    found = vft.contacts(TAPS, robot="ur5", free_part="0.3:4")
+    found = vft.contacts(TAPS, robot="ur5", free=["0.3:4"])
     assert len(found.contacts) == 2
     assert found.hardest is not None
     assert found.hardest.where == "wrist"

@@ -71,7 +71,7 @@ def test_every_table_shows_both_logs(logs, option):
 
 @pytest.mark.slow
 def test_significance_names_both_logs(logs):
-    text = compared(logs, "--significance")
+    text = compared(logs, "--details")
     assert "a/log.csv" in text
     assert "b/log.csv" in text
 
@@ -97,7 +97,7 @@ def test_an_identified_robot_has_one_rms_a_joint_and_log(logs, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_payload_pair_of_equal_names_trains_friction_on_the_log_without_load(tmp_path):
+def test_a_payload_pair_of_equal_names_is_scored_on_the_log_without_load(tmp_path):
     """The loaded log of a pair is the heavier one, whatever the files are called."""
     made = invoke("simulate", "payload-pair", "-o", tmp_path / "log.csv", "--seed", 1)
     assert made.exit_code == 0, made.output
@@ -106,13 +106,12 @@ def test_a_payload_pair_of_equal_names_trains_friction_on_the_log_without_load(t
         (tmp_path / f"log.{ending}").rename(tmp_path / name / "log.csv")
     robot = tmp_path / "robot.toml"
     both = [tmp_path / name / "log.csv" for name in "ab"]
-    options = ("--find-payload", "--method", "friction", "--json", "-o", robot)
+    options = ("--method", "payload", "--json", "-o", robot)
     result = invoke("identify", *both, "--robot", "ur5", *options)
     assert result.exit_code == 0, result.output
     record = json.loads(result.stdout)
-    assert record["method"] == "friction"
     assert {row["log"] for row in record["residuals"]} == {"b/log.csv"}
-    assert any(row["parameter"] == "coulomb" for row in record["parameters"])
+    assert {row["parameter"] for row in record["parameters"]} == {"mass", "com_x", "com_y", "com_z"}
 
 
 @pytest.mark.slow
@@ -125,7 +124,17 @@ def test_one_run_given_twice_is_refused(logs, tmp_path):
         ("compare", log, log, *zero),
         ("report", log, copy, *zero, "-o", tmp_path / "out"),
         ("identify", log, copy, *common, "-o", tmp_path / "robot.toml"),
-        ("identify", log, "--free", copy, "--find-payload", *common, "-o", tmp_path / "r.toml"),
+        (
+            "identify",
+            log,
+            "--free",
+            copy,
+            "--method",
+            "payload",
+            *common,
+            "-o",
+            tmp_path / "r.toml",
+        ),
     ):
         result = invoke(*words)
         assert isinstance(result.exception, ParameterError), result.output
@@ -139,7 +148,7 @@ def test_one_run_given_twice_is_refused(logs, tmp_path):
         ("compare", "--reference", "two-cycle"),
         ("compare", "--reference", "zero"),
         ("estimate",),
-        ("tune",),
+        ("identify", "--method", "gains"),
     ],
     ids=" ".join,
 )

@@ -19,7 +19,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     "estimate": (*UR5, "--observer", "gmo", "-o", "out"),
     "compare": (*UR5, "--observer", "gmo", "--reference", f"file:{FIXTURE}.truth.parquet"),
     "report": (*UR5, "--observer", "gmo", "-o", "out"),
-    "tune": (*UR5, "--free-part", "0:4", "-o", "gains.toml"),
+    "identify --method gains": (*UR5, "--free", "0:4", "-o", "gains.toml"),
     "admit": UR5,
     "identify": (*UR5, "-o", "mine.toml"),
 }
@@ -43,7 +43,7 @@ def test_a_sound_log_is_said_to_be_sound(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     words = COMMANDS.get(command, ("-o", "other.csv"))
-    code, out, err = run(command, FIXTURE, *words, "--json", "-v")
+    code, out, err = run(*command.split(), FIXTURE, *words, "--json", "-v")
     assert code == 0, err
     assert "log health: sound" in err.splitlines()
     # the short recipe has none, and the UR5's friction follows them where a command models the log
@@ -78,7 +78,7 @@ def test_a_log_with_temperatures_is_modelled_by_them(
 def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
     command: str, turned: str, run: Run, tmp_path: Path
 ) -> None:
-    code, out, err = run(command, turned, *COMMANDS[command])
+    code, out, err = run(*command.split(), turned, *COMMANDS[command])
     assert (code, out) == (1, "")
     (line,) = [line for line in err.splitlines() if line.startswith("error: ")]
     assert "effort-sign" in line
@@ -90,7 +90,7 @@ def test_a_meaningless_log_is_refused_in_one_line_and_nothing_is_written(
 @pytest.mark.slow
 @pytest.mark.parametrize("command", sorted(COMMANDS.keys() - {"identify"}))
 def test_anyway_goes_on_and_says_so_first(command: str, turned: str, run: Run) -> None:
-    code, _, err = run(command, turned, *COMMANDS[command], "--anyway")
+    code, _, err = run(*command.split(), turned, *COMMANDS[command], "--anyway")
     assert code == 0, err
     lines = err.splitlines()
     (doubt,) = [line for line in lines if line.startswith("MEANINGLESS")]
@@ -126,7 +126,7 @@ def test_every_output_of_a_report_carries_what_was_overridden(
 
 @pytest.mark.slow
 def test_an_open_effort_heals_the_log(turned: str, run: Run, tmp_path: Path) -> None:
-    words = ("--observer", "gmo", "--effort", "auto", "-o", "out", "--json")
+    words = ("--observer", "gmo", "--set", "log.effort=auto", "-o", "out", "--json")
     code, out, err = run("estimate", turned, *UR5, *words)
     assert code == 0, err
     record = json.loads(out)

@@ -41,7 +41,7 @@ def test_a_log_becomes_a_robot_that_estimate_uses(excitation, tmp_path):
 @pytest.mark.slow
 def test_json_is_all_there_is_on_stdout(excitation, tmp_path):
     command = ["identify", str(excitation), "--robot", "ur5", "--json"]
-    command += ["--validate", str(excitation), "-o", str(tmp_path / "r.toml")]
+    command += ["--check", str(excitation), "-o", str(tmp_path / "r.toml")]
     result = RUNNER.invoke(app, command)
     assert result.exit_code == 0, result.output
     record = json.loads(result.stdout)
@@ -74,16 +74,21 @@ def test_what_exists_stays_without_force(excitation, tmp_path):
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["--free", "other.csv"], "is the motion without the load that --find-payload seeks"),
-        (["--find-payload", "--free", "0:4"], "give --free the log without it, once"),
-        (["--find-payload", "--free", "a.csv", "--free", "b.csv"], "from one pair of logs"),
+        (["--free", "other.csv"], "is the motion without the load that --method payload seeks"),
+        (["--method", "payload", "--free", "0:4"], "give --free the log without it, once"),
+        (["--method", "payload", "--free", "a.csv", "--free", "b.csv"], "from one pair of logs"),
         (["--method", "guess"], "there is friction, base"),
-        (["--method", "base", "--fit-constants"], "is an option of --method friction"),
-        (["--validate-interval", "4:1"], "is not A:B with A < B"),
+        (["--method", "base", "--set", "identify.constants=yes"], "is for --method friction"),
+        (["--set", "identify.check-interval=4:1"], "is not A:B with A < B"),
+        (["--gains", "auto"], "--gains is an option of --method gains"),
+        (["--method", "base", "--gains", "auto"], "--method base makes no use of --gains"),
+        (["--method", "gains", "--check", "a.csv"], "--method gains makes no use of --check"),
+        (["--method", "gains", "other.csv"], "takes one LOG; name free motion by --free"),
+        (["--method", "gains", "--gains", "paper"], "is not auto or delay=S (seconds) or"),
     ],
 )
 def test_options_that_do_not_go_together_are_refused(words, message, tmp_path):
-    """Nothing is left out without a word: --free without --find-payload had no effect."""
+    """Nothing is left out without a word: --free without a payload had no effect."""
     command = ["identify", "log.csv", "--robot", "ur5", "-o", str(tmp_path / "r.toml"), *words]
     result = RUNNER.invoke(app, command)
     assert isinstance(result.exception, ParameterError)

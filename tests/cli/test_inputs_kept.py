@@ -39,7 +39,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "estimate log.csv --free recording.rrd --robot ur5 --rrd -o .",
         "report log.csv --robot ur5 --reference file:estimates.parquet -o .",
         "identify log.csv --robot arm.toml -o arm.toml",
-        "tune log.csv --robot arm.toml -o arm.toml",
+        "identify log.csv --method gains --robot arm.toml -o arm.toml",
         "simulate scene.toml -o scene.toml",
     ],
 )

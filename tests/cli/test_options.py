@@ -9,6 +9,7 @@ import pytest
 import typer
 
 from vftcli.cli import COMMANDS, main, make_app
+from vftcli.cli.options import settings_by_name
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 
@@ -16,20 +17,18 @@ READING = {
     "estimate": ("-o", "out"),
     "compare": ("--reference", "zero"),
     "report": ("-o", "out"),
-    "tune": ("-o", "gains.toml"),
     "admit": (),
-    "identify": ("-o", "robot.toml", "--find-payload"),
+    "identify": ("-o", "robot.toml", "--method", "payload"),
     "inspect": (),
     "thresholds": (),
     "convert": ("-o", "log.parquet"),
     "contacts": (),
-    "init": (),
 }
 """Command that reads a log → what else it has to be given."""
 
 OWN = {("simulate", "--set"), ("simulate", "--output"), ("admit", "--output"),
-       ("identify", "--output"), ("tune", "--output"), ("convert", "--output"),
-       ("init", "--output"), ("compare", "--output"),
+       ("identify", "--output"), ("convert", "--output"),
+       ("inspect", "--output"), ("compare", "--output"),
        ("annotate", "--output"), ("batch", "--output"), ("reproduce", "--output"),
        ("estimate", "--csv"), ("compare", "--csv"), ("contacts", "--csv")}  # fmt: skip
 """Options that are a command's own: --set of a scenario, what is written where, and --csv, which
@@ -37,47 +36,51 @@ the contract makes a file of `estimate` and a table of the others."""
 
 BAD = {
     "--interval": ("8:4", "is not A:B with A < B"),
-    "--format": ("excel", "known formats"),
+    "log.format": ("excel", "known formats"),
     "--columns": ("nonsense", "--columns"),
     "--episode": ("last", "is neither a number, as in 0, nor all"),
     "--arm": ("middle", "there is left, right"),
-    "--effort": ("volts", "there is auto, current, torque, torque-without-gravity"),
+    "log.effort": ("volts", "there is auto, current, torque, torque-without-gravity"),
     "--robot": ("ur9", "no robot 'ur9'"),
-    "--friction": ("some", "there is profile, none, model"),
+    "model.friction": ("some", "there is profile, none, model"),
     "--tip": ("tool0", "--tip is for a URDF, xacro or MJCF; ur5 is a robot file"),
-    "--robot-arg": ("name", "--robot-arg 'name' is not NAME=VALUE"),
     "--payload": ("bucket", "no payload 'bucket'"),
     "--observer": ("kalman", "no observer 'kalman'; there is best, fdo, gmo"),
-    "--rrd-detail": ("many", "many is none of full, levels and none"),
-    "--set": ("gmo.gain=much", "is not a number or a list"),
+    "recording.detail": ("many", "many is none of full, levels and none"),
     "--gains": ("nowhere.toml", "nowhere.toml"),
-    "--set-file": ("nowhere.toml", "nowhere.toml"),
-    "--match": ("speed=3", "is not delay=S (seconds) or bandwidth=HZ"),
     "--free": ("nowhere.csv", "nowhere.csv"),
-    "--free-part": ("4", "is not A:B with A < B"),
-    "--free-cycles": ("first", "is not a list of cycle numbers"),
-    "--period": ("-3", "is not a positive time in seconds"),
-    "--alignment": ("odd", "no alignment 'odd'"),
-    "--low-pass": ("-3", "is not a positive cutoff in Hz, none or auto"),
-    "--remove-bias": ("all", "there is auto, whole-log, none"),
+    "two-cycle.free-cycles": ("first", "is no list of cycle numbers"),
+    "two-cycle.period": ("-3", "is not a positive time in seconds"),
+    "two-cycle.alignment": ("odd", "no alignment 'odd'"),
+    "two-cycle.low-pass": ("-3", "is not a positive cutoff in Hz, none or auto"),
+    "bias.method": ("all", "there is auto, whole-log, none"),
     "--frame": ("world", "world"),
-    "--solver": ("qr", "no solver 'qr'"),
-    "--tool": ("1,2", "--tool"),
-    "--sensor-pose": ("hand", "--sensor-pose"),
+    "virtual-sensor.solver": ("qr", "no solver 'qr'"),
+    "virtual-sensor.tool": ("1,2", "virtual-sensor.tool"),
+    "virtual-sensor.sensor": ("hand", "virtual-sensor.sensor"),
     "--zero": ("nowhere", "is neither A:B with A < B, in seconds, nor start; name a log"),
-    "--torque-sd": ("some", "--torque-sd"),
-    "--derive": ("tau", "--derive 'tau'"),
+    "virtual-sensor.torque-sd": ("some", "virtual-sensor.torque-sd"),
+    "log.derive": ("tau", "log.derive 'tau'"),
     "--reference": ("magic", "no reference 'magic'"),
     "--figures": ("gif", "--figures 'gif' is not pdf, svg or png"),
     "--config": ("nowhere.toml", "--config nowhere.toml: no such file"),
 }
-"""Shared option → a value it does not take, and what the one line on it says."""
+"""Shared option or setting → a value it does not take, and what the one line on it says."""
+NUMBER = ("gmo.gain", "much", "is not a number or a list")
+"""The same of an observer's number."""
 
 
 def parameters(command: str) -> dict[str, Any]:
-    """Name as it is typed → what typer knows of it."""
+    """Name as it is typed → what typer knows of it; of a setting, the setting."""
     group: Any = typer.main.get_command(make_app())
-    return {p.opts[-1]: p for p in group.commands[command].params}
+    found = group.commands[command]
+    return {p.opts[-1]: p for p in found.params} | settings_by_name(vars(found.callback)["choices"])
+
+
+def typed(name: str, value: str) -> tuple[str, ...]:
+    """The words for a value of an option or a setting."""
+    # A negative number would be taken for an option if it stood alone.
+    return (f"{name}={value}",) if name.startswith("-") else ("--set", f"{name}={value}")
 
 
 @pytest.fixture
@@ -115,22 +118,32 @@ def test_the_same_bad_value_is_refused_with_the_same_line(
         if option not in there:
             continue
         robot = ("--robot", "ur5") if "--robot" in there and option != "--robot" else ()
-        # A negative number would be taken for an option if it stood alone.
-        lines[command] = complaint(command, FIXTURE, *robot, *needed, f"{option}={value}")
+        lines[command] = complaint(command, FIXTURE, *robot, *needed, *typed(option, value))
     assert words in next(iter(lines.values()))
     assert len(set(lines.values())) == 1, lines
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
+def test_a_bad_number_of_an_observer_is_refused(
+    command: str, complaint: Callable[..., str]
+) -> None:
+    name, value, words = NUMBER
+    assert words in complaint(
+        command, FIXTURE, "--robot", "ur5", *READING[command], *typed(name, value)
+    )
 
 
 def test_every_shared_option_is_tried() -> None:
     """A new option of several commands needs its bad value here, or is one that takes all."""
     takes_all = {"--output", "--help", "--json", "--force", "--causal", "--wrench", "--as-printed",
-                 "--contacts", "--no-contacts", "--reference-columns",
-                 "--anyway", "--mcap", "--open", "--details", "--quiet",
-                 "--latex"}  # fmt: skip
+                 "--details", "--set", "--reference-columns", "--anyway", "--mcap", "--open",
+                 "--quiet", "--latex", "--check", "contacts.list"}  # fmt: skip
     count: dict[str, int] = {}
     for command in READING:
         for name in parameters(command):
-            if name.startswith("--") and (command, name) not in OWN:
+            shown = name.startswith("--") or "." in name
+            if shown and (command, name) not in OWN:
                 count[name] = count.get(name, 0) + 1
     shared = {name for name, times in count.items() if times > 1}
     assert shared - takes_all <= set(BAD)
@@ -140,7 +153,7 @@ def test_a_shared_option_reads_alike_in_every_command() -> None:
     seen: dict[str, dict[str, tuple[object, ...]]] = {}
     for command in COMMANDS:
         for name, p in parameters(command).items():
-            if name.startswith("-") and (command, name) not in OWN:
+            if name.startswith("--") and (command, name) not in OWN:
                 text = (p.help, p.metavar, p.opts, p.is_flag)
                 seen.setdefault(name, {})[command] = text
     differing = {
@@ -151,14 +164,14 @@ def test_a_shared_option_reads_alike_in_every_command() -> None:
 
 @pytest.mark.parametrize("command", READING)
 def test_a_command_that_reads_a_log_reads_it_as_all_do(command: str) -> None:
-    common = {"--format", "--columns", "--interval", "--json", "--details", "--quiet"}
+    common = {"log.format", "--columns", "--interval", "--json", "--details", "--quiet"}
     assert set(parameters(command)) >= common
 
 
 @pytest.mark.parametrize("command", ["estimate", "compare", "report", "admit"])
 def test_a_command_that_estimates_takes_all_that_can_be_asked(command: str) -> None:
     whole = {*BAD, "--causal", "--wrench", "--as-printed"}
-    whole -= {"--reference", "--figures", "--rrd-detail"}  # what is compared, shown, written
+    whole -= {"--reference", "--figures", "recording.detail"}  # what is compared, shown, written
     assert set(parameters(command)) >= whole
 
 
@@ -184,5 +197,5 @@ def test_documents_name_every_option_and_no_other() -> None:
     text = "\n".join(f.read_text("utf-8") for f in files if f.name not in others)
     named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)) - OF_OTHER_TOOLS
     there = {name for c in COMMANDS for name in parameters(c) if name.startswith("--")}
-    of_help = {"--version", "--help-all", "--install-completion"}
+    of_help = {"--version", "--install-completion"}
     assert named - of_help == there

@@ -58,7 +58,6 @@ def test_lists_the_scenarios() -> None:
     ("arguments", "words"),
     [
         (["ur5-cirle", "-o", "x.csv"], "Did you mean ur5-circle"),
-        (["ur5-circle"], "-o"),
         (["ur5-circle", "-o", "none/x.csv"], "no such folder"),
         (["ur5-circle", "-o", "."], "-o"),
         (["ur5-circle", "-o", "x.csv", "--set", "payload.mass=-2"], "mass is -2 kg"),
@@ -83,6 +82,11 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
     with pytest.raises(VftError, match="--force"):
         run("ur5-circle", "-o", str(path), "--set", "duration=0.3")
     assert path.read_text() == "mine"
+
+
+def test_without_a_place_nothing_is_simulated() -> None:
+    result = CliRunner().invoke(app, ["ur5-circle"])
+    assert (result.exit_code, "-o PATH says where" in result.output) == (2, True)
 
 
 def test_no_bar_without_a_terminal() -> None:

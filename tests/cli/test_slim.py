@@ -68,9 +68,9 @@ def test_a_table_made_without_pyarrow_reads_the_same_with_it(folder: Path) -> No
     [
         ("inspect", FIXTURE),
         ("compare", FIXTURE, "--robot", "ur5", "--reference", "zero", "--interval", "0:4"),
-        ("tune", FIXTURE, "--robot", "ur5", "-o", "gains.toml"),
+        ("identify", FIXTURE, "--robot", "ur5", "--method", "gains", "-o", "gains.toml"),
         ("identify", FIXTURE, "--robot", "ur5", "--method", "friction", "-o", "mine.toml"),
-        ("bench", "--rounds", "1", "--samples", "1200"),
+        ("bench", "--set", "bench.rounds=1", "--set", "bench.samples=1200"),
     ],
 )
 def test_what_needs_none_of_them_works(words: tuple[str, ...], folder: Path) -> None:

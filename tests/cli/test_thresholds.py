@@ -51,15 +51,17 @@ def test_the_tables_and_the_calls_of_a_franka(free: Path, pushed: Path, run: Run
 
 
 def test_the_json_stands_alone_and_the_push_is_found(free: Path, pushed: Path, run: Run) -> None:
-    code, out, _ = run("thresholds", free, *COLUMNS, "--rate", 60, "--check", pushed, "--json")
+    words = ("--rate", 60, "--check", pushed, "--check", free, "--json")
+    code, out, _ = run("thresholds", free, *COLUMNS, *words)
     assert code == 0
     record = json.loads(out)
     assert record["rate_per_h"] == 60.0
     # Noise of .2 N·m has its largest of 3000 at 3.4 sd; the tail reaches further by some e-folds.
     assert all(0.6 < row["threshold_Nm"] < 1.6 for row in record["joints"])
-    (contact,) = record["check"]["contacts"]
+    check, other = record["checks"]
+    (contact,) = check["contacts"]
     assert (contact["start_s"], contact["by"]) == (pytest.approx(20.0, abs=0.03), "J2")
-    assert record["check"]["reference"] is None
+    assert (check["reference"], other["log"], other["contacts"]) == (None, "free.npy", [])
 
 
 def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, run: Run) -> None:
@@ -67,7 +69,7 @@ def test_the_robots_own_estimate_may_be_the_reference(free: Path, pushed: Path, 
     words = ("--rate", 60, "--check", pushed, "--reference", "vendor", "--json")
     code, out, err = run("thresholds", free, *COLUMNS, *words)
     assert code == 0, err
-    check = json.loads(out)["check"]
+    (check,) = json.loads(out)["checks"]
     assert check["reference"] == "vendor"
     assert [c["by"] for c in check["contacts"] if c["by"]] == ["J2"]
     assert check["smallest_caught_N"] is None

@@ -28,7 +28,7 @@ def motion(
     runs = ()
     if run is not None:
         runs = (FreeRun(run=Run(recording=run, robot=arm), log=log),)
-    return FreeMotion(log=log, choice=FreeChoice.parsed(free_part=free), runs=runs)
+    return FreeMotion(log=log, choice=FreeChoice.parsed(free=[free] if free else ()), runs=runs)
 
 
 def true_wrench(name: str) -> tuple[Array, Array]:

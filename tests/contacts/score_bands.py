@@ -49,7 +49,7 @@ class Case(NamedTuple):
     Attributes:
         name: What to print, and to choose by.
         analysed: Analyses it, given the free part or None for none.
-        free: The free part, as `--free-part` takes it. [s]
+        free: The free part, as `--free` has it. [s]
     """
 
     name: str
@@ -62,7 +62,7 @@ def asked(free: str | None, robot: str | None = None, **more: object) -> Analysi
     return AnalysisChoice(
         robot=RobotChoice(name=robot),
         observers=ObserverChoice(names=("best",)),
-        free=FreeChoice.parsed(free_part=free),
+        free=FreeChoice.parsed(free=[free] if free else ()),
         wrench=WrenchChoice(frame="base"),
         **more,  # type: ignore[arg-type]
     )

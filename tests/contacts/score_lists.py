@@ -90,7 +90,8 @@ def scored(name: str, seed: int, more: Sequence[str] = STICKS) -> LogScore:
     hand = made.truth.contacts.get("hand", made.truth.wrench)
     truth, recording = hand[rows], made.recording
     choice = AnalysisChoice(
-        observers=ObserverChoice(names=("best",)), free=FreeChoice.parsed(free_part=free)
+        observers=ObserverChoice(names=("best",)),
+        free=FreeChoice.parsed(free=[free] if free else ()),
     )
     took: list[float] = []
     plain = pipeline.find_contacts

@@ -101,7 +101,7 @@ def engine(log: Path, folder: Path, read: ReadChoice, span: str, reference: str)
     choice = AnalysisChoice(
         read=read,
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        free=FreeChoice.parsed(free_part=span),
+        free=FreeChoice.parsed(free=[span] if span else ()),
         observers=ObserverChoice(names=("best",)),
         wrench=WrenchChoice(frame="base"),
         reference=ReferenceChoice(name=reference),
@@ -166,7 +166,7 @@ def bullet() -> None:
             choice = AnalysisChoice(
                 read=ReadChoice(columns=columns),
                 robot=RobotChoice(name=str(model)),
-                free=FreeChoice.parsed(free_part="0.3:7.8"),
+                free=FreeChoice.parsed(free=["0.3:7.8"]),
                 observers=ObserverChoice(names=("best",)),
                 wrench=WrenchChoice(frame="base"),
             )

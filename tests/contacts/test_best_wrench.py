@@ -27,7 +27,7 @@ def analysed(name: str) -> Analysis:
         FIXTURES / name,
         AnalysisChoice(
             robot=RobotChoice(name="ur5"),
-            free=FreeChoice.parsed(free_part="0.3:4"),
+            free=FreeChoice.parsed(free=["0.3:4"]),
             observers=ObserverChoice(names=("best",)),
             wrench=WrenchChoice(frame="base"),
         ),
@@ -109,7 +109,7 @@ def test_a_load_nobody_told_is_in_the_wrench_of_best() -> None:
         - load_regressor(robot.chain, whole.q) @ weights / robot.torque_constant,
     )
     choice = AnalysisChoice(
-        free=FreeChoice.parsed(free_part="0.3:4"),
+        free=FreeChoice.parsed(free=["0.3:4"]),
         observers=ObserverChoice(names=("best",)),
         wrench=WrenchChoice(frame="base"),
     )

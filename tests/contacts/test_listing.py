@@ -260,7 +260,7 @@ def test_an_arm_of_three_joints_has_times_and_torques_but_no_newtons() -> None:
     pushed = torque.copy()
     pushed[(t > 6.0) & (t < 7.0), 1] -= 12.0
     log = Run(recording=replace(recording, torque=pushed), robot=robot)
-    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0:5"))
+    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free=["0:5"]))
     found = list_contacts(motion)
     (row,) = found.contacts
     # To a block of 24 ms at either end.
@@ -281,7 +281,7 @@ def test_a_load_that_stays_to_the_end_of_the_log_is_listed() -> None:
     scenario = replace(load_scenario("panda-bearing", ["sensing.rate=250"]), duration=9.0)
     made = simulate(scenario)
     log = Run(recording=made.recording, robot=load_robot("panda"))
-    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free_part="0.3:3.9"))
+    motion = FreeMotion(log=log, choice=FreeChoice.parsed(free=["0.3:3.9"]))
     (row,) = list_contacts(motion).contacts
     assert row.start == pytest.approx(4.2, abs=0.3)
     assert row.stop == pytest.approx(9.0, abs=0.1)

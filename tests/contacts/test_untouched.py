@@ -82,7 +82,7 @@ def test_cycles_that_do_not_exist_are_refused() -> None:
 
     short = motion(read(FIXTURES / "ur5_taps_ur_rtde.csv"), "ur5")
     with pytest.raises(ReferenceTorqueError):
-        free_part(replace(short, choice=FreeChoice.parsed(free_cycles="9")))
+        free_part(replace(short, choice=FreeChoice.parsed(settings={"two-cycle.free-cycles": "9"})))
 
 
 def test_the_level_is_that_of_the_free_samples_that_move() -> None:

@@ -57,11 +57,11 @@ COMMANDS = {
     "identify": "identify {0}.csv --robot ur5 --anyway -o out/arm.toml",
     "simulate": "simulate ur5-circle --set duration=1 --seed {2} --as rosbag2 -o out/bag",
     "admit": "admit {0}.csv --robot ur5 --alpha 1 --anyway -o out",
-    "tune": "tune {0}.csv --robot ur5 --free 0:2 --anyway -o out/gains.toml",
+    "gains": "identify {0}.csv --method gains --robot ur5 --free 0:2 --anyway -o out/gains.toml",
 }
 """Name → the command: {0} the log, {1} another, {2} a seed."""
 
-SINGLE = {"convert", "tune"}
+SINGLE = {"convert", "gains"}
 """Commands that write one file, which needs no seal."""
 
 

@@ -44,7 +44,7 @@ COMMANDS = {
     "convert-csv": "convert panda.csv -o p.csv",
     "convert-mcap": "convert a.csv -o a.mcap --json",
     "identify": "identify a.csv --robot ur5 --anyway -o arm.toml",
-    "tune": "tune a.csv --robot ur5 --free 0:2 --anyway -o gains.toml",
+    "gains": "identify a.csv --method gains --robot ur5 --free 0:2 --anyway -o gains.toml",
     "admit": "admit a.csv --robot ur5 --alpha 1,1.6 --anyway -o out",
     "admit-release": "admit --release x=0.3 --robot ur5 --json -o out",
     "simulate-rtde": "simulate ur5-circle --set duration=1 --seed 2 -o log.csv",

@@ -89,7 +89,7 @@ def test_effort_that_is_current_is_told() -> None:
     log = moving("ur5e")
     examination = altered(log, torque=log.current, current=None)
     (said,) = [f for f in told(examination) if f.name == "torque-as-current"]
-    assert "--effort current" in said.remedy
+    assert "--set log.effort=current" in said.remedy
 
 
 @pytest.mark.slow

@@ -155,7 +155,7 @@ def on_robot(family: str, seed: Seed, place: Path, seeds: dict[str, list[Seed]])
     joints = 7 if "panda" in seed.name else 6
     sound = {s.name: s for s in seeds["table"]}["libfranka-csv" if joints == 7 else "table"]
     if family == "gains":
-        return ["estimate", str(sound.path), "--robot", "ur5", "--set-file", str(place)]
+        return ["estimate", str(sound.path), "--robot", "ur5", "--gains", str(place)]
     return ["estimate", str(sound.path), "--robot", str(place)]
 
 

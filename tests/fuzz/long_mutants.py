@@ -18,18 +18,17 @@ EPISODES = "panda_episodes"
 RATE, SECONDS = 50.0, 12.0
 """Of a seed [Hz, s]: `best` runs on it, and most commands take about a second."""
 
-ENDINGS = {"identify": "out.toml", "tune": "out.toml"}
+ENDINGS = {"identify": "out.toml"}
 CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
     "report": {
         "--reference": ("zero", "two-cycle", "vendor"),
-        "--rrd-detail": ("levels", "none"),
+        "recording.detail": ("levels", "none"),
     },
-    "identify": {"--method": ("auto", "friction", "base", "targets")},
-    "tune": {"--goal": ("rmse", "delay=0.05", "bandwidth=5", "false-alarms=60")},
-    "admit": {"--controller": ("variable", "traditional")},
+    "identify": {"--method": ("friction", "base", "targets", "payload", "gains")},
+    "admit": {"admittance.controller": ("variable", "traditional")},
     "contacts": {"--free": ("0:3", "9:12")},
     "thresholds": {"--rate": ("1", "60")},
-    "batch": {"--do": ("estimate", "compare", "report", "contacts"), "--workers": ("0",)},
+    "batch": {"--do": ("estimate", "compare", "report", "contacts"), "--jobs": ("0",)},
 }
 """Command → its options and their values, one of each is drawn."""
 
@@ -65,7 +64,7 @@ def long_mutant(seed: Seed, rng: Rng, path: Path) -> Mutant:
 def long_words(seed: Seed, place: Path, rng: Rng, folder: Path) -> list[str]:
     """A command on a mutant."""
     if seed.model is None:
-        words = ["annotate", str(place), "--robot", "panda", "--workers", "0"]
+        words = ["annotate", str(place), "--robot", "panda", "--jobs", "0"]
     else:
         command = pick(rng, list(CHOICES))
         words = [command, str(place), "--robot", seed.model.robot]

@@ -67,29 +67,29 @@ def pose(rng: Rng) -> str:
 OPTIONS = {
     "--columns": columns,
     "--interval": span,
-    "--free-part": span,
     "--free": span,
     "--zero": span,
     "--set": setting,
     "--observer": lambda rng: pick(rng, ("gmo", "fdo", "kfo-rts", "kfo-auto", "rts-auto", "x", "")),
-    "--match": lambda rng: pick(rng, ("delay=", "bandwidth=", "x=", "")) + str(pick(rng, NUMBERS)),
+    "--gains": lambda rng: pick(rng, ("delay=", "bandwidth=", "x=", "")) + str(pick(rng, NUMBERS)),
     "--robot": lambda rng: pick(rng, ("ur5", "panda", "ur10e", "UR5", "", "x.toml", "/dev/null")),
-    "--friction": lambda rng: pick(rng, ("none", "profile", "x")),
-    "--format": lambda rng: pick(rng, ("table", "ur-csv", "libfranka-csv", "npz", "x", "")),
+    "model.friction": lambda rng: pick(rng, ("none", "profile", "x")),
+    "log.format": lambda rng: pick(rng, ("table", "ur-csv", "libfranka-csv", "npz", "x", "")),
     "--frame": lambda rng: pick(rng, ("flange", "base", "tool", "sensor", "x")),
-    "--solver": lambda rng: pick(rng, ("pinv", "map", "x")),
-    "--tool": pose,
-    "--sensor-pose": pose,
-    "--torque-sd": lambda rng: str(pick(rng, (*NUMBERS, "own"))),
-    "--period": lambda rng: str(pick(rng, NUMBERS)),
-    "--free-cycles": lambda rng: pick(rng, ("1", "1,2", "1-3", "0", "9-1", "x", "1-999999999")),
-    "--low-pass": lambda rng: str(pick(rng, (*NUMBERS, "auto", "none", "x"))),
-    "--alignment": lambda rng: pick(rng, ("auto", "phase", "model", "x")),
-    "--remove-bias": lambda rng: pick(rng, ("whole-log", "none", "x")),
+    "virtual-sensor.solver": lambda rng: pick(rng, ("pinv", "map", "x")),
+    "virtual-sensor.tool": pose,
+    "virtual-sensor.sensor": pose,
+    "virtual-sensor.torque-sd": lambda rng: str(pick(rng, (*NUMBERS, "own"))),
+    "two-cycle.period": lambda rng: str(pick(rng, NUMBERS)),
+    "two-cycle.free-cycles": lambda rng: pick(
+        rng, ("1", "1,2", "1-3", "0", "9-1", "x", "1-999999999")),
+    "two-cycle.low-pass": lambda rng: str(pick(rng, (*NUMBERS, "auto", "none", "x"))),
+    "two-cycle.alignment": lambda rng: pick(rng, ("auto", "phase", "model", "x")),
+    "bias.method": lambda rng: pick(rng, ("whole-log", "none", "x")),
     "--payload": lambda rng: pick(rng, ("franka_hand", "x", "")),
 }  # fmt: skip
 
-INSPECTED = ("--columns", "--interval", "--format", "--robot")
+INSPECTED = ("--columns", "--interval", "log.format", "--robot")
 """Those that inspect takes too."""
 
 
@@ -100,5 +100,5 @@ def option_words(rng: Rng, command: str) -> list[str]:
     for _ in range(int(rng.integers(1, 4))):
         name = pick(rng, names)
         value = OPTIONS[name](rng).replace("\0", "")
-        words.append(f"{name}={value}")
+        words += [f"{name}={value}"] if name.startswith("-") else ["--set", f"{name}={value}"]
     return words

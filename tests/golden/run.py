@@ -65,7 +65,7 @@ ur5_circle/compare zero: compare LOG --reference zero --interval 0:4 --gains pap
 ur5_circle/compare truth: compare LOG --reference file:fixtures/ur5_circle.csv.truth.parquet --json
 ur5_circle/estimate smoother: estimate LOG --observer kfo-rts --wrench --frame base -o out -q
 ur5_circle/admit: admit LOG --json
-ur5_circle/tune: tune LOG --interval 0:12 -o out.toml -q
+ur5_circle/gains: identify LOG --method gains --interval 0:12 -o out.toml -q
 ur5_circle/report: report LOG --reference two-cycle --wrench -o out -q
 ur5_circle/convert: convert fixtures/ur5_circle.csv -o out.parquet && {BACK}
 ur5_circle/screen inspect: inspect LOG

@@ -70,7 +70,7 @@ def test_friction_and_rotor_come_back():
     # 8 − 2·1·v is above zero up to the joints' π rad/s: the parabola may compete
     true = rubbed(UR5, load_coulomb=0.08, quadratic=-1.0)
     true = replace(true, chain=replace(true.chain, rotor_inertia=rotor))
-    found = identify([log(true)], UR5, Task()).robot
+    found = identify([log(true)], UR5, Task(method="friction")).robot
     # 30 s of 0.2 N·m noise; coefficients of 5 and 8 within their spread of 1 or 2 %
     np.testing.assert_allclose(found.chain.rotor_inertia, rotor, rtol=0.05)
     for j in (1, 2):  # the joints that carry weight
@@ -87,7 +87,7 @@ def test_friction_and_rotor_come_back():
 @pytest.mark.slow
 def test_a_plain_model_is_chosen_where_nothing_more_is_there():
     true = rubbed(UR5, "coulomb-viscous-offset")
-    found = identify([log(true)], UR5, Task())
+    found = identify([log(true)], UR5, Task(method="friction"))
     assert {f.model for f in found.robot.friction} == {"coulomb-viscous-offset"}
     chosen = found.shape_choices.filter(found.shape_choices["chosen"])
     assert len(chosen) == 6
@@ -112,7 +112,7 @@ def test_a_fall_beside_the_links_is_replaced_by_the_joints_own_fit(monkeypatch):
 @pytest.mark.slow
 def test_a_stribeck_effect_is_seen():
     true = rubbed(UR5, "coulomb-viscous-stribeck", stribeck=4.0, stribeck_velocity=0.1)
-    found = identify([log(true, noise=0.05)], UR5, Task()).robot
+    found = identify([log(true, noise=0.05)], UR5, Task(method="friction")).robot
     values = found.friction[0].parameters
     assert found.friction[0].model == "coulomb-viscous-stribeck"
     assert values["stribeck"] == pytest.approx(4.0, rel=0.1)
@@ -123,7 +123,7 @@ def test_a_stribeck_effect_is_seen():
 def test_drive_constants_come_back():
     true = rubbed(UR5, "coulomb-viscous-offset")
     true = replace(true, torque_constant=UR5.torque_constant * 1.1)
-    found = identify([log(true)], UR5, Task(fit_constants=True)).robot
+    found = identify([log(true)], UR5, Task(method="friction", constants=True)).robot
     # joints that carry weight; the wrists' load is no larger than the noise
     np.testing.assert_allclose(found.torque_constant[1:3], true.torque_constant[1:3], rtol=0.01)
 
@@ -184,7 +184,7 @@ HAND = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3,
 @pytest.mark.parametrize("seed", [1, 2])
 def test_the_payload_comes_back_from_one_motion(seed):
     """In every joint another friction than the profile's; the load's inertia counts too."""
-    asked = Task(method=None, find_payload=True)
+    asked = Task(method="payload")
     found = identify(
         [log(rubbed(UR5, "coulomb-viscous-offset").with_payload(HAND), seed)], UR5, asked
     )
@@ -202,7 +202,7 @@ def test_the_payload_comes_back_from_one_motion(seed):
 def test_a_motion_in_which_no_load_shows_says_so(mass):
     true = rubbed(UR5, "coulomb-viscous-offset", coulomb=2.0)
     light = replace(HAND, mass=mass) if mass else None
-    asked = Task(method=None, find_payload=True)
+    asked = Task(method="payload")
     with pytest.raises(IdentificationError, match="no load shows; in this motion one from"):
         identify([log(true.with_payload(light), 1)], UR5, asked)
 
@@ -211,13 +211,13 @@ def test_an_arm_that_hardly_moves_is_not_weighed():
     held = log(UR5.with_payload(HAND), 1)
     still = replace(held, q=held.q[0] + 0.01 * (held.q - held.q[0]), dq=0.01 * held.dq)
     with pytest.raises(IdentificationError, match="the arm passes 1 different poses"):
-        identify([still], UR5, Task(method=None, find_payload=True))
+        identify([still], UR5, Task(method="payload"))
 
 
 def test_a_motion_of_some_seconds_is_not_weighed():
     short = log(UR5.with_payload(HAND), 1).between(5.0, 14.0)
     with pytest.raises(IdentificationError, match=r"9 s of motion are too short .* record 10 s"):
-        identify([short], UR5, Task(method=None, find_payload=True))
+        identify([short], UR5, Task(method="payload"))
 
 
 def test_different_motions_are_no_pair():
@@ -228,7 +228,7 @@ def test_different_motions_are_no_pair():
 @pytest.mark.slow
 def test_a_repeated_trajectory_is_told():
     first, again, other = log(UR5, 1), log(UR5, 1, noise=0.4), log(UR5, 2)
-    found = identify([first], UR5, Task(), [again, other])
+    found = identify([first], UR5, Task(method="friction"), [again, other])
     (told,) = [r for r in found.remarks if r.code == "repeated-trajectory"]
     assert told.values["share_percent"] == 100.0
     motions = [prepare(r, UR5, Processing()) for r in (first, again, other)]
@@ -239,10 +239,10 @@ def test_a_repeated_trajectory_is_told():
 @pytest.mark.slow
 def test_a_contact_is_found_and_left_out():
     true = rubbed(UR5, "coulomb-viscous-offset")
-    clean = identify([log(true)], UR5, Task()).robot
+    clean = identify([log(true)], UR5, Task(method="friction")).robot
     t = motion(0)[0]
     push = np.where((t > 12) & (t < 13), 40.0, 0.0)[:, None] * np.array([1, 1, 0, 0, 0, 0])
-    touched = identify([log(true, extra=push)], UR5, Task())
+    touched = identify([log(true, extra=push)], UR5, Task(method="friction"))
     (told,) = [r for r in touched.remarks if r.code == "suspected-contacts"]
     # the 8 Hz filter spreads the edges by less than a period of 0.125 s
     assert told.values["starts_s"] == pytest.approx([12.0], abs=0.125)
@@ -257,7 +257,7 @@ def test_a_log_at_rest_identifies_nothing():
     still = np.zeros((len(t), 6))
     recording = Recording(t=t, q=still, dq=still, current=still + 1.0)
     with pytest.raises(IdentificationError, match="a log at rest identifies no friction"):
-        identify([recording], UR5, Task())
+        identify([recording], UR5, Task(method="friction"))
 
 
 @pytest.mark.slow
@@ -266,7 +266,7 @@ def test_a_joint_that_rests_keeps_its_numbers():
     dq[:, 3], q[:, 3], ddq[:, 3] = 0.0, 0.4, 0.0
     torque = drive(rubbed(UR5), q, dq, ddq)
     recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
-    found = identify([recording], UR5, Task())
+    found = identify([recording], UR5, Task(method="friction"))
     assert [r.where.joints for r in found.remarks if r.code == "static-joint"] == [(4,)]
     assert found.robot.friction[3] == UR5.friction[3]
     assert found.robot.chain.rotor_inertia[3] == UR5.chain.rotor_inertia[3]
@@ -280,7 +280,7 @@ def test_a_joint_that_never_reverses_is_told():
     true = rubbed(UR5, "coulomb-viscous-offset", offset=0.0)
     torque = drive(true, q, dq, ddq)
     recording = Recording(t=t, q=q, dq=dq, current=torque / UR5.torque_constant)
-    found = identify([recording], UR5, Task())
+    found = identify([recording], UR5, Task(method="friction"))
     assert [r.where.joints for r in found.remarks if r.code == "one-way-joint"] == [(6,)]
     assert "offset" not in found.robot.friction[5].parameters
 
@@ -288,7 +288,7 @@ def test_a_joint_that_never_reverses_is_told():
 def test_missing_currents_are_told():
     t, q, dq, _ = motion(0)
     with pytest.raises(MissingSignalError, match="no motor currents"):
-        identify([Recording(t=t, q=q, dq=dq)], UR5, Task())
+        identify([Recording(t=t, q=q, dq=dq)], UR5, Task(method="friction"))
 
 
 def test_missing_targets_are_told():
@@ -300,14 +300,14 @@ def test_missing_targets_are_told():
 @pytest.mark.parametrize(("name", "error"), [("panda", RobotError), ("ur10e", IdentificationError)])
 def test_the_wrong_robot_is_refused(name, error):
     with pytest.raises(error, match="another"):
-        identify([log(rubbed(UR5))], load_robot(name), Task())
+        identify([log(rubbed(UR5))], load_robot(name), Task(method="friction"))
 
 
 @pytest.mark.slow
 def test_turned_currents_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="another sign or unit"):
-        identify([replace(good, current=-good.current)], UR5, Task())
+        identify([replace(good, current=-good.current)], UR5, Task(method="friction"))
 
 
 @pytest.mark.slow
@@ -334,23 +334,22 @@ def test_a_joint_that_hardly_rubs_is_bounded_at_zero_and_named(push, terms):
 def test_turned_velocities_are_refused():
     good = log(rubbed(UR5))
     with pytest.raises(IdentificationError, match="it would push"):
-        identify([replace(good, dq=-good.dq)], UR5, Task())
+        identify([replace(good, dq=-good.dq)], UR5, Task(method="friction"))
 
 
 @pytest.mark.slow
 def test_an_unknown_load_is_suspected():
     load = Payload(mass=2.5, com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-    with pytest.raises(IdentificationError, match=r"kg on the flange .* --find-payload"):
-        identify([log(UR5.with_payload(load))], UR5, Task())
+    with pytest.raises(IdentificationError, match=r"kg on the flange .* --method payload"):
+        identify([log(UR5.with_payload(load))], UR5, Task(method="friction"))
 
 
 @pytest.mark.parametrize(
     ("options", "match"),
     [
         ({"method": "magic"}, "friction, base, targets"),
-        ({"method": None}, "nothing to identify"),
-        ({"method": "targets", "friction": False}, "leave out --friction none"),
-        ({"method": "base", "fit_constants": True}, "--method friction"),
+        ({"method": "targets", "friction": False}, "leave model.friction=none away"),
+        ({"method": "base", "constants": True}, "--method friction"),
     ],
 )
 def test_tasks_that_make_no_sense_are_refused(options, match):
@@ -402,7 +401,7 @@ def two_folders(*logs):
 def test_two_logs_of_one_file_name_stay_two_logs():
     """Their rows were pooled: 12 residuals for 6 joints, in the terminal and the robot file."""
     true = rubbed(UR5, "coulomb-viscous-offset")
-    found = identify(two_folders(log(true, 1), log(true, 2)), UR5, Task())
+    found = identify(two_folders(log(true, 1), log(true, 2)), UR5, Task(method="friction"))
     tables = found.robot.document["identification"]["residuals"]
     assert [len(table["rms_Nm"]) for table in tables] == [6, 6]
     assert tables[0] != tables[1]
@@ -410,14 +409,13 @@ def test_two_logs_of_one_file_name_stay_two_logs():
 
 
 @pytest.mark.slow
-def test_a_pair_of_one_file_name_identifies_the_arm_too():
-    """The loaded log was told by its file name: with equal names no friction was identified."""
+def test_a_pair_of_one_file_name_is_a_pair():
+    """The loaded log is known by its content, not by its name."""
     true = rubbed(UR5, "coulomb-viscous-offset")
     load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
     logs = log(true, 1), log(true.with_payload(load), 1)
-    named = identify(two_folders(*logs), UR5, Task(find_payload=True))
-    plain = identify(logs, UR5, Task(find_payload=True))
-    assert named.method == "friction"
+    named = identify(two_folders(*logs), UR5, Task(method="payload"))
+    plain = identify(logs, UR5, Task(method="payload"))
     assert named.parameters.equals(plain.parameters)
     assert len(named.traces) == 1  # the log without the load
 
@@ -426,7 +424,7 @@ def test_the_heavier_log_is_refused_as_the_free_one_whatever_its_name():
     load = Payload(mass=2.0, com=np.array([0.02, -0.03, 0.08]), inertia=np.zeros((3, 3)))
     free, loaded = two_folders(log(UR5, 1), log(UR5.with_payload(load), 1))
     with pytest.raises(IdentificationError, match="swap the two logs"):
-        identify([free], UR5, Task(find_payload=True), free=loaded)
+        identify([free], UR5, Task(method="payload"), free=loaded)
 
 
 @pytest.mark.slow
@@ -453,6 +451,6 @@ def test_torques_behind_the_gears_leave_the_friction_method_nothing_to_find():
     """Without friction: the rotor is before the gear, the links are the profile's."""
     robot = replace(UR5, torque_source="link_torque", torque_constant=None).without_friction()
     with pytest.raises(IdentificationError, match="nothing to find"):
-        identify([log(robot)], robot, Task(friction=False))
+        identify([log(robot)], robot, Task(method="friction", friction=False))
     found = identify([log(robot)], robot, Task(method="base", friction=False))
     assert found.robot.friction == ()

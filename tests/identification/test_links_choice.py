@@ -44,7 +44,7 @@ def test_wrong_links_are_identified_too(rubbing_log, sines, share, method):
 def test_a_log_that_no_profile_made_is_identified_without_a_method(logs):
     """Bullet's UR5: no friction, no rotors, nobody's links; a third file tests the other two."""
     free = [read(logs / "bullet_ur5" / f"free_{k}.csv.gz", columns=BULLET) for k in (5, 6, 7)]
-    found = identify(free[:2], UR5, Task(method="auto"))
+    found = identify(free[:2], UR5, Task())
     assert found.method == "base"
     gain = UR5.gains["gmo"]["gain"]
     left = MomentumObserver(gain=gain).estimate(dynamics_terms(free[2], found.robot)).tau

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from vftcli.identification.identify import with_provenance
+from vftcli.identification.fitting import with_provenance
 from vftcli.identification.payload import LoadFit
 from vftcli.identification.result import (
     BASE,

@@ -80,7 +80,7 @@ def test_ur10e_residuals_and_observer_floor(ur10e, method, train, test):
 @pytest.mark.slow
 def test_ur10e_other_days_and_loads_are_told(ur10e):
     others = [ur10e(name) for name in ("free_repeat_a", "load_14harm")]
-    found = identify([ur10e("free_14harm")], load_robot("ur10e"), Task(), others)
+    found = identify([ur10e("free_14harm")], load_robot("ur10e"), Task(method="friction"), others)
     told = {(r.code, r.where.about, r.where.joints) for r in found.remarks}
     assert ("more-friction", "free_repeat_a.csv", (1,)) in told
     assert ("repeated-trajectory", "load_14harm.csv", ()) in told
@@ -92,7 +92,7 @@ def test_ur10e_other_days_and_loads_are_told(ur10e):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["free_repeat_b", "free_repeat_c", "jointwise_4"])
 def test_other_free_logs_show_no_contact(ur10e, name):
-    found = identify([ur10e(name)], load_robot("ur10e"), Task())
+    found = identify([ur10e(name)], load_robot("ur10e"), Task(method="friction"))
     assert "suspected-contacts" not in codes(found)
 
 
@@ -127,7 +127,7 @@ def test_ur10e_targets_are_the_controllers_own(ur10e):
 @pytest.mark.slow
 def test_ur10e_payload_of_the_pair(ur10e):
     pair = [ur10e("free_14harm"), ur10e("load_14harm")]
-    found = identify(pair, load_robot("ur10e"), Task(method=None, find_payload=True))
+    found = identify(pair, load_robot("ur10e"), Task(method="payload"))
     assert found.robot.payload is not None
     # weighed 2.805 kg; required within 5 %, stretch 2 %
     assert found.robot.payload.mass == pytest.approx(2.805, rel=0.02)
@@ -143,7 +143,7 @@ def weighed(found):
 
 @pytest.mark.slow
 def test_ur10e_payload_of_one_motion(ur10e):
-    asked = Task(method=None, find_payload=True)
+    asked = Task(method="payload")
     found = identify([ur10e("load_14harm")], load_robot("ur10e"), asked)
     (mass, sd), _ = weighed(found)
     # weighed 2.805 kg; drive constants known to 3 % under an arm of 33 kg: some .25 kg
@@ -157,7 +157,7 @@ def test_ur10e_payload_of_one_motion(ur10e):
 @pytest.mark.parametrize("name", ["run_a", "run_b"])
 def test_fr3_hand_of_one_motion(logs, name):
     log = read(logs / "fr3" / f"{name}.npy", columns="t[ns],q:7,dq:7,tau:7,-tau_ext:7,_:13")
-    found = identify([log], load_robot("fr3"), Task(method=None, find_payload=True))
+    found = identify([log], load_robot("fr3"), Task(method="payload"))
     (mass, sd), (z, z_sd) = weighed(found)
     # Franka's hand: .73 kg, its centre .03 m before the flange (Franka's FCI documentation)
     assert abs(mass - 0.73) < 1.96 * sd < 0.15
@@ -204,17 +204,17 @@ RIGHT = {
 def test_a_right_arm_is_not_refused(logs, name):
     columns, robot = RIGHT[name]
     arm = load_robot(logs / robot if robot.endswith(".toml") else robot)
-    found = identify([read(logs / name, columns=columns)], arm, Task())
+    found = identify([read(logs / name, columns=columns)], arm, Task(method="friction"))
     assert "unexplained-torque" not in codes(found)
 
 
 @pytest.mark.slow
 def test_another_arm_is_refused(logs, ur10e):
     with pytest.raises(IdentificationError, match="Choose another --robot"):
-        identify([ur10e("free_repeat_c")], load_robot("ur5e"), Task())
+        identify([ur10e("free_repeat_c")], load_robot("ur5e"), Task(method="friction"))
     circle = read(logs / "mujoco_ur5e" / "circle.csv")
     with pytest.raises(IdentificationError, match="Choose another --robot"):
-        identify([circle], load_robot("ur10e"), Task())
+        identify([circle], load_robot("ur10e"), Task(method="friction"))
 
 
 @pytest.mark.slow

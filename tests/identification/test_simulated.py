@@ -80,7 +80,7 @@ def rubbing(robot, speeds, load):
 
 @pytest.mark.slow
 def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, truth):
-    found = identify([train], load_robot("ur5"), Task(fit_constants=True)).robot
+    found = identify([train], load_robot("ur5"), Task(method="friction", constants=True)).robot
     np.testing.assert_allclose(found.torque_constant, truth.torque_constant, rtol=0.05)
     np.testing.assert_allclose(found.chain.rotor_inertia, truth.chain.rotor_inertia, rtol=0.05)
     speeds = np.linspace(0.2, 1.0, 9)

@@ -118,7 +118,9 @@ def test_residuals_are_cut_apart_log_by_log(recording):
 
 def test_drive_constants_need_currents(recording):
     torque = replace(recording, current=None, torque=recording.q)
-    with pytest.raises(IdentificationError, match="--fit-constants needs motor currents"):
+    with pytest.raises(
+        IdentificationError, match=r"--set identify\.constants=yes needs motor currents"
+    ):
         prepare_training([torque], UR5, Processing(), fit_constants=True)
 
 

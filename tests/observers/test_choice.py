@@ -43,7 +43,7 @@ def test_nothing_said_runs_the_best_and_the_paper_s_four() -> None:
         ({"causal": True}, PAPER),
         # The printed formulas and one footing for all are asked of the paper's observers.
         ({"as_printed": True}, PAPER),
-        ({"match": "delay=0.05"}, PAPER),
+        ({"gains": "delay=0.05"}, PAPER),
         ({"as_printed": True, "observer": ["best", "gmo"]}, ("best", "gmo")),
         ({"observer": ["gmo"]}, ("gmo",)),
         ({"observer": ["gmo", "best", "gmo"]}, ("best", "gmo")),  # the best leads, each once
@@ -76,7 +76,7 @@ def test_gains_of_the_log_go_between_the_robot_and_set(spectra: Spectra) -> None
     assert np.all(zoh.r_diag == 2.0)
     np.testing.assert_array_equal(zoh.q_p_diag, UR5.gains["kfo"]["q_p_diag"])
     assert remarks == ()
-    both = ObserverChoice.parsed(gains="auto", observer=["gmo"], set=["gmo.gain=33"])
+    both = ObserverChoice.parsed(gains="auto", observer=["gmo"], settings={"gmo.gain": "33"})
     assert np.all(both.build(UR5, STEP, shown)[0][0].gain == 33.0)
     # A log without a free part has none to give: those of the file, read as what it would give.
     (gmo, zoh), remarks = asked.build(UR5, STEP)
@@ -105,35 +105,32 @@ def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> N
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
     own = gain(ObserverChoice(names=("gmo",)))
     assert own == np.atleast_1d(UR5.gains["gmo"]["gain"])[0]
-    assert gain(ObserverChoice(names=("gmo",), gains_file=file)) == 21.0
-    both = ObserverChoice.parsed(observer=["gmo"], set_file=file, set=["gmo.gain=33"])
+    assert gain(ObserverChoice(names=("gmo",), gains=file)) == 21.0
+    both = ObserverChoice.parsed(observer=["gmo"], gains=file, settings={"gmo.gain": "33"})
     assert gain(both) == 33.0
 
 
 def test_a_file_leaves_what_it_does_not_name(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
-    there = ObserverChoice(gains_file=file).gains_over(UR5.gains)
+    there = ObserverChoice(gains=file).gains_over(UR5.gains)
     assert there["kfo"] == UR5.gains["kfo"]
     assert UR5.gains["gmo"]["gain"] != 21.0
 
 
-def test_a_gains_file_has_two_names(tmp_path: Path) -> None:
+def test_gains_of_a_file_are_not_the_robot_s(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
     new = ObserverChoice.parsed(observer=["gmo"], gains=str(file))
-    assert new == ObserverChoice.parsed(observer=["gmo"], set_file=file)
     assert gain(new) == 21.0
     assert not new.of_robot_file
     paper = ObserverChoice.parsed(observer=["gmo"], gains="paper")
     assert paper == ObserverChoice.parsed(observer=["gmo"])
     assert paper.of_robot_file
-    with pytest.raises(ParameterError, match="the old name of --gains FILE"):
-        ObserverChoice.parsed(gains="auto", set_file=file)
 
 
 def test_a_match_moves_the_gains() -> None:
-    matched = ObserverChoice.parsed(observer=["gmo"], match="delay=0.05")
+    matched = ObserverChoice.parsed(observer=["gmo"], gains="delay=0.05")
     # First order: the delay behind a slow ramp is 1/K.
     assert gain(matched) == pytest.approx(20.0, rel=1e-9)
 
@@ -149,10 +146,9 @@ def test_only_observers_that_a_log_tunes_need_its_spectra() -> None:
     ("words", "message"),
     [
         ({"observer": ["kalman"]}, "no observer 'kalman'; there is best, fdo, gmo"),
-        ({"set": ["gmo"]}, "is not OBSERVER.PARAMETER=VALUE"),
-        ({"set": ["gmo.gian=3"]}, "Did you mean gain"),
-        ({"match": "speed=3"}, "is not delay=S"),
-        ({"match": "delay=-1"}, "is not delay=S"),
+        ({"settings": {"gmo.gian": "3"}}, "Did you mean gain"),
+        ({"gains": "bandwidth=x"}, "is not delay=S"),
+        ({"gains": "delay=-1"}, "is not delay=S"),
     ],
 )
 def test_a_slip_is_refused_before_a_log_is_read(words: dict[str, object], message: str) -> None:

@@ -1,4 +1,4 @@
-"""Equal footing: what --match promises, read back from the observers themselves."""
+"""Equal footing: what --gains promises, read back from the observers themselves."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""`vftcli tune`: goals, files, and what cannot be reached."""
+"""Gains for a goal: `vftcli identify --method gains`, goals, files, and what cannot be reached."""
 
 import json
 import tomllib
@@ -42,7 +42,7 @@ def test_every_observer_reaches_the_stated_bandwidth() -> None:
 
 
 def test_the_smoother_promises_the_smallest_error() -> None:
-    lines = tune_all(spectra(0.3), parse_goal("rmse"))
+    lines = tune_all(spectra(0.3), parse_goal("auto"))
     best = min(lines, key=lambda line: float(np.mean(line.rmse)))
     assert best.observer == "kfo-rts"
     # the joint with the smaller torque over the same noise wants the slower filter
@@ -81,7 +81,7 @@ def test_alarms_that_nothing_can_avoid_are_said() -> None:
         ("delay", None),
         ("delay=-1", None),
         ("delay=nan", None),
-        ("rmse=3", None),
+        ("auto=3", None),
         ("bandwidth=x", None),
         ("false-alarms=2", None),
         ("false-alarms=2", "0"),
@@ -89,15 +89,25 @@ def test_alarms_that_nothing_can_avoid_are_said() -> None:
     ],
 )
 def test_goals_that_are_none(goal: str, threshold: str | None) -> None:
-    with pytest.raises(ParameterError, match=r"--goal|--threshold"):
+    with pytest.raises(ParameterError, match=r"--gains|alarm\.threshold"):
         parse_goal(goal, threshold)
 
 
 @pytest.mark.slow
 def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
-    """tune writes it, --gains takes it: GMO then errs as little as was promised."""
+    """identify writes it, --gains takes it: GMO then errs as little as was promised."""
     gains, runner = tmp_path / "gains.toml", CliRunner()
-    asked = ["tune", str(FIXTURE), "--robot", "ur5", "-o", str(gains), "--json"]
+    asked = [
+        "identify",
+        str(FIXTURE),
+        "--robot",
+        "ur5",
+        "--method",
+        "gains",
+        "-o",
+        str(gains),
+        "--json",
+    ]
     done = runner.invoke(app, asked)
     assert done.exit_code == 0, done.output
     promised = {o["observer"]: o for o in json.loads(done.stdout)["observers"]}
@@ -135,23 +145,23 @@ def test_an_offset_at_the_threshold_is_an_alarm_without_end() -> None:
 
 def test_the_one_rate_of_filtered_dynamics_lies_between_those_of_the_joints() -> None:
     """It has the smallest mean error; each joint by itself could have less."""
-    fdo, gmo, *_ = tune_all(spectra(0.3), parse_goal("rmse"))
+    fdo, gmo, *_ = tune_all(spectra(0.3), parse_goal("auto"))
     assert fdo.gains["omega"] == fdo.rate[0] == fdo.rate[1]
     assert np.min(gmo.rate) < fdo.rate[0] < np.max(gmo.rate)
     assert np.all(gmo.rmse < fdo.rmse)
 
 
 def test_a_threshold_is_one_or_one_a_joint() -> None:
-    with pytest.raises(ParameterError, match=r"--threshold has 3 values; .* each of 2 joints"):
-        tune_all(spectra(), parse_goal("rmse", "1,2,3"))
-    for line in tune_all(spectra(), parse_goal("rmse", "1,2")):
+    with pytest.raises(ParameterError, match=r"alarm.threshold has 3 values; .* each of 2 joints"):
+        tune_all(spectra(), parse_goal("auto", "1,2,3"))
+    for line in tune_all(spectra(), parse_goal("auto", "1,2")):
         assert line.alarms is not None
 
 
 @pytest.mark.parametrize("name", ["kfo-zoh", "kfo-rts"])
 def test_a_kalman_filters_rate_is_the_fourth_root_of_its_densities(name: str) -> None:
     """ω_n⁴ = Q_τ/R under ``density``, whatever R the log's noise asks for."""
-    (line,) = (x for x in tune_all(spectra(0.3), parse_goal("rmse")) if x.observer == name)
+    (line,) = (x for x in tune_all(spectra(0.3), parse_goal("auto")) if x.observer == name)
     ratio = np.array(line.gains["q_tau_diag"]) / np.array(line.gains["r_diag"])
     np.testing.assert_allclose(ratio**0.25, line.rate, rtol=1e-12)
 
@@ -166,7 +176,7 @@ def test_a_gain_at_a_bound_is_said_with_the_numbers() -> None:
         step=quiet.step,
         segments=(8, 8),
     )
-    goal = parse_goal("rmse")
+    goal = parse_goal("auto")
     remarks = bounds_reached(tune_all(silent, goal), silent, goal)
     assert {r.where.about for r in remarks} == {"fdo", "gmo", "kfo-zoh", "kfo-rts"}
     for remark in remarks:

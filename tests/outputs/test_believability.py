@@ -90,7 +90,7 @@ def test_a_load_nobody_told_stands_first_with_its_command(without_reference: Ana
     assert (first.standing, first.subject) == ("bad", "load")
     assert first.sentence == in_words(load).evidence
     assert first.remedy is not None
-    assert "--find-payload" in first.remedy
+    assert "--method payload" in first.remedy
 
 
 def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> None:

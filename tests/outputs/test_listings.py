@@ -8,7 +8,7 @@ from vftcli.robots import load_robot
 
 
 class Line(NamedTuple):
-    """What `tune` finds for one observer, as far as the table shows it."""
+    """What a goal finds for one observer, as far as the table shows it."""
 
     observer: str
     rate: np.ndarray

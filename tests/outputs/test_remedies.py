@@ -29,7 +29,7 @@ def test_every_subject_stands_for_remarks_that_exist_once() -> None:
 @pytest.mark.parametrize(
     ("code", "ending"),
     [
-        ("light-load", "--find-payload --robot ur5 -o loaded.toml"),
+        ("light-load", "--method payload --robot ur5 -o loaded.toml"),
         ("payload-not-mounted", "--robot ur5 --payload log"),
         ("no-robot-fits", "--robot ur5 --method base -o my_robot.toml"),
         ("saturation", "--robot ur5"),

@@ -103,7 +103,7 @@ def test_a_load_has_no_rest(analysis: Analysis) -> None:
     text = log_screen(replace(analysis, contacts=found), CANVAS)
     assert "A load, or a wrong payload" in text
     assert "else: " not in text
-    assert "--find-payload" in text
+    assert "--method payload" in text
 
 
 def test_against_tells_the_lead_the_others_and_the_floor(analysis: Analysis) -> None:

@@ -97,7 +97,7 @@ def test_what_is_wide_is_no_threshold_and_in_no_call() -> None:
     table = tomllib.loads(calls(some)["toml"])["thresholds"]
     assert not {"force_N", "force_upper_N", "force_size_N"} & set(table)
     assert table["moment_Nm"] == [13.01, 14.01, 15.01]
-    record = thresholds_record(some, (), None)
+    record = thresholds_record(some, (), ())
     assert [row["threshold_N"] for row in record["axes"][:3]] == [10.001, 11.001, None]
     assert record["force"]["threshold_N"] is None
     assert "–" in terminal(thresholds_grid(some)).splitlines()[-1]
@@ -136,7 +136,7 @@ def check(reference: str | None = "sensor") -> ContactCheck:
 
 def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
     counted = (CountedAlarms("a.csv", 0.5, 0.5, (0,) * 7, 0, 1),)
-    text = json.dumps(jsonable(thresholds_record(made(), counted, check())), allow_nan=False)
+    text = json.dumps(jsonable(thresholds_record(made(), counted, [check()])), allow_nan=False)
     record = json.loads(text)
     assert {"rate_per_h", "joints", "axes", "calls"} <= set(record)
     assert {"joint", "threshold_Nm", "interval_Nm"} <= set(record["joints"][0])
@@ -147,8 +147,8 @@ def test_the_record_has_the_keys_of_the_contract_and_is_strict_json() -> None:
     assert record["force"]["threshold_N"] == pytest.approx(30.001)
     # k = 30 of 900 readings of a second: 120 an hour, a quarter of one.
     assert (record["joints"][0]["tail_maxima"], record["joints"][0]["hours"]) == (30, 0.25)
-    assert (record["check"]["caught"], record["check"]["smallest_caught_N"]) == (2, 20.0)
-    assert record["check"]["contacts"][1]["delay_s"] is None
+    assert (record["checks"][0]["caught"], record["checks"][0]["smallest_caught_N"]) == (2, 20.0)
+    assert record["checks"][0]["contacts"][1]["delay_s"] is None
     assert record["left_out"][0]["any_axis"] == 1
 
 
@@ -157,7 +157,7 @@ def test_what_has_no_tail_has_no_upper_end_either() -> None:
     one = Thresholds(
         rate=1.0, joints=(short,), axes=(), force=(), of_vendor=True, logged_wrench=False
     )
-    record = json.loads(json.dumps(jsonable(thresholds_record(one, (), None)), allow_nan=False))
+    record = json.loads(json.dumps(jsonable(thresholds_record(one, (), ())), allow_nan=False))
     assert record["joints"][0]["interval_Nm"] == [5.0, None]
     assert tomllib.loads(record["calls"]["toml"])["thresholds"]["joint_torque_upper_Nm"] == [5.0]
     assert "short.csv" in terminal(thresholds_grid(one))

@@ -20,7 +20,9 @@ from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-BY_DENSITY = ObserverChoice.parsed(observer=["kfo-rts"], set=["kfo.noise_convention=density"])
+BY_DENSITY = ObserverChoice.parsed(
+    observer=["kfo-rts"], settings={"kfo.noise_convention": "density"}
+)
 """What `best` falls back to."""
 MOVING = [0, 1, 2, 3, 5]
 """Joint 5 of the circle rests."""
@@ -76,11 +78,9 @@ def test_whole_log_is_off_for_everyone_and_none_for_no_one(
     request_: AnalysisChoice, automatic: Analysis
 ) -> None:
     everyone = analyse_log(
-        FIXTURE, replace(request_, refinement=RefinementChoice(remove_bias="whole-log"))
+        FIXTURE, replace(request_, refinement=RefinementChoice(bias="whole-log"))
     )
-    nobody = analyse_log(
-        FIXTURE, replace(request_, refinement=RefinementChoice(remove_bias="none"))
-    )
+    nobody = analyse_log(FIXTURE, replace(request_, refinement=RefinementChoice(bias="none")))
     best, gmo, auto = (e.tau for e in everyone.estimates)
     np.testing.assert_array_equal(best, auto)
     np.testing.assert_array_equal(best, automatic.estimates[0].tau)

@@ -20,9 +20,9 @@ from vftcli.signals.errors import ParameterError, VftError
 from vftcli.signals.remarks import Remark
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
-WHOLE_LOG = RefinementChoice(remove_bias="whole-log")
+WHOLE_LOG = RefinementChoice(bias="whole-log")
 DENSITIES = ObserverChoice.parsed(
-    observer=["rts-auto", "kfo-rts"], set=["kfo.noise_convention=density"]
+    observer=["rts-auto", "kfo-rts"], settings={"kfo.noise_convention": "density"}
 )
 """A tuned smoother, and what it falls back to."""
 MOVING = np.array([1, 2, 3, 4, 6])
@@ -251,15 +251,11 @@ def test_an_unknown_gains_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="Did you mean gain"):
         analyse_log(
             FIXTURE,
-            AnalysisChoice(
-                robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains_file=file)
-            ),
+            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
         )
     file.write_text("gain = 3.0\n", encoding="utf-8")
     with pytest.raises(ParameterError, match=r"no \[observers"):
         analyse_log(
             FIXTURE,
-            AnalysisChoice(
-                robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains_file=file)
-            ),
+            AnalysisChoice(robot=RobotChoice(name="ur5"), observers=ObserverChoice(gains=file)),
         )

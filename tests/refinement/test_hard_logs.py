@@ -138,7 +138,7 @@ class Numberless:
 
 def test_a_joint_without_a_number_is_the_momentum_observers_and_named(slow, panda):
     run = Run(recording=slow, robot=panda)
-    found = baseline_of(FreeMotion(log=run, choice=FreeChoice.parsed(free_part="0:6")))
+    found = baseline_of(FreeMotion(log=run, choice=FreeChoice.parsed(free=["0:6"])))
     observer = Numberless()
     both = Baselines(plain=found, best=found)
     made = refine.refine(both, [observer], [observer.estimate(run.terms)])

@@ -7,13 +7,12 @@ import pytest
 
 from vftcli.repetition.choice import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
 from vftcli.repetition.ladder import RUNGS
-from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.errors import ReferenceTorqueError
 
 
 def test_a_span_of_free_is_the_free_part() -> None:
-    """``--free A:B`` and ``--free-part A:B`` mean the same; a log is a log."""
-    told = FreeChoice.parsed(free=["2:4", "run.csv", ":1"], free_part="6:7")
-    assert told.spans == ((6.0, 7.0), (2.0, 4.0), (-np.inf, 1.0))
+    told = FreeChoice.parsed(free=["2:4", "run.csv", ":1"])
+    assert told.spans == ((2.0, 4.0), (-np.inf, 1.0))
     assert told.logs == (Path("run.csv"),)
 
 
@@ -39,27 +38,22 @@ def test_the_names_of_alignments_are_those_of_the_ladder() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"alignment": "best"}, "commanded, period, phase, model"),
-        ({"alignment": "commanded"}, "add --period S"),
-        ({"period": 0.0}, "--period 0 is not a positive time"),
-        ({"period": float("nan")}, "is not a positive time"),
-        ({"free": ["a.csv"], "period": 4.0}, "leave them away with --free"),
-        ({"free": ["a.csv"], "free_cycles": "1"}, "leave them away with --free"),
-        ({"low_pass": "-3"}, "not a positive cutoff"),
-        ({"low_pass": "nan"}, "not a positive cutoff"),
-        ({"low_pass": "all"}, "not a positive cutoff"),
+        ({"two-cycle.alignment": "best"}, "commanded, period, phase, model"),
+        ({"two-cycle.alignment": "commanded"}, "add --set two-cycle.period=S"),
+        ({"two-cycle.period": "0"}, "two-cycle.period=0 is not a positive time"),
+        ({"two-cycle.period": "nan"}, "is not a positive time"),
+        ({"free": ["a.csv"], "two-cycle.period": "4"}, "leave them away with --free"),
+        ({"free": ["a.csv"], "two-cycle.free-cycles": "1"}, "leave them away with --free"),
+        ({"two-cycle.low-pass": "-3"}, "not a positive cutoff"),
+        ({"two-cycle.low-pass": "nan"}, "not a positive cutoff"),
+        ({"two-cycle.low-pass": "all"}, "not a positive cutoff"),
     ],
 )
 def test_choices_that_exclude_each_other_or_do_not_exist(
     options: dict[str, object], message: str
 ) -> None:
     with pytest.raises(ReferenceTorqueError, match=message):
-        FreeChoice.parsed(**options)  # type: ignore[arg-type]
-
-
-def test_a_malformed_free_part_is_refused() -> None:
-    with pytest.raises(ParameterError, match="is not A:B"):
-        FreeChoice.parsed(free_part="4")
+        FreeChoice.parsed(**options)
 
 
 def test_lists_of_cycles() -> None:

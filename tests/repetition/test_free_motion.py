@@ -38,7 +38,7 @@ def codes(remarks: Sequence[object]) -> list[str]:
 
 
 def test_the_cycle_that_is_named_is_the_one_taken(circle: Run) -> None:
-    """``--free-cycles 2`` is the second cycle, from 4 to 8 s, and no other."""
+    """``--set two-cycle.free-cycles=2`` is the second cycle, from 4 to 8 s, and no other."""
     motion = motion_of(circle, choice=FreeChoice(cycles=(2,)))
     partners = partners_in_log(motion)
     (pairing,) = partners.clocks["found"]

@@ -56,7 +56,7 @@ def pushed(mode: str) -> Replay:
     force = np.zeros((len(t), 6))
     force[:, 1] = np.select([t < 0.4, t < 1.4], [30.0, 10.0], 0.0)
     arm = load_robot("ur5")
-    control = ControlChoice.parsed(alpha="1.9", threshold_mode=mode)
+    control = ControlChoice.parsed(alpha="1.9", settings={"admittance.threshold_mode": mode})
     parameters = control.parameters(arm)
     q = np.tile(arm.admittance["start"], (len(t), 1))
     wrench = Wrench(name="push", t=t, values=force, frame="base")

@@ -37,12 +37,12 @@ def test_an_arm_that_no_profile_fits_lists_them_all() -> None:
 
 def test_friction_can_be_left_away() -> None:
     assert any(f.model != "none" for f in RobotChoice(name="ur5").load(log()).friction)
-    without = RobotChoice.parsed(robot="ur5", friction="none").load(log())
+    without = RobotChoice.parsed(robot="ur5", settings={"model.friction": "none"}).load(log())
     assert all(f.model == "none" for f in without.friction)
 
 
 def test_another_friction_is_refused_before_a_log_is_read() -> None:
-    with pytest.raises(ParameterError, match="--friction 'lugre'; there is profile, none"):
+    with pytest.raises(ParameterError, match=r"model\.friction=lugre; there is profile, none"):
         RobotChoice(friction="lugre")
 
 
@@ -51,13 +51,11 @@ def test_a_payload_that_the_file_has_not_is_refused() -> None:
         RobotChoice(name="ur5", payload="bucket").load(log())
 
 
-def test_the_tip_and_the_arguments_of_a_description_are_part_of_the_choice(tmp_path: Path) -> None:
+def test_the_tip_of_a_description_are_part_of_the_choice(tmp_path: Path) -> None:
     path = written(tmp_path, two_armed())
     choice = RobotChoice.parsed(robot=str(path), tip="left_tool0")
     assert choice.load(log(7)).chain.names[0] == "left_joint1"
     assert hash(choice) == hash(RobotChoice(name=str(path), tip="left_tool0"))
-    with pytest.raises(ParameterError, match="--robot-arg 'ur5e' is not NAME=VALUE"):
-        RobotChoice.parsed(robot="ur.xacro", robot_arg=["ur5e"])
 
 
 def test_the_payload_that_the_log_declares_is_mounted() -> None:

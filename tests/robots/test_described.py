@@ -213,8 +213,8 @@ def test_what_is_no_description_is_told_what_it_is(
 def test_options_of_descriptions_are_refused_where_they_mean_nothing(tmp_path: Path) -> None:
     with pytest.raises(RobotError, match="--tip is for a URDF, xacro or MJCF; ur5 is a robot file"):
         load_robot("ur5", tip="tool0")
-    with pytest.raises(RobotError, match="--robot-arg is for a URDF, xacro or MJCF; ur5"):
-        load_robot("ur5", arguments=["name=ur"])
+    with pytest.raises(RobotError, match="name:=ur is for a URDF, xacro or MJCF; ur5"):
+        load_robot("ur5 name:=ur")
     path = written(tmp_path, fingered())
-    with pytest.raises(RobotError, match="--robot-arg 'name=ur' is for a xacro, which this is not"):
-        load_robot(path, arguments=["name=ur"])
+    with pytest.raises(RobotError, match="'name:=ur' is for a xacro, which this is not"):
+        load_robot(f"{path} name:=ur")

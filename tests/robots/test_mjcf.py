@@ -83,7 +83,7 @@ def test_the_friction_of_a_simulation_is_left_out_and_said(tmp_path: Path) -> No
     assert left.values["damping_Nms_rad"] == [0, 20, 0, 0, 0]
     taken = RobotChoice(name=str(path), friction="model").load(log)
     assert taken.friction[1].parameters == {"coulomb": 0.3, "viscous": 20.0}
-    with pytest.raises(RobotError, match="--friction model is what an MJCF gives its joints"):
+    with pytest.raises(RobotError, match=r"model\.friction=model is what an MJCF gives its joints"):
         RobotChoice(name="ur5", friction="model").load(log)
 
 

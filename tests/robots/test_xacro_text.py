@@ -7,7 +7,7 @@ import pytest
 from made_urdfs import arm, fixed, link, robot, written
 
 from vftcli.robots import load_robot, xml_text
-from vftcli.signals.errors import ParameterError, RobotError
+from vftcli.signals.errors import RobotError
 
 HEAD = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
 <xacro:arg name="gripper" default="false"/>
@@ -31,16 +31,16 @@ def _xacro_installed() -> None:
 @pytest.mark.usefixtures("_xacro_installed")
 def test_a_xacro_is_expanded_with_its_arguments(tmp_path: Path) -> None:
     path = written(tmp_path, xacro(), "arm.urdf.xacro")
-    bare = load_robot(path, arguments=["name=made"])
+    bare = load_robot(f"{path} name:=made")
     assert (bare.name, bare.joints, bare.chain.mass[0]) == ("made", 5, 1.0)
-    held = load_robot(path, arguments=["name=made", "gripper=true"])
+    held = load_robot(f"{path} name:=made gripper:=true")
     assert held.chain.mass[-1] - bare.chain.mass[-1] == pytest.approx(0.5)
     assert bare.remarks[0].code == "xacro-run"
 
 
 @pytest.mark.usefixtures("_xacro_installed")
 def test_a_file_that_holds_macros_is_a_xacro_whatever_it_is_called(tmp_path: Path) -> None:
-    assert load_robot(written(tmp_path, xacro()), arguments=["name=made"]).name == "made"
+    assert load_robot(f"{written(tmp_path, xacro())} name:=made").name == "made"
 
 
 @pytest.mark.usefixtures("_xacro_installed")
@@ -54,7 +54,7 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
     written(parts, part, "part.xacro")
     include = '<xacro:include filename="$(find other_parts)/part.xacro"/>'
     path = written(own, xacro(include), "arm.xacro")
-    found = load_robot(path, arguments=["name=made", "far=2"])
+    found = load_robot(f"{path} name:=made far:=2")
     assert found.chain.mass[-1] == pytest.approx(1.2)
 
 
@@ -63,31 +63,31 @@ def test_packages_beside_the_file_and_above_it_are_found(tmp_path: Path) -> None
 @pytest.mark.parametrize(
     ("text", "arguments", "words"),
     [
-        (xacro(), [], "the xacro needs name: give --robot-arg name=VALUE; it takes name, gripper"),
+        (xacro(), [], "the xacro needs name: .*name:=VALUE'; it takes name, gripper"),
         (
             xacro(),
-            ["name=made", "griper=true"],
-            r"no argument 'griper'\. Did you mean gripper\? As --robot-arg it takes name, gri",
+            ["name:=made", "griper:=true"],
+            r"no argument 'griper'\. Did you mean gripper\? Behind its name it takes name, gri",
         ),
-        (xacro("$(arg tool)"), ["name=made"], "the xacro needs tool: give --robot-arg tool=VALUE"),
+        (xacro("$(arg tool)"), ["name:=made"], "the xacro needs tool: .*tool:=VALUE"),
         (
             xacro('<xacro:include filename="$(find nowhere)/x.xacro"/>'),
-            ["name=made"],
+            ["name:=made"],
             "cannot be expanded: .*nowhere",
         ),
-        (xacro("${1 / 0}"), ["name=made"], "cannot be expanded: .*division by zero"),
-        (xacro("${__import__('os')}"), ["name=made"], "cannot be expanded: "),
-        (xacro('<xacro:include filename="arm.xacro"/>'), ["name=made"], "cannot be expanded: "),
-        (xacro("${'a' * 10 ** 12}"), ["name=made"], r"cannot be expanded: .*10 \*\* 12"),
-        (xacro("$(env HOME)"), ["name=made"], "it reads the environment variable HOME"),
+        (xacro("${1 / 0}"), ["name:=made"], "cannot be expanded: .*division by zero"),
+        (xacro("${__import__('os')}"), ["name:=made"], "cannot be expanded: "),
+        (xacro('<xacro:include filename="arm.xacro"/>'), ["name:=made"], "cannot be expanded: "),
+        (xacro("${'a' * 10 ** 12}"), ["name:=made"], r"cannot be expanded: .*10 \*\* 12"),
+        (xacro("$(env HOME)"), ["name:=made"], "it reads the environment variable HOME"),
         (
             xacro("${xacro.load_yaml('/etc/passwd')}"),
-            ["name=made"],
+            ["name:=made"],
             "it loads /etc/passwd, which is outside of its folder",
         ),
         (
             xacro("${load_yaml('../beside.yaml')}"),
-            ["name=made"],
+            ["name:=made"],
             r"it loads \.\./beside\.yaml, which is outside of its folder",
         ),
     ],
@@ -100,7 +100,7 @@ def test_a_xacro_that_cannot_be_expanded_says_why_on_one_line(
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     with pytest.raises(RobotError, match=words) as caught:
-        load_robot(written(tmp_path, text, "arm.xacro"), arguments=arguments)
+        load_robot(" ".join([str(written(tmp_path, text, "arm.xacro")), *arguments]))
     assert "\n" not in str(caught.value)
     assert capfd.readouterr() == ("", "")
 
@@ -115,7 +115,7 @@ def test_a_xacro_that_never_ends_is_ended(
     monkeypatch.setattr(xml_text, "SECONDS", 1)
     path = written(tmp_path, xacro("${9**9**9}"), name)
     with pytest.raises(RobotError, match="cannot be expanded within 1 s of a processor"):
-        load_robot(path, arguments=["name=made"])
+        load_robot(f"{path} name:=made")
 
 
 @pytest.mark.usefixtures("_xacro_installed")
@@ -161,13 +161,7 @@ def test_without_the_package_the_line_that_expands_it_is_told(
         RobotError,
         match=r"pip install 'vftcli\[xacro\]'.*xacro arm\.urdf\.xacro name:=made > arm\.urdf$",
     ):
-        load_robot(path, arguments=["name=made"])
-
-
-def test_an_argument_is_a_name_and_a_value(tmp_path: Path) -> None:
-    path = written(tmp_path, xacro(), "arm.xacro")
-    with pytest.raises(ParameterError, match="--robot-arg 'name' is not NAME=VALUE"):
-        load_robot(path, arguments=["name"])
+        load_robot(f"{path} name:=made")
 
 
 def test_what_only_names_the_language_is_a_urdf(tmp_path: Path) -> None:

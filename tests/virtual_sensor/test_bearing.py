@@ -41,7 +41,7 @@ def sensed(recording, **zero):
     request = AnalysisChoice(
         wrench=WrenchChoice(frame="base", zero=ZeroChoice(**zero)),
         robot=RobotChoice(name="panda"),
-        observers=ObserverChoice.parsed(set=["kfo.noise_convention=density"]),
+        observers=ObserverChoice.parsed(settings={"kfo.noise_convention": "density"}),
     )
     return analyse(recording, request.robot.load(recording), request)
 

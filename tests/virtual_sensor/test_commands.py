@@ -44,7 +44,9 @@ def test_estimate_writes_the_wrench_and_nulls_what_the_pose_cannot_tell(
     assert "ON the robot" in record["wrench"]["meaning"]
 
 
-@pytest.mark.parametrize("option", [("--frame", "base"), ("--solver", "map"), ("--zero", "1:3")])
+@pytest.mark.parametrize(
+    "option", [("--frame", "base"), ("--set", "virtual-sensor.solver=map"), ("--zero", "1:3")]
+)
 def test_any_wrench_option_asks_for_the_wrench(monkeypatch, capsys, tmp_path, option) -> None:
     code, _, err = run(monkeypatch, capsys, "estimate", *COMMON, *option, "-o", str(tmp_path))
     assert code == 0, err
@@ -76,9 +78,12 @@ def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
     [
         (("--frame", "wrist"), "no frame 'wrist' for a wrench; there is flange"),
         (("--frame", "tool"), "the robot has no tool"),
-        (("--solver", "svd"), "no solver 'svd'"),
+        (("--set", "virtual-sensor.solver=svd"), "no solver 'svd'"),
         (("--zero", "500:600"), "lies outside the log"),
-        (("--frame", "sensor", "--sensor-pose", "0,0,0,2,0,0,0,1,0,0,0,1"), "not a rotation"),
+        (
+            ("--frame", "sensor", "--set", "virtual-sensor.sensor=0,0,0,2,0,0,0,1,0,0,0,1"),
+            "not a rotation",
+        ),
     ],
 )
 def test_bad_options_are_one_line_and_leave_nothing(

@@ -136,9 +136,11 @@ def test_an_unknown_frame_lists_those_there_are() -> None:
 
 
 def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
-    with pytest.raises(ParameterError, match=r"no tool, so there is no Jacobian.*--tool"):
+    with pytest.raises(
+        ParameterError, match=r"no tool, so there is no Jacobian.*virtual-sensor.tool"
+    ):
         VirtualSensor(frame="tool")
-    with pytest.raises(ParameterError, match="--sensor-pose"):
+    with pytest.raises(ParameterError, match=r"virtual-sensor\.sensor"):
         VirtualSensor(frame="sensor")
 
 
@@ -152,25 +154,25 @@ def test_a_frame_without_its_pose_says_how_to_give_it() -> None:
 )
 def test_a_pose_that_is_no_rotation_is_refused(matrix: np.ndarray, words: str) -> None:
     with pytest.raises(ParameterError, match=words):
-        checked_pose(matrix, np.zeros(3), "--sensor-pose")
+        checked_pose(matrix, np.zeros(3), "virtual-sensor.sensor")
 
 
 def test_poses_are_read_as_three_six_or_twelve_numbers_or_a_name(tmp_path) -> None:
     robot = load_robot("ur5")
-    short = read_pose("0.1,0,0.2", robot, "tool", "--tool")
-    long = read_pose("0.1,0,0.2,0.1,0.2,0.3", robot, "tool", "--tool")
+    short = read_pose("0.1,0,0.2", robot, "tool", "virtual-sensor.tool")
+    long = read_pose("0.1,0,0.2,0.1,0.2,0.3", robot, "tool", "virtual-sensor.tool")
     np.testing.assert_array_equal(short.translation, [0.1, 0.0, 0.2])
     np.testing.assert_allclose(long.rotation, rpy_matrix((0.1, 0.2, 0.3)))
-    whole = pose_of_numbers([0, 0, 1, *long.rotation.ravel()], "--tool")
+    whole = pose_of_numbers([0, 0, 1, *long.rotation.ravel()], "virtual-sensor.tool")
     np.testing.assert_allclose(whole.rotation, long.rotation)
     with pytest.raises(ParameterError, match="5 numbers"):
-        read_pose("1,2,3,4,5", robot, "tool", "--tool")
+        read_pose("1,2,3,4,5", robot, "tool", "virtual-sensor.tool")
     with pytest.raises(ParameterError, match=r"no \[tool.gripper\]"):
-        read_pose("gripper", robot, "tool", "--tool")
+        read_pose("gripper", robot, "tool", "virtual-sensor.tool")
     assert robot.path is not None
     path = tmp_path / "mine.toml"
     path.write_text(
         robot.path.read_text(encoding="utf-8") + "\n[tool.gripper]\nxyz = [0, 0, 0.15]\n"
     )
-    named = read_pose("gripper", load_robot(path), "tool", "--tool")
+    named = read_pose("gripper", load_robot(path), "tool", "virtual-sensor.tool")
     np.testing.assert_array_equal(named.translation, [0.0, 0.0, 0.15])

@@ -54,7 +54,7 @@ def test_under_noise_the_pose_is_found_within_its_own_deviation() -> None:
 
 def test_pushes_along_one_line_tell_no_pose() -> None:
     line = np.outer(np.sin(np.linspace(0, 6, 50)), [10.0, 0, 0, 0, 1, 0])
-    with pytest.raises(ParameterError, match=r"forces lie on one line.*--sensor-pose"):
+    with pytest.raises(ParameterError, match=r"forces lie on one line.*virtual-sensor.sensor"):
         fit_pose(line, line)
 
 

@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from vftcli.signals.arrays import Array
 
 
+FILE = "file:"  #: Head of a force with a path in its name.
+
+
 def listed(text: str, option: str) -> tuple[float, ...]:
     """The numbers of ``A,B,C``."""
     numbers = parsing.numbers(text)
@@ -93,6 +96,8 @@ class ControlChoice(Choice):
         from vftcli.admittance.law import check_kinds
 
         check_kinds(self.kinds)
+        if self.force is not None and self.force != "sensor" and not self.force.startswith(FILE):
+            raise ParameterError(f"admittance.force={self.force} is neither sensor nor {FILE}PATH")
         _ = self.settings  # malformed ones are refused before a log is read
 
     @property

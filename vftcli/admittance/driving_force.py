@@ -38,8 +38,8 @@ def stored_force(
     """What the virtual sensor makes of an observer's torque that a file of estimates holds."""
     if choice.solver == SMOOTHER:
         raise ParameterError(
-            "--solver smoother takes the log itself, not the torques of a file of estimates; "
-            "give the log, or leave --solver away"
+            "virtual-sensor.solver=smoother needs the log itself, not a file of estimates; "
+            "give the log, or leave the setting away"
         )
     tau = recording.require("tau_ext")
     estimate = ExternalTorque(name=observer, t=recording.t, tau=tau)

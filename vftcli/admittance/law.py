@@ -244,6 +244,6 @@ def check_stable(
     if grave and not anyway:
         more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise UnstableError(
-            f"unstable: {grave[0]}{more}. Change the parameters, or study it with --force-unstable."
+            f"unstable: {grave[0]}{more}. Change the parameters, or study it with --anyway."
         )
     return verdicts, tuple(remark for verdict in verdicts for remark in verdict.complaints())

@@ -61,13 +61,12 @@ def annotate(
     tell: Callable[[str], None],
     progress: Callable[[str, float, float], None],
     *,
-    allow_missing: bool = False,
     force: bool = False,
 ) -> dict[str, Any]:
     """Write a copy of a dataset with the forces of every frame.
 
-    Frames without an estimate stop the run, or with `allow_missing` are filled with zeros
-    and marked; `force` is whether an earlier copy may be replaced.
+    Frames without an estimate stop the run, or are filled with zeros and marked where the choice
+    goes on anyway; `force` is whether an earlier copy may be replaced.
 
     Returns:
         What ``meta/vftcli.json`` holds.
@@ -83,16 +82,16 @@ def annotate(
         work = folder / WORK
         plan = Plan(dataset, work, key)
         run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
-        expected = force_columns(choice, (), derived=False, valid=allow_missing)
+        expected = force_columns(choice, (), derived=False, valid=choice.anyway)
         outcomes = run(
             plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
         )
-        made = gathered(outcomes, allow_missing, progress)
+        made = gathered(outcomes, choice, progress)
         columns = force_columns(
             choice,
             joint_names(made),
             derived=any(one.get("derived") for one in made.episodes),
-            valid=allow_missing,
+            valid=choice.anyway,
         )
         write = partial(write_file, dataset, columns, choice.suffix)
         tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
@@ -174,7 +173,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 
 def gathered(
     outcomes: Iterable[Outcome[Any]],
-    allow_missing: bool,
+    choice: ForceChoice,
     progress: Callable[[str, float, float], None],
 ) -> Made:
     """Results of the episodes, in the order of their files."""
@@ -183,7 +182,7 @@ def gathered(
     for outcome in outcomes:
         told = value_of(outcome)
         for record in told["episodes"]:
-            if not allow_missing:
+            if not choice.anyway:
                 refuse_missing(record)
         episodes += told["episodes"]
         robot, observer = robot or told["robot"], observer or told["observer"]
@@ -192,7 +191,7 @@ def gathered(
     return Made(episodes, robot, observer)
 
 
-REMEDY = "--allow-missing writes 0 there, and a column that says so"
+REMEDY = "--anyway writes 0 there, and a column that says so"
 
 
 def refuse_missing(record: Mapping[str, Any]) -> None:
@@ -205,7 +204,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
     if record["status"] == "part":
         name, count = next(iter(record["missing_frames"].items()))
         why = (
-            "these poses hide it; --solver smoother has a wrench in every pose"
+            "these poses hide it; --set virtual-sensor.solver=smoother has a wrench in every pose"
             if name == "wrench"
             else "a value of the log is no number there"
         )

@@ -46,7 +46,8 @@ class ForceChoice:
     wrench: WrenchChoice | None = None
     sd: bool = False  #: Whether the observer's own standard deviation is wanted.
     contact: bool = False  #: Whether it is wanted which frames lie in a contact of the list.
-    anyway: bool = False  #: Whether results are wanted even where a finding makes them meaningless.
+    #: Whether to go on where a finding makes results meaningless, and where there are none.
+    anyway: bool = False
 
     def __post_init__(self) -> None:
         if len(self.observers.names) != 1:
@@ -156,8 +157,8 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
     """See that velocities and efforts are there, and that the efforts were measured."""
     if recording.dq is None:
         raise MissingSignalError(
-            f"{recording.name}: no joint velocities. --derive dq makes them of the positions over "
-            "the complete episode, so that the forces are not causal, and that is recorded"
+            f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "
+            "over the complete episode, so that the forces are not causal, and that is recorded"
         )
     efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
     if not efforts:
@@ -183,8 +184,8 @@ def columns_of(analysis: Analysis, choice: ForceChoice) -> dict[str, Single]:
     if choice.sd:
         if estimate.sd is None:
             raise ParameterError(
-                f"--sd: {estimate.name} states no standard deviation; choose another --observer, "
-                "as kfo-zoh"
+                f"--add sd: {estimate.name} states no standard deviation; choose another "
+                "--observer, as kfo-zoh"
             )
         found["external_torque_sd"] = estimate.sd
     if choice.wrench is not None:

@@ -129,7 +129,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
         security = Security.temporary()
     except ImportError as error:
         raise EngineError(
-            f"workers need a certificate, which cannot be made here ({error}); --workers 0 does "
+            f"workers need a certificate, which cannot be made here ({error}); --jobs 0 does "
             "one log after the other"
         ) from None
     tell(f"{workers} worker{'s' * (workers > 1)} of {memory / 1e9:.1f} GB")
@@ -161,7 +161,7 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
         raise EngineError(
             f"no Dask scheduler answers at {choice.address} within {ANSWER:g} s "
             f"({failure_of(error).line[:120]}); start one with `dask scheduler`, or leave "
-            "--scheduler out"
+            "cluster.address away"
         ) from None
     with client:
         try:

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vftcli.admittance.choice import ControlChoice
+from vftcli.admittance.choice import FILE, ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
 from vftcli.cli.progress import echo
-from vftcli.evaluation.reference_choice import FILE
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
@@ -61,9 +60,7 @@ def admit(
 ) -> None:
     """Replay a log's external force through admittance controllers.
 
-    The traditional controller and variable-parameter ones. Writes DIR/index.html,
-    motion.parquet, comparison.{csv,json} and run.json. The force is that of one observer, kfo-fe
-    unless you name another. A scenario runs with the controller in the loop.
+    The force is that of kfo-fe; a scenario runs with the controller in the loop.
 
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
@@ -71,7 +68,6 @@ def admit(
     from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.signals.packages import check_installed
-    from vftcli.simulation.load import listing
 
     if (log is None) != bool(release):
         raise typer.BadParameter("give one of LOG, SCENARIO, --release AXIS=VALUE")
@@ -88,7 +84,7 @@ def admit(
     examinations: tuple[Examination, ...] = ()
     if log is None:
         result = released(release or [], analysis, control)
-    elif not log.exists() and str(log) in dict(listing()):
+    elif is_scenario(log):
         result, run = looped(str(log), seed, analysis, control)
     else:
         result, recording, examinations = replayed(log, analysis, control)
@@ -109,6 +105,11 @@ def admit(
         say_left_out(files_of_replay(form))
         if show_made:
             open_made(output)
+
+
+def is_scenario(log: Path) -> bool:
+    """Whether a word names a scenario: a file of one, or what has no ending and is no file."""
+    return log.suffix == ".toml" or not (log.exists() or log.suffix or len(log.parts) > 1)
 
 
 def chosen(analysis: AnalysisOptions, log: Path | None = None) -> "AnalysisChoice":

@@ -8,6 +8,7 @@ from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
+from vftcli.signals.parsing import check_known
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
@@ -16,33 +17,19 @@ if TYPE_CHECKING:
     from vftcli.batch.annotation import ForceChoice
 
 
-class ColumnOptions(opt.Bundle):
-    """Which columns are added."""
+ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
 
-    GROUP = WRITE
 
-    sd: Annotated[
-        bool,
-        Option("--sd", "", "Also the observer's own standard deviation of each torque."),
-    ]
-    contact: Annotated[
-        bool,
-        Option(
-            "--contact",
-            "",
-            "Also 1 in a listed contact, else 0. The list sees the complete episode: a label, no "
-            "causal input.",
-        ),
-    ]
-    allow_missing: Annotated[
-        bool,
-        Option(
-            "--allow-missing",
-            "",
-            "Write 0 where nothing can be told. Columns …_valid say where; without it, such a "
-            "frame stops the run.",
-        ),
-    ]
+def added_columns(words: list[str] | None) -> list[str]:
+    """The columns that ``--add`` names.
+
+    Raises:
+        ParameterError: If there is no such column.
+    """
+    names = [name.strip() for word in words or () for name in word.split(",")]
+    for name in names:
+        check_known(name, ADDED, f"--add {name}")
+    return names
 
 
 @opt.command
@@ -50,22 +37,25 @@ def annotate_dataset(
     dataset: Annotated[
         Path, Option("", "DATASET", "A LeRobot folder, a DROID folder, or HDF5 episodes.")
     ],
-    output: Annotated[Path, Option("-o/--output", "COPY", "Folder of the copy.", group=WRITE)],
+    output: opt.Folder,
     logged: LogOptions,
     observers: opt.Typed[ObserverChoice],
-    also_wrench: opt.Wrench,
     wrench: opt.Typed[WrenchChoice],
-    columns: ColumnOptions,
+    add: Annotated[
+        list[str] | None,
+        Option("--add", "NAMES", "Add wrench, sd or contact columns as well.", group=WRITE),
+    ],
     workers: opt.Typed[WorkersChoice],
     anyway: opt.Anyway,
     _talk: opt.TalkOptions,
     json: opt.Json,
     force: opt.Force,
 ) -> None:
-    """Write the forces of every frame into a copy of a dataset.
+    """Add forces to every frame of a dataset's copy.
 
-    Adds observation.external_torque, with --wrench observation.wrench, and their statistics; what
-    was done stands in COPY/meta/vftcli.json. A run that was cut off goes on where it stopped.
+    Adds observation.external_torque, with --add wrench observation.wrench, and their statistics;
+    what was done stands in COPY/meta/vftcli.json. A run that was cut off goes on where it stopped.
+    With --anyway frames without an answer are 0, and columns ..._valid say so.
 
     Example: vftcli annotate fixtures/panda_episodes -o forces
     """
@@ -73,13 +63,14 @@ def annotate_dataset(
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.cli.console import command_line, detail, say, say_json, stages
 
+    added = added_columns(add)
     asked = ForceChoice(
         read=logged.reading.choice(),
         robot=logged.robot.choice(),
         observers=observers.choice(observer=observers.words["observer"] or [USUAL]),
-        wrench=wrench.choice() if also_wrench or wrench.is_asked else None,
-        sd=columns.sd,
-        contact=columns.contact,
+        wrench=wrench.choice() if "wrench" in added or wrench.is_asked else None,
+        sd="sd" in added,
+        contact="contact" in added,
         anyway=anyway,
     )
     engine = workers.choice()
@@ -92,7 +83,6 @@ def annotate_dataset(
         command=command_line(),
         tell=detail,
         progress=stages(),
-        allow_missing=columns.allow_missing,
         force=force,
     )
     if json:

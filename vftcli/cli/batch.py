@@ -26,7 +26,7 @@ SOME_FAILED = 3  #: Exit code where some logs failed, and others did not.
 def batch(
     logs: Annotated[
         list[Path],
-        Option("", "LOG|FOLDER...", "Logs, folders, data sets; an episode is a log."),
+        Option("", "LOG|FOLDER|DATASET...", "Logs, folders, data sets; an episode is a log."),
     ],
     output: opt.Folder,
     do: Annotated[
@@ -44,9 +44,9 @@ def batch(
     also: ExtraOptions,
     force: opt.Force,
 ) -> None:
-    """Ask many logs the same, on every core or on a cluster.
+    """Run a command on many logs; resume where it stopped.
 
-    Writes DIR/batch.parquet, failures.parquet, index.html and run.json; a second run does what
+    Writes PATH/batch.parquet, failures.parquet, index.html and run.json; a second run does what
     is missing or failed. Exit code 3: some failed.
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out

@@ -37,10 +37,8 @@ JOURNEYS = {
     },
     "Prepare a robot and its logs": {
         "inspect": "inspect:inspect_log",
-        "init": "init:write_config",
         "identify": "identify:identify_robot",
         "annotate": "annotate:annotate_dataset",
-        "tune": "tune:tune_gains",
         "convert": "convert:convert_log",
     },
     "Study further": {

@@ -30,7 +30,7 @@ NONE = "none"  #: Value of ``--config`` with which no file is read.
 TYPED = frozenset({"config", "force", "help", "set"})
 #: Command → options that it takes otherwise than the rest: only its own table gives them.
 OTHERWISE = {
-    "identify": {"free"},  # the motion without the load that is sought
+    "identify": {"free", "gains"},  # the motion without the load, what gains are found for
     "thresholds": {"reference", "reference-columns"},  # of --check alone
     "convert": {"log.derive"},  # it writes what was logged
 }
@@ -95,14 +95,16 @@ def config_option() -> TyperOption:
 
 
 def is_configured(command: Any) -> bool:  # noqa: ANN401 - typer carries its own click
-    """Whether a command takes options from a file: those that read a log, but what writes it."""
-    return command.name != "init" and any("--columns" in param.opts for param in command.params)
+    """Whether a command takes options from a file: those that read a log."""
+    return any("--columns" in param.opts for param in command.params)
 
 
 def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
     """Make what the file holds the defaults of a command."""
     unasked = Path(NAME)
-    if ctx.resilient_parsing or named == NONE or (named is None and not unasked.is_file()):
+    # Who writes such a file does not read the one that is there; only `inspect` -o is known here.
+    absent = ctx.params.get("output") is not None or not unasked.is_file()
+    if ctx.resilient_parsing or named == NONE or (named is None and absent):
         return
     path = unasked if named is None else Path(named)
     options, keys = options_of(ctx.command), keys_for(ctx.command, path)
@@ -183,6 +185,10 @@ def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
     for name, table in tables.items():
         if not isinstance(table, dict):
             raise ParameterError(f"{path}: {name} = {shown(table)} is no table of options")
+        # [contacts] is the command's table, and the group of contacts.list.
+        group = [key for key in table if any(kind.takes(f"{name}.{key}") for kind in choices)]
+        if group:
+            content[name] = {key: table.pop(key) for key in group}
         tables[name] = flattened(path, table, choices, known[name])
         check_keys(path, f"of {name}", tables[name], known[name])
     every = dict.fromkeys(key for options in known.values() for key in options)
@@ -261,7 +267,9 @@ def check_keys(
 def tables_of(path: Path) -> dict[str, Any]:
     """What a file holds."""
     if not (path.is_file() or path.is_fifo()):
-        raise ParameterError(f"--config {path}: no such file; vftcli init LOG writes one")
+        raise ParameterError(
+            f"--config {path}: no such file; vftcli inspect LOG -o FILE writes one"
+        )
     with path.open("rb") as file:
         content = file.read(LARGEST + 1)
     if len(content) > LARGEST:

@@ -1,26 +1,23 @@
 """`vftcli convert`: any readable log as a table or an MCAP."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Annotated
 
 from vftcli.cli import options as opt
 from vftcli.readers.reader import ReadChoice
-from vftcli.signals.option import WRITE, Option
 
 
 @opt.command
 def convert_log(
     log: opt.Log,
-    output: Annotated[
-        Path, Option("-o/--output", "FILE", "x.parquet, x.mcap or x.csv.", group=WRITE)
-    ],
+    output: opt.Folder,
     reading: opt.Typed[ReadChoice],
     _talk: opt.TalkOptions,
     json: opt.Json,
     force: opt.Force,
 ) -> None:
-    """Convert any readable log into Parquet, CSV or MCAP.
+    """Write any log as Parquet, CSV or MCAP.
+
+    The ending of -o says which: x.parquet, x.csv, x.mcap.
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
@@ -34,7 +31,9 @@ def convert_log(
     check_conversion(output, force)
     choice = reading.choice()
     if choice.derive == "dq":
-        raise ParameterError("convert writes what was logged; --derive dq belongs to an estimate")
+        raise ParameterError(
+            "convert writes what was logged; --set log.derive=dq belongs to an estimate"
+        )
     recording = Library().open(log, replace(choice, derive="none"))
     convert(recording, output, force=force)
     # A table may be made of any log, also of one that no estimate should be made of.

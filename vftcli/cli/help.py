@@ -31,6 +31,8 @@ class GroupedCommand(TyperCommand):
     def __init__(self, *words: Any, **more: Any) -> None:  # noqa: ANN401 - typer's own
         super().__init__(*words, **more)
         if is_configured(self):
+            for param in self.params:
+                param.is_eager = (self.name, param.name) == ("inspect", "output")
             self.params.append(config_option())
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401

@@ -1,5 +1,6 @@
-"""`vftcli identify`: logs become a robot."""
+"""`vftcli identify`: logs become a robot, or the gains of its observers."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -7,99 +8,76 @@ from typing import TYPE_CHECKING, Annotated
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.progress import echo
+from vftcli.identification import Task
+from vftcli.observers.choice import GoalChoice
+from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
-from vftcli.signals.option import WRITE, Option
-from vftcli.signals.parsing import interval
+from vftcli.signals.errors import ParameterError
 
 if TYPE_CHECKING:
-    from vftcli.identification import Task
     from vftcli.readers.reader import ReadChoice
+    from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
 
 
-class TaskOptions(opt.Bundle):
-    """What is identified, and how."""
+def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
+    """Refuse what the method has no use for.
 
-    method: Annotated[
-        str | None,
-        Option(
-            "--method",
-            "METHOD",
-            "friction, base, targets or auto. Default: auto, friction but base where the robot's "
-            "links are wrong; none with --find-payload.",
-        ),
-    ]
-    find_payload: Annotated[
-        bool,
-        Option(
-            "--find-payload",
-            "",
-            "Find a load on the flange: two LOGs of one motion, --free, poses, or motion.",
-        ),
-    ]
-    fit_constants: Annotated[
-        bool, Option("--fit-constants", "", "Friction method: drive constants K too.")
-    ]
-    cutoff: Annotated[float, Option("--cutoff", "HZ", "Cutoff of the zero-phase filter.")] = 8.0
-
-    def task(self, name: str, friction: bool = True) -> "Task":
-        """What shall be identified, for a robot of this name whose joints rub or not."""
-        from vftcli.identification import Processing, Task
-
-        usual = "friction" if self.fit_constants else "auto"
-        return Task(
-            method=self.method or (None if self.find_payload else usual),
-            friction=friction,
-            name=name,
-            find_payload=self.find_payload,
-            fit_constants=self.fit_constants,
-            processing=Processing(cutoff=self.cutoff),
+    Args:
+        task: What is identified.
+        free: What ``--free`` names.
+        logs: The logs.
+        others: Option that one method has no use for → what it was given.
+    """
+    for name, given in others.items():
+        if given and (name == "--gains") != (task.method == "gains"):
+            raise ParameterError(
+                f"--method {task.method} makes no use of {name}; leave it away"
+                if task.method
+                else f"{name} is an option of --method gains"
+            )
+    if task.method == "gains":
+        if len(logs) > 1:
+            raise ParameterError("--method gains takes one LOG; name free motion by --free")
+    elif free.logs and task.method != "payload":
+        raise ParameterError(
+            "--free is the motion without the load that --method payload seeks; free motion to "
+            "identify the arm from is given as LOG"
         )
-
-
-def logs_without_load(free: list[str] | None, find_payload: bool) -> tuple[Path, ...]:
-    """The logs of the same motion without the load that is sought, one at most."""
-    from vftcli.signals.errors import ParameterError
-
-    chosen = FreeChoice.parsed(free=free)
-    if chosen.spans or len(chosen.logs) > 1:
+    elif free.spans or len(free.logs) > 1:
         raise ParameterError(
             "a load is found from one pair of logs: give --free the log without it, once"
         )
-    if chosen.logs and not find_payload:
-        raise ParameterError(
-            "--free is the motion without the load that --find-payload seeks; free motion to "
-            "identify the arm from is given as LOG"
-        )
-    return chosen.logs
+
+
+def file_for(robot: "Robot") -> Path:
+    """The file in this folder for what is found of a robot, where no other is named."""
+    return Path("my_" + re.sub(r"[^\w.-]", "_", robot.name) + ".toml")
 
 
 @opt.command
 def identify_robot(
     logs: opt.Logs,
-    output: Annotated[Path, Option("-o/--output", "FILE.toml", "The new robot file.", group=WRITE)],
+    output: Annotated[
+        Path | None,
+        opt.OUT._replace(help="Write here; default: my_ROBOT.toml in this folder."),
+    ],
     logged: LogOptions,
-    asked: TaskOptions,
-    validate: Annotated[
-        list[Path] | None,
-        Option("--validate", "LOG", "Score on this log too. Repeatable."),
-    ],
-    span: Annotated[
-        tuple[float, float] | None,
-        Option(
-            "--validate-interval", "A:B", "Use only this span of the --validate logs.", interval
-        ),
-    ],
-    free: Annotated[list[str] | None, FreeChoice.option("free", reads=None)],
+    asked: opt.Typed[Task],
+    goal: opt.Typed[GoalChoice],
+    check: opt.Check,
+    free: opt.Typed[FreeChoice],
+    bias: opt.Typed[RefinementChoice],
     made: opt.MadeOptions,
     anyway: opt.Anyway,
     _talk: opt.TalkOptions,
     show: opt.Open,
 ) -> None:
-    """Make a robot file from logs: friction, inertias, payload.
+    """Make a robot file: friction, inertia, payload, gains.
 
-    Writes FILE.toml for --robot, and FILE.html and FILE.run.json beside it. With --find-payload
-    a LOG may be a dataset, of which every episode counts.
+    Without --method friction, but base where the robot's links are wrong. A page and run.json
+    stand beside the file. For a payload a LOG may be a dataset, of which every episode counts;
+    gains are for the goal that --gains states.
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
@@ -122,20 +100,24 @@ def identify_robot(
     )
     from vftcli.readers.library import Library
 
-    task = asked.task(output.stem, friction=logged.robot.words["friction"] != "none")
-    form = made.figures
-    OutputFolder(output.parent, made.force, files_beside(output, form)).check()
-    choice, chosen = logged.reading.choice(), logged.robot.choice()
+    chosen, task, without_load = logged.robot.choice(), asked.choice(), free.choice()
+    pages = {"--check": check, "--open": show}
+    check_uses(task, without_load, logs, {**pages, "--gains": goal.words["gains"]})
+    if task.method == "gains":
+        find_gains(logs[0], output, logged, free, bias, goal.choice(), made, anyway=anyway)
+        return
+    form, choice = made.figures, logged.reading.choice()
     # An episode is one of LOG's; the others are logs of their own.
-    held_out_choice = replace(choice.whole, interval=span)
+    held_out_choice = replace(choice.whole, interval=task.check_interval)
     unloaded_choice = replace(choice.whole, interval=choice.interval)
-    validated, without_load = validate or [], logs_without_load(free, asked.find_payload)
-    library = Library([*logs, *validated, *without_load])
+    library = Library([*logs, *(check or ()), *without_load.logs])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links, and the default begins with it.
-    keeps = task.method in {"friction", "auto"}
-    examiner = health_of(library, anyway=anyway, fitting=keeps)
+    examiner = health_of(library, anyway=anyway, fitting=task.keeps_links)
     profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
+    output = output or file_for(profile)
+    OutputFolder(output.parent, made.force, files_beside(output, form)).check()
+    task = replace(task, name=output.stem, friction=chosen.friction != "none")
 
     def opened(
         paths: list[Path] | tuple[Path, ...], how: "ReadChoice", *, whole: bool = False
@@ -143,8 +125,9 @@ def identify_robot(
         each = library.open_each(paths, how, whole=whole)
         return [examiner.taken(log, profile, how) for log in each]
 
-    train = opened(logs, choice, whole=asked.find_payload)
-    held_out, unloaded = opened(validated, held_out_choice), opened(without_load, unloaded_choice)
+    train = opened(logs, choice, whole=task.method == "payload")
+    held_out = opened(check or [], held_out_choice)
+    unloaded = opened(without_load.logs, unloaded_choice)
     for recording in (*train, *held_out, *unloaded):
         say_recording(recording)
         examiner.examine(recording, profile)
@@ -159,3 +142,63 @@ def identify_robot(
     echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))
+
+
+def find_gains(
+    log: Path,
+    output: Path | None,
+    logged: LogOptions,
+    free: opt.Typed[FreeChoice],
+    bias: opt.Typed[RefinementChoice],
+    goal: GoalChoice,
+    made: opt.MadeOptions,
+    *,
+    anyway: bool,
+) -> None:
+    """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
+    from vftcli.cli.console import command_line, detail, say, say_json, say_recording
+    from vftcli.observers.choice import LOG_GAINS, ObserverChoice
+    from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
+    from vftcli.outputs.examination import health_record, overridden_lines
+    from vftcli.outputs.files import check_file
+    from vftcli.outputs.grid import terminal
+    from vftcli.outputs.listings import tuned_grid
+    from vftcli.outputs.log.figures import write_tuned
+    from vftcli.outputs.log.run_record import jsonable
+    from vftcli.pipeline import examine, model, prepared, read
+    from vftcli.readers.library import Library
+    from vftcli.robots.run import Runs
+
+    wanted = parse_goal(goal.gains, goal.threshold)
+    choice = logged.asked(
+        Library([log]),
+        anyway=anyway,
+        free=free.choice(),
+        observers=ObserverChoice(gains=LOG_GAINS, causal=True),
+        refinement=bias.choice(),
+    )
+    recording, arm = prepared(choice.library.open(log, choice.read), choice)
+    output = output or file_for(arm)
+    check_file(output, made.force)
+    motion = read(recording, arm, choice, Runs())
+    examinations = examine(motion, choice)
+    found = model(motion, choice)
+    if found is None or (spectra := found.plain.spectra) is None:
+        why = found.plain.missing if found else "no free part"
+        raise ParameterError(f"nothing to find gains from: {why}")
+    tuned = tune_all(spectra, wanted)
+    reached = bounds_reached(tuned, spectra, wanted)
+    notes = [str(remark) for remark in (*found.remarks, *reached)]
+    doubts = overridden_lines(examinations)
+    heading = [*doubts, command_line(), f"goal: {goal.gains}", f"robot: {arm.name}", *notes]
+    write_tuned(output, heading, spectra, tuned, force=made.force, form=made.figures)
+    if made.json:
+        rows = [jsonable(line.record) for line in tuned]
+        health = jsonable(health_record(examinations))
+        say_json({"goal": goal.gains, "examination": health, "notes": notes, "observers": rows})
+        return
+    say_recording(recording)
+    for note in (*arm.remarks, *notes):
+        detail(f"note: {note}")
+    echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
+    say(f"wrote {output}: use it with --gains {output}")

@@ -1,47 +1,106 @@
-"""`vftcli inspect`: the log doctor."""
+"""`vftcli inspect`: the log doctor, and the options that a log calls for, written down once."""
 
-from typing import Annotated
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.config import NAME
 from vftcli.cli.progress import echo
 from vftcli.signals.option import Option
+
+if TYPE_CHECKING:
+    from vftcli.proposal import ProposedOption
 
 
 @opt.command
 def inspect_log(
-    log: opt.Log,
+    logs: opt.Logs,
     logged: LogOptions,
     _talk: opt.TalkOptions,
-    strict: Annotated[bool, Option("--strict", "", "Exit with 1 if there is any warning, for CI.")],
+    output: Annotated[
+        Path | None,
+        opt.OUT._replace(help="Write here; the options that the log calls for."),
+    ],
+    strict: Annotated[bool, Option("--strict", "", "Exit with 1 if anything looks wrong, for CI.")],
     json: opt.Json,
+    force: opt.Force,
 ) -> None:
-    """Examine a log: format, signals, clock, and what looks wrong.
+    """Show what a log holds and what is wrong with it.
+
+    With -o vftcli.toml robot, columns, reference are written, each with its reason, for the
+    commands in that folder; further LOGs become free motion where nothing touches the arm.
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
     from vftcli.cli.console import say_json, say_robots
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
+    from vftcli.outputs.files import check_file
     from vftcli.readers import read_first_recording
 
-    choice = logged.reading.choice()
-    recording = read_first_recording(log, choice)
-    recording = choice.within(choice.taken(recording))
-    chosen = logged.robot.choice()
-    examiner, arm = Examiner(), None
-    if chosen.name or choice.effort == "auto":
-        arm = examiner.robot(recording, chosen)
-        recording = examiner.taken(recording, arm, choice)
+    if output is not None:
+        check_file(output, force)
+    choice, chosen, examiner = logged.reading.choice(), logged.robot.choice(), Examiner()
+    examinations = []
+    for log in logs:
+        recording, arm = read_first_recording(log, choice), None
+        recording = choice.within(choice.taken(recording))
+        if chosen.name or choice.effort == "auto":
+            arm = examiner.robot(recording, chosen)
+            recording = examiner.taken(recording, arm, choice)
+        examinations.append(examine(recording, arm))
     say_robots(examiner.robots)
-    examination = examine(recording, arm)
+    if not json:
+        echo("\n\n".join(map(examination_text, examinations)))
+    written = {} if output is None else write_options(output, logs, logged, force=force)
     if json:
-        say_json(examination_record(examination))
-    else:
-        echo(examination_text(examination))
-    warnings = len(examination.warnings)
+        each = list(map(examination_record, examinations))
+        say_json({**(each[0] if len(each) == 1 else {"logs": each}), **written})
+    warnings = sum(len(examination.warnings) for examination in examinations)
     if strict and warnings:
         echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
         raise typer.Exit(1)
+
+
+def write_options(
+    output: Path, logs: Sequence[Path], logged: LogOptions, *, force: bool
+) -> dict[str, Any]:
+    """Write the options that logs call for, and give them for machines."""
+    from vftcli.cli.console import say
+    from vftcli.outputs.files import write_text
+    from vftcli.proposal import config_text, propose
+    from vftcli.readers.library import Library
+
+    words = {**logged.reading.words, **logged.robot.words}
+    given = {name.replace("_", "-"): value for name, value in words.items() if value is not None}
+    choice = logged.asked(Library(logs), on_screen=True)
+    proposed = [from_folder(output.parent, option) for option in propose(logs, choice, given)]
+    write_text(output, config_text(proposed), force)
+    taken = {option.key: option.value for option in proposed if option.key and option.taken}
+    for option in proposed:
+        if not option.key:
+            say(f"note: {option.why}")
+    how = "unasked by commands run beside it" if output.name == NAME else f"with --config {output}"
+    say(f"wrote {output}: {', '.join(taken) or 'nothing that is settled'}; read {how}")
+    if "robot" not in taken:
+        say("which arm it is stands open: name it with --robot, or in the file")
+    notes = [option.why for option in proposed]
+    return {"output": str(output), "options": taken, "notes": notes}
+
+
+def from_folder(folder: Path, option: "ProposedOption") -> "ProposedOption":
+    """An option with the files that it names from a folder on."""
+
+    def named(word: str) -> str:
+        there = option.key in {"robot", "free"} and Path(word).exists()
+        return Path(os.path.relpath(word, folder)).as_posix() if there else word
+
+    value = option.value
+    return option._replace(
+        value=named(value) if isinstance(value, str) else list(map(named, value))
+    )

@@ -74,6 +74,9 @@ Anyway = Annotated[
         group=LOG,
     ),
 ]
+Check = Annotated[
+    list[Path] | None, Option("--check", "LOG", "Try the result on this log. Repeatable.")
+]
 Wrench = Annotated[bool, Option("--wrench", "", "Add the wrench of every observer.", group=WRENCH)]
 
 
@@ -190,8 +193,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         from vftcli.outputs.files import protected
 
         kept = taken().path
-        typed = values.get("set") or ()
-        values["settings"] = {**taken().settings, **settings_of(typed, part.choices)}
+        if part.choices:
+            typed = settings_of(values.get("set") or (), part.choices)
+            values["settings"] = {**taken().settings, **typed}
         inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
@@ -296,7 +300,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
     if default is EMPTY and (not option.metavar or NoneType in get_args(what)):
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
-    how["metavar"] = option.metavar or None
+    how |= {"metavar": option.metavar or None, "show_default": False}
     if option.completes or option.values():
         how["autocompletion"] = option.values
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)

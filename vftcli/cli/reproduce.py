@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.signals.option import WRITE, Option
+from vftcli.signals.option import Option
 
 
 @opt.command
@@ -16,17 +16,15 @@ def reproduce(
     figures: opt.Figures,
     only: Annotated[
         str | None,
-        Option("--only", "NAME,…", "Run only these: table1...table4, fig1...fig13.", group=WRITE),
+        Option("--only", "NAME,...", "Run only these: table1...table4, fig1...fig13."),
     ],
-    fast: Annotated[
-        bool, Option("--fast", "", "Use one seed a scenario instead of five.", group=WRITE)
-    ],
+    fast: Annotated[bool, Option("--fast", "", "Use one seed a scenario instead of five.")],
     force: opt.Force,
     _talk: opt.TalkOptions,
 ) -> None:
     """Run the paper's experiments beside its numbers.
 
-    On simulated equivalents, with stated seeds. Writes DIR/index.html, reproduction.md and
+    On simulated equivalents, with stated seeds. Writes PATH/index.html, reproduction.md and
     run.json. An experiment that fails is told in its row; the others are written, and the exit
     code is 1.
 

@@ -3,17 +3,17 @@
 from pathlib import Path
 from typing import Annotated
 
+import typer
+
 from vftcli.cli import options as opt
 from vftcli.cli.progress import echo
-from vftcli.signals.option import WRITE, Option, names_at
+from vftcli.signals.option import Option, names_at
 
 
 @opt.command
 def simulate_log(
     *,
-    scenario: Annotated[
-        str, Option("", "SCENARIO", "Name of a scenario (`vftcli simulate list`) or a FILE.toml.")
-    ],
+    scenario: Annotated[str, Option("", "SCENARIO", "list, a scenario's name or a FILE.toml.")],
     seed: Annotated[int | None, opt.SEED],
     log_format: Annotated[
         str,
@@ -24,21 +24,15 @@ def simulate_log(
             completes=names_at("simulation.writers:WRITERS"),
         ),
     ] = "",
-    changes: Annotated[
-        list[str] | None,
-        Option(
-            "--set",
-            "KEY=VALUE",
-            "Repeatable: servo.stiffness=soft, sensing.clock_drift=0.003, duration=8.",
-        ),
-    ],
-    output: Annotated[
-        Path, Option("-o/--output", "PATH", "The log file or bag folder.", group=WRITE)
-    ] = Path(),
+    changes: Annotated[list[str] | None, opt.SET._replace(group="")],
+    output: Annotated[Path | None, opt.OUT],
     json: opt.Json,
     force: opt.Force,
 ) -> None:
-    """Simulate an experiment: the log, and the truth beside it.
+    """Simulate an experiment, with its true forces.
+
+    They stand beside the log, as PATH.truth.parquet. The settings are the scenario's keys, as
+    duration=8 or servo.stiffness=soft; without --as the format is the arm's own.
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
@@ -57,6 +51,8 @@ def simulate_log(
         for name, title in scenarios:
             echo(f"{name:<{width}} {title}")
         return
+    if output is None:
+        raise typer.BadParameter("-o PATH says where the log goes")
     check_installed("pinocchio", "vftcli simulate")
     setup = load_scenario(scenario, changes or ())
     paths = [output, free_path(output)] if setup.pair else [output]

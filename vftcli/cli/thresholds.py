@@ -24,26 +24,18 @@ def contact_thresholds(
     columns: Annotated[str | None, ReferenceChoice.option("reference_columns", group=COMPARE)],
     anyway: opt.Anyway,
     _talk: opt.TalkOptions,
-    check: Annotated[
-        Path | None,
-        Option(
-            "--check",
-            "LOG",
-            "A log with contacts: which of them they would have caught, how late, how hard. "
-            "Where they are says --reference, else the truth beside a simulated log, else its "
-            "sensor; else the alarms are listed.",
-        ),
-    ],
+    check: opt.Check,
     json: opt.Json,
     rate: Annotated[
-        float, Option("--rate", "PER_HOUR", "False alarms per hour of all joints, or axes.")
+        float,
+        Option("--rate", "PER_HOUR", "Allow this many false alarms an hour; default 1."),
     ] = 1.0,
 ) -> None:
-    """Learn from free motion the thresholds that a robot is given.
+    """Find contact thresholds from contact-free logs.
 
-    For a stated rate of false alarms. The logs are motion that nobody touches, the longer the
-    better; of several days the worst counts. Printed as libfranka's call, franka_ros parameters,
-    URScript and TOML.
+    The longer the better; of several days the worst counts. Printed as libfranka's call,
+    franka_ros parameters, URScript and TOML. Contacts of a --check log are those of --reference,
+    else of the truth beside a simulated log, else of its sensor; else its alarms are listed.
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
@@ -59,9 +51,9 @@ def contact_thresholds(
     from vftcli.signals.errors import ParameterError
 
     asked = None if reference is None else ReferenceChoice(name=reference, columns=columns)
-    if asked is not None and check is None:
+    if asked is not None and not check:
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
-    library = Library([*logs, *([check] if check else [])])
+    library = Library([*logs, *(check or ())])
     choice = logged.asked(library, anyway=anyway)
     models = Runs()
     opened = library.open_logs(logs, choice.read)
@@ -70,25 +62,25 @@ def contact_thresholds(
     signals = [compared_signals(run) for run in free]
     thresholds = find_thresholds(signals, rate)
     counted = left_out(signals, rate)
-    checked = None
-    if check is not None:
-        touching = library.open(check, choice.read.whole)
+    checks = []
+    for log in check or ():
+        touching = library.open(log, choice.read.whole)
         pushed = modelled(*prepared(touching, choice), choice, models)
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, asked or settled_reference(pushed.recording))
-        checked = check_contacts(compared, thresholds, *truth)
+        checks.append(check_contacts(compared, thresholds, *truth))
     remarks = (*thresholds.remarks, *shown)
     if json:
-        record = thresholds_record(thresholds, counted, checked)
+        record = thresholds_record(thresholds, counted, checks)
         record |= {"logs": [run.name for run in free], "remarks": list(remarks)}
         say_json({**record, "examination": health_record(choice.examiner.examinations)})
         return
     for run in free:
         say_recording(run.recording)
     say_robots(choice.examiner.robots)
-    for remark in (*remarks, *(checked.remarks if checked else ())):
+    for remark in (*remarks, *(remark for one in checks for remark in one.remarks)):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
-    echo(thresholds_text(thresholds, counted, checked), nl=False)
+    echo(thresholds_text(thresholds, counted, checks), nl=False)
 
 
 def truth_of(

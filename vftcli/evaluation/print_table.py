@@ -127,7 +127,7 @@ def check_published(name: str, reference: str | None) -> None:
         raise ParameterError(f"no published table {name!r}; there is {', '.join(TABLES)}")
     if reference is None:
         raise ParameterError(
-            f"--published {name} sets errors beside the paper's; add --reference two-cycle"
+            f"report.published={name} sets errors beside the paper's; add --reference two-cycle"
         )
 
 
@@ -144,7 +144,7 @@ def compare_with(
     wanted = len(next(iter(published.rmse.values())))
     if joints != wanted:
         raise ParameterError(
-            f"--published {name} is of an arm with {wanted} joints, the log has {joints}"
+            f"report.published={name} is of an arm with {wanted} joints, the log has {joints}"
         )
     ours: dict[str, Array] = {}
     floor = np.full(joints, np.nan)

@@ -1,7 +1,15 @@
 """Identification: logs become a robot. `identify` is the door."""
 
-from vftcli.identification.identify import METHODS, Task, identify
-from vftcli.identification.processing import Processing
-from vftcli.identification.result import Identification
+from typing import TYPE_CHECKING
 
-__all__ = ["METHODS", "Identification", "Processing", "Task", "identify"]
+from vftcli.identification.choice import Task
+from vftcli.signals.packages import door
+
+if TYPE_CHECKING:
+    from vftcli.identification.fitting import identify
+    from vftcli.identification.processing import Processing
+    from vftcli.identification.result import Identification
+else:
+    __getattr__ = door(__name__, "fitting", "processing", "result")
+
+__all__ = ["Identification", "Processing", "Task", "identify"]

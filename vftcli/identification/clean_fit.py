@@ -81,8 +81,8 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
         ratio = float(np.max(links_explain(data, fits), initial=0.0))
         if ratio > OTHER_LINKS:
             raise IdentificationError(
-                f"{doubts[0]}. Choose another --robot, find the load with --find-payload, or let "
-                "--method base identify the links too"
+                f"{doubts[0]}. Choose another --robot, find the load with --method payload, or "
+                "let --method base identify the links too"
             )
         # Links are not at fault for torque that no links explain.
         doubts = [doubt for doubt in doubts if doubt.code != "unexplained-torque"]

@@ -108,7 +108,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
         raise IdentificationError(
             f"{data.recordings[0].name}: the current of joint {j + 1} does not follow its torque "
             f"(slope {scale:.2g}); wrong robot, sign or joint order, or the joint carries no load: "
-            "leave out --fit-constants"
+            "leave out --set identify.constants=yes"
         )
     before = profile_constant(data.robot, j)
     K, K_sd = before / scale, before * scale_sd / scale**2

@@ -69,7 +69,7 @@ def prepare_training(
     motions = [prepare(recording, robot, processing) for recording in recordings]
     if fit_constants and not all(uses_current(r, robot) for r in recordings):
         raise IdentificationError(
-            "--fit-constants needs motor currents; the logs have torques. Leave it out"
+            "--set identify.constants=yes needs motor currents; the logs have torques. Leave it out"
         )
     moves, reverses = moving_joints(motions)
     return Training(
@@ -103,8 +103,8 @@ def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
         names = ", ".join(m.recording.name for m in motions)
         raise IdentificationError(
             f"{names}: no joint moves faster than {MOVES:g} rad/s for {ENOUGH:g} s; a log at rest "
-            "identifies no friction and no inertia. Record free motion, or use --find-payload "
-            "on static poses"
+            "identifies no friction and no inertia. Record free motion, or use --method "
+            "payload on static poses"
         )
     # A tenth of a second back is enough to tell the sign of friction from an offset.
     return moves, np.min(times, axis=0) >= 0.1 * ENOUGH

@@ -33,12 +33,13 @@ def settings_of(words: Sequence[str]) -> "Settings":
     return parse_settings(words, sections())
 
 
-def source_of(text: str) -> "str | Path | Goal":
+def source_of(source: str | Path) -> "str | Path | Goal":
     """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file.
 
     Raises:
         ParameterError: If a goal is malformed, or `vftcli identify` alone serves it.
     """
+    text = str(source)
     if text in {PAPER_GAINS, LOG_GAINS}:
         return text
     if text.startswith(("delay=", "bandwidth=")):
@@ -224,3 +225,16 @@ class ObserverChoice(Choice):
         if self.gains_file is None:
             return gains
         return overlay_gains(gains, load_gains(self.gains_file, sections()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class GoalChoice(Choice):
+    """What gains are found for."""
+
+    GROUP = ESTIMATE
+
+    gains: Annotated[str, ObserverChoice.option("gains", reads=None)] = LOG_GAINS
+    threshold: Annotated[
+        str | None,
+        setting("alarm.threshold", "NUMBER(S)", "Torque of an alarm [N·m], one or one a joint."),
+    ] = None

@@ -106,13 +106,14 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
     """
     if not path.exists():
         raise ParameterError(
-            f"{path}: no such file of gains; --gains takes auto, paper, or a file of `vftcli tune`"
+            f"{path}: no such file of gains; --gains takes auto, paper, or a file of identify "
+            "--method gains"
         )
     root = RobotFile(path, "file of gains").root
     if "observers" not in root.values:
         raise ParameterError(
-            f"{path}: no [observers.*] tables; a gains file is what vftcli tune writes, as "
-            "[observers.gmo] gain = 10.0"
+            f"{path}: no [observers.*] tables; a gains file is what vftcli identify --method gains "
+            "writes, as [observers.gmo] gain = 10.0"
         )
     gains = checked_gains(root.section("observers"))
     check_gains(gains, sections, str(path))

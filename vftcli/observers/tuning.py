@@ -29,7 +29,7 @@ from vftcli.signals.remarks import Remark, fact
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
 #: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
 GOALS = {
-    "rmse": "rmse",
+    "auto": "auto",
     "delay": "delay=S (seconds)",
     "bandwidth": "bandwidth=HZ",
     "false-alarms": "false-alarms=PER_HOUR",
@@ -52,19 +52,17 @@ class Goal(NamedTuple):
     threshold: Array | None = None
 
 
-def parse_target(
-    text: str, option: str = "--match", allowed: Iterable[str] = ("delay", "bandwidth")
-) -> Goal:
-    """Read one of some goals as an option has it: ``rmse``, the others as ``delay=S``."""
+def parse_target(text: str, allowed: Iterable[str] = ("delay", "bandwidth")) -> Goal:
+    """Read one of some goals of ``--gains``: ``auto``, the others as ``delay=S``."""
     name, equals, number = text.partition("=")
     name = name.strip()
     try:
         value = float(number)
     except ValueError:
         value = float("nan")
-    if name not in allowed or not (0.0 < value < np.inf if name != "rmse" else not equals):
+    if name not in allowed or not (0.0 < value < np.inf if name != "auto" else not equals):
         forms = " or ".join(GOALS[each] for each in allowed)
-        raise ParameterError(f"{option} {text!r} is not {forms}, a positive number")
+        raise ParameterError(f"--gains {text!r} is not {forms}, a positive number")
     return Goal(name, value)
 
 
@@ -78,8 +76,8 @@ def match_observers(
     """
     if setup.as_printed:
         raise ParameterError(
-            "--match tunes the corrected observers; the printed ones have another response. Leave "
-            "--match or --as-printed away"
+            "--gains tunes the corrected observers; the printed ones have another response. Leave "
+            "--gains or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
     remarks = [
@@ -96,7 +94,7 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
     """One observer with the gain that reaches a delay or bandwidth on every joint."""
     if type(observer) not in KNOBS:
         raise ParameterError(
-            f"--match cannot tune {observer.name}: it has no {goal.name} of its own to set; "
+            f"--gains cannot tune {observer.name}: it has no {goal.name} of its own to set; "
             "choose fdo, gmo, kfo-fe or kfo-zoh with --observer"
         )
     knob, low, high = KNOBS[type(observer)]
@@ -160,24 +158,24 @@ class Tuned(NamedTuple):
 
 
 def parse_goal(text: str, threshold: str | None = None) -> Goal:
-    """Read what ``--goal`` and ``--threshold`` ask for.
+    """Read what ``--gains`` and ``alarm.threshold`` ask for.
 
     Args:
         text: As `parse_target` reads it, any of `GOALS`.
         threshold: One number or one a joint, positive. [N·m]
     """
-    goal = parse_target(text, "--goal", GOALS)
+    goal = parse_target(text, GOALS)
     level = None
     if threshold is not None:
         level = np.array(numbers(threshold) or [np.nan])
         if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
             raise ParameterError(
-                f"--threshold {threshold!r} is not a positive number or one a joint [N·m]"
+                f"alarm.threshold={threshold} is not a positive number or one a joint [N·m]"
             )
     if goal.name == "false-alarms" and level is None:
         raise ParameterError(
-            "--goal false-alarms needs to know what raises an alarm: add --threshold N·m, one "
-            "number or one a joint"
+            "--gains false-alarms needs to know what raises an alarm: add --set "
+            "alarm.threshold=N·m, one number or one a joint"
         )
     return goal._replace(threshold=level)
 
@@ -195,13 +193,13 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     threshold = goal.threshold
     if threshold is not None and len(threshold) not in {1, spectra.joints}:
         raise ParameterError(
-            f"--threshold has {len(threshold)} values; give one, or one for each of "
+            f"alarm.threshold has {len(threshold)} values; give one, or one for each of "
             f"{spectra.joints} joints"
         )
     first_order = rates(momentum, spectra, goal)
     # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
     shared = float(np.min(first_order))
-    if goal.name == "rmse":
+    if goal.name == "auto":
         grid = natural_frequencies(spectra.step)
         shared = float(grid[np.argmin(expected_error(momentum, grid, spectra).mean(axis=1))])
     single = np.full(spectra.joints, shared)
@@ -243,7 +241,7 @@ def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
 
 def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tuple[Remark, ...]:
     """A warning on every gain that reached a bound of the search."""
-    if goal.name not in {"rmse", "false-alarms"}:
+    if goal.name not in {"auto", "false-alarms"}:
         return ()
     grid = natural_frequencies(spectra.step)
     return tuple(r for line in tuned for r in bound_remarks(line.observer, line.rate, grid))
@@ -272,7 +270,7 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     if goal.name == "bandwidth" and kind is kalman_smoother:
         fraction = float(kalman_smoother(np.ones(1)).tuning(spectra.step, 1).bandwidth[0])
         return np.full(spectra.joints, goal.value / fraction)
-    if goal.name == "rmse" or kind is kalman_smoother:
+    if goal.name == "auto" or kind is kalman_smoother:
         return np.asarray(grid[np.argmin(expected_error(kind, grid, spectra), axis=0)])
     n, start = spectra.joints, kind(np.full(spectra.joints, 10.0))
     return np.array(tune(start, goal, spectra.step, n).tuning(spectra.step, n).omega_n)
@@ -289,7 +287,8 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
         listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
         raise ParameterError(
             f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
-            f"too loud for the threshold on {listed}; raise --threshold or remove the bias"
+            f"too loud for the threshold on {listed}; raise --set alarm.threshold=N·m or remove "
+            "the bias"
         )
     return few
 

@@ -26,7 +26,7 @@ SUBJECTS = {
                "zero-far-from-start", "zero-swings"),
     "vendor's torque": ("vendor-sign", "zero-tau-ext"),
 }  # fmt: skip
-#: Findings that ``--find-payload`` answers.
+#: Findings that ``identify --method payload`` answers.
 LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {"contact-is-load"}
 
 
@@ -53,7 +53,7 @@ def payload_command(analysis: Analysis) -> str:
     """The command that finds what hangs on the flange."""
     runs = [run.recording for run in analysis.motion.runs]
     free = ["--free", path_of(runs[0])] if runs else []
-    found = ("--find-payload", "--robot", robot_option(analysis), "-o", "loaded.toml")
+    found = ("--method", "payload", "--robot", robot_option(analysis), "-o", "loaded.toml")
     return command("identify", analysis.recording, *free, *found)
 
 

@@ -15,14 +15,13 @@ SHARES = 100
 
 
 def thresholds_text(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ContactCheck]
 ) -> str:
     """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
     parts = [terminal(thresholds_grid(thresholds))]
     if counted:
         parts.append(terminal(left_out_grid(counted)))
-    if check is not None:
-        parts.append(f"{terminal(check_grid(check))}{check_line(check)}\n")
+    parts += [f"{terminal(check_grid(check))}{check_line(check)}\n" for check in checks]
     parts += [f"{name}:\n{text}" for name, text in calls(thresholds).items()]
     return "\n".join(parts)
 
@@ -155,7 +154,7 @@ def threshold_rows(
 
 
 def thresholds_record(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], check: ContactCheck | None
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ContactCheck]
 ) -> dict[str, Any]:
     """All of it for machines."""
     count = len(thresholds.joints)
@@ -168,7 +167,7 @@ def thresholds_record(
         "force": of_wrench[axes] if thresholds.force else None,
         "calls": calls(thresholds),
         "left_out": [one._asdict() for one in counted],
-        "check": None if check is None else check_record(check),
+        "checks": list(map(check_record, checks)),
         "remarks": list(thresholds.remarks),
     }
 

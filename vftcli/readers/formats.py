@@ -21,7 +21,7 @@ from vftcli.signals.letters import printable
 class LogFormat:
     """One log format."""
 
-    name: str  #: Name for ``--format``.
+    name: str  #: Name for ``log.format``.
     title: str  #: What it is.
     recording: str  #: How a user records one.
     takes: str  #: Which signals are taken from it.
@@ -147,8 +147,7 @@ def description(file: LogFile) -> str:
         )
     return (
         f"a binary file of no kind that is known (it begins {file.head[:8].hex(' ')}); export the "
-        "log as CSV, Parquet or MCAP, or name its format: --set log.format=NAME (vftcli help "
-        "formats lists them)"
+        "log as CSV, Parquet or MCAP, or name its format: --set log.format=NAME (help formats)"
     )
 
 

@@ -161,7 +161,8 @@ def _recognise(file: LogFile) -> LogFormat:
     if not found:
         raise UnknownFormatError(f"{file.path}: not recognised as a log: {description(file)}.")
     raise UnknownFormatError(
-        f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which with --format."
+        f"{file.path}: could be {' or '.join(r.name for r in found)}. Say which: "
+        "--set log.format=NAME."
     )
 
 

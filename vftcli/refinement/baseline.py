@@ -2,7 +2,7 @@
 
 The bias of the whole log (`vftcli.refinement.whole_log`) comes off μ before an observer runs.
 `best` runs on what is left, tuned on the spectra of that; the other observers do where
-``--remove-bias whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
+``bias.method=whole-log`` asks for it. Nothing here refuses a log: what cannot be done is said,
 and `best` is made of what is left.
 """
 
@@ -166,7 +166,7 @@ class Baselines:
         plain = self.plain.tunable
         called_for = None
         if gains and plain is not None:
-            least = tune_all(plain, Goal("rmse"))
+            least = tune_all(plain, Goal("auto"))
             called_for = {line.section: dict(line.gains) for line in least}
         return LogSpectra(plain=plain, best=self.best.tunable, gains=called_for)
 

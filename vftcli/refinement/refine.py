@@ -90,7 +90,7 @@ class Refinement(Shown):
     curves: Mapping[str, Curve]  #: Observer that was tuned → the curve that was minimised.
     #: Where each observer's error comes from, one an observer; none without spectra.
     budgets: tuple[Budget, ...]
-    removed: str  #: What ``--remove-bias`` asked for.
+    removed: str  #: What ``bias.method`` asked for.
     remarks: tuple[Remark, ...]  #: What the reader of the estimates should know.
 
 
@@ -108,7 +108,7 @@ def refine(
         found: What the observers run on.
         observers: The observers.
         estimates: Their estimates, in this order.
-        removed: What ``--remove-bias`` asked for.
+        removed: What ``bias.method`` asked for.
         gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
     """
     # Observers may run on different terms: each is measured on its own.

@@ -99,7 +99,7 @@ def difference(laid: LaidOver, name: str, cutoff: float | None) -> Difference:
     if np.count_nonzero(known) < 16:
         raise ReferenceTorqueError(
             f"{motion.name}: only {np.count_nonzero(known)} samples have a partner in the free "
-            "run; record a longer one, or choose other free cycles with --free-cycles"
+            "run; record a longer one, or choose other cycles: --set two-cycle.free-cycles=…"
         )
     corrected = RUNGS[name].corrected
     signal = at(known, laid.torque)

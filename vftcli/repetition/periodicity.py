@@ -86,17 +86,17 @@ def check_stated(recording: Recording, stated: float | None, duration: float) ->
     if stated is None:
         return
     if not (np.isfinite(stated) and stated > 0):
-        raise ReferenceTorqueError(f"--period is {stated:g} s; it must be positive")
+        raise ReferenceTorqueError(f"two-cycle.period is {stated:g} s; it must be positive")
     if stated > (1.0 - LEAST_REPEATED) * duration:
         raise ReferenceTorqueError(
             f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
-            "the arm moves, which must hold more than one cycle; give a shorter --period, or "
-            "in its place a free run in another log with --free"
+            "the arm moves, which must hold more than one cycle; give a shorter "
+            "two-cycle.period, or in its place a free run in another log with --free"
         )
     if stated < 4.0 * recording.median_step:
         raise ReferenceTorqueError(
             f"{recording.name}: a period of {stated:g} s is shorter than four samples "
-            f"({recording.median_step:g} s each); --period is in seconds"
+            f"({recording.median_step:g} s each); two-cycle.period is in seconds"
         )
 
 

@@ -132,7 +132,8 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
     """Free runs in other logs, laid under a log."""
     if motion.choice.cycles or motion.choice.period is not None:
         raise ReferenceTorqueError(
-            "--period and --free-cycles are for cycles of one log; leave them away with --free"
+            "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
+            "away with --free"
         )
     recording = motion.log.recording
     remarks = []
@@ -160,8 +161,8 @@ def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None
         return (None, min(LOW_PASS, 0.2 / step))
     if not low_pass < 0.5 / step:
         raise ReferenceTorqueError(
-            f"--low-pass {low_pass:g} is not a cutoff between 0 and {0.5 / step:.4g} Hz, none or "
-            "auto"
+            f"two-cycle.low-pass={low_pass:g} is not a cutoff between 0 and {0.5 / step:.4g} Hz, "
+            "none or auto"
         )
     return (low_pass,)
 

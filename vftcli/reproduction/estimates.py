@@ -38,7 +38,7 @@ from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 VARIANTS: dict[str, dict[str, Any]] = {
     AS_PRINTED: {"as_printed": True},
     CORRECTED: {},
-    DENSITY: {"numbers": ["kfo.noise_convention=density"]},
+    DENSITY: {"settings": {"kfo.noise_convention": "density"}},
     "at 1.59 Hz": {"gains": "bandwidth=1.59"},
 }
 #: Variant → its observer, the one that the paper's virtual sensor takes.

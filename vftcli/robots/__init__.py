@@ -1,6 +1,6 @@
 """Robots: the built-in profiles, and the loaders of users' own files."""
 
-from collections.abc import Sequence
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -60,13 +60,16 @@ def built_in(path: Path) -> "Robot":
     return load_profile(path)
 
 
-def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = ()) -> "Robot":
+#: Between a xacro and its arguments, as ROS has them: ``ur.xacro ur_type:=ur5e``.
+ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
+
+
+def load_robot(robot: str | Path, *, tip: str = "") -> "Robot":
     """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
 
     Args:
-        robot: The name, or the file.
+        robot: The name, or the file; arguments of a xacro follow it as ``NAME:=VALUE``.
         tip: The link or joint at the arm's end in a description with hands or several arms.
-        arguments: Arguments of a xacro, each ``NAME=VALUE``.
 
     Raises:
         RobotError: If there is no such profile or file, or it is not a valid description.
@@ -75,12 +78,13 @@ def load_robot(robot: str | Path, *, tip: str = "", arguments: Sequence[str] = (
         raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
     from vftcli.robots.robot_file import DESCRIPTIONS
 
-    path = PROFILES.get(plain_name(str(robot)), Path(robot))
+    name, *arguments = ARGUMENT.split(str(robot))
+    path = PROFILES.get(plain_name(name), Path(name))
     ending = path.suffix.lower()
     if ending == ".toml":
-        for option, given in (("--tip", tip), ("--robot-arg", arguments)):
-            if given:
-                raise RobotError(f"{option} is for a URDF, xacro or MJCF; {robot} is a robot file")
+        if tip or arguments:
+            given = arguments[0] if arguments else "--tip"
+            raise RobotError(f"{given} is for a URDF, xacro or MJCF; {name} is a robot file")
         if path in PROFILES.values():
             return built_in(path)
         from vftcli.robots.profile import load_profile

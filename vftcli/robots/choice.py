@@ -1,6 +1,5 @@
 """What a user may choose of the robot: which arm, its friction model, what it carries."""
 
-import re
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
 
 #: Values of ``model.friction``: the robot file's, none at all, or that of a simulator.
 FRICTION = ("profile", "none", "model")
-#: Between a xacro and its arguments, as ROS has them: ``ur.xacro ur_type:=ur5e``.
-ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
 DECLARED = "log"  #: Value of ``--payload``: what the log says that the controller was told of.
 
 
@@ -97,10 +94,7 @@ class RobotChoice(Choice):
         Raises:
             RobotError: If there is no such robot.
         """
-        name, *arguments = ARGUMENT.split(self.name or "")
-        return load_robot(
-            name, tip=self.tip, arguments=[a.replace(":=", "=", 1) for a in arguments]
-        )
+        return load_robot(self.name or "", tip=self.tip)
 
 
 def choices_for(recording: "Recording") -> str:

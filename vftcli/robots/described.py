@@ -57,7 +57,7 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
         root = xml_root(urdf_of_xacro(path, arguments), path)
         remarks = (fact("xacro-run", file=path.name),)
     elif arguments:
-        raise RobotError(f"{path}: --robot-arg {arguments[0]!r} is for a xacro, which this is not")
+        raise RobotError(f"{path}: {arguments[0]!r} is for a xacro, which this is not")
     if root.tag not in READERS:
         other = f"its first element is <{root.tag}>, not <robot> or <mujoco>"
         what = CONVERSIONS.get(root.tag, other)

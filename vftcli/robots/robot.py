@@ -108,8 +108,8 @@ class Robot(Shown):
     ros_state: str = ""
     #: Names of joints that turn on and on: their positions may be logged within a turn.
     endless: tuple[str, ...] = ()
-    #: The friction that a simulator's description gives the joints, for ``--friction model``; empty
-    #: where there is none.
+    #: The friction that a simulator's description gives the joints, for ``model.friction=model``;
+    #: empty where there is none.
     simulated_friction: tuple[JointFriction, ...] = ()
     payload: Payload | None = None  #: The load mounted on the flange, or None.
     #: Further loads by name, for ``--payload NAME``.
@@ -191,18 +191,18 @@ class Robot(Shown):
         return replace(self, payload=payload)
 
     def without_friction(self) -> "Robot":
-        """Return the robot with no friction model, for ``--friction none``."""
+        """Return the robot with no friction model, for ``model.friction=none``."""
         return replace(self, friction=())
 
     def with_simulated_friction(self) -> "Robot":
-        """Return the robot with the friction of a simulator, for ``--friction model``.
+        """Return the robot with the friction of a simulator, for ``model.friction=model``.
 
         Raises:
             RobotError: If its description gives none.
         """
         if not self.simulated_friction:
             raise RobotError(
-                f"{self.name}: --friction model is what an MJCF gives its joints (damping, "
+                f"{self.name}: model.friction=model is what an MJCF gives its joints (damping, "
                 "frictionloss); this robot's description gives none"
             )
         return replace(self, friction=self.simulated_friction)

@@ -18,7 +18,7 @@ from xml.etree import ElementTree as ET
 from vftcli.robots.robot_file import robot_text
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
-from vftcli.signals.parsing import assignment, did_you_mean
+from vftcli.signals.parsing import did_you_mean
 
 #: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
 DEEPEST = 500
@@ -30,7 +30,6 @@ DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
 USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
 NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
 
-FORM = "NAME=VALUE"
 ABOVE = 5  #: Folders above the file in which packages are looked for.
 #: Time of a processor in which a xacro must be expanded; large ones take below one. [s]
 SECONDS = 10
@@ -80,7 +79,7 @@ def xml_root(text: str, path: Path) -> ET.Element:
 
 def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     """The URDF that a xacro writes."""
-    given = dict(assignment(word, "--robot-arg", FORM) for word in arguments)
+    given = dict(word.split(":=", 1) for word in arguments)
     line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
     otherwise = f"; or give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
     for module in ("xacro", "xacrodoc"):
@@ -94,15 +93,15 @@ def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
     if unknown := next((name for name in given if name not in {**used, **declared}), None):
         meant = did_you_mean(unknown, {**used, **declared})
         raise RobotError(
-            f"{path}: the xacro takes no argument {unknown!r}.{meant} As --robot-arg {takes}"
+            f"{path}: the xacro takes no argument {unknown!r}.{meant} Behind its name {takes}"
         )
     if why and (missing := [name for name in used if name not in {**declared, **given}]):
         raise RobotError(
-            f"{path}: the xacro needs {', '.join(missing)}: give --robot-arg {missing[0]}=VALUE; "
-            f"{takes}"
+            f"{path}: the xacro needs {', '.join(missing)}: give --robot '{path} "
+            f"{missing[0]}:=VALUE'; {takes}"
         )
     if why:
-        raise RobotError(f"{path}: the xacro cannot be expanded: {why}; as --robot-arg {takes}")
+        raise RobotError(f"{path}: the xacro cannot be expanded: {why}; {takes}")
     text: str = made["text"]
     return text
 

@@ -11,6 +11,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from inspect import get_annotations
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self, get_args
 
 from vftcli.signals.errors import ParameterError
@@ -149,9 +150,15 @@ class Choice:
         return words | ({NUMBERS: [f"{name}={text}" for name, text in own.items()]} if own else {})
 
     @classmethod
-    def parsed(cls, **words: Any) -> Self:  # noqa: ANN401 - texts, numbers, lists of them
-        """The choice that typed words state; None and an empty list are as if not given."""
+    def parsed(
+        cls,
+        *,
+        settings: Mapping[str, str] = MappingProxyType({}),
+        **words: Any,  # noqa: ANN401 - texts, numbers, lists of them
+    ) -> Self:
+        """The choice that typed words and settings state; None and an empty list state nothing."""
         options, values = cls.options(), {}
+        words |= cls.words_of(settings)
         for word, typed in words.items():
             field, what, option = options[word]
             if typed is not None and (typed or not option.several):

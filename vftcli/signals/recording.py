@@ -142,7 +142,9 @@ class Recording(Shown):
         """
         value: Array | None = getattr(self, name)
         if value is None:
-            derive = ", or derive them from the positions: --derive dq" if name == "dq" else ""
+            derive = (
+                ", or derive them from the positions: --set log.derive=dq" if name == "dq" else ""
+            )
             raise MissingSignalError(
                 f"{self.name}: the log has no {MEANINGS[name]} ({name}); it has "
                 f"{', '.join(self.signals)}. Record them, or name their columns with --columns"

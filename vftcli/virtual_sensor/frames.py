@@ -26,8 +26,8 @@ ROTATION_TOLERANCE = 1e-6
 FRAMES: dict[str, str] = {
     "flange": "flange axes, moment about the flange point",
     "base": "base axes, moment about the flange point",
-    "tool": "tool axes, moment about the tool point (--tool)",
-    "sensor": "sensor axes, moment about the sensor's origin (--sensor-pose)",
+    "tool": "tool axes, moment about the tool point (virtual-sensor.tool)",
+    "sensor": "sensor axes, moment about the sensor's origin (virtual-sensor.sensor)",
 }
 
 
@@ -58,15 +58,16 @@ def frame_pose(frame: str, mounting: Mounting) -> Pose:
         if mounting.tool is None:
             raise ParameterError(
                 "the robot has no tool, so there is no Jacobian for it: give its pose on the "
-                "flange with --tool x,y,z,roll,pitch,yaw, or a [tool.NAME] section in the robot "
-                "file and --tool NAME"
+                "flange with --set virtual-sensor.tool=x,y,z,roll,pitch,yaw, or a [tool.NAME] "
+                "section in the robot file and --set virtual-sensor.tool=NAME"
             )
         return mounting.tool
     if frame == "sensor":
         if mounting.sensor is None:
             raise ParameterError(
-                "the sensor's pose on the flange is not known: give it with --sensor-pose "
-                "x,y,z,roll,pitch,yaw, or --sensor-pose fit to estimate it from the log"
+                "the sensor's pose on the flange is not known: give it with --set "
+                "virtual-sensor.sensor=x,y,z,roll,pitch,yaw, or virtual-sensor.sensor=fit to "
+                "estimate it from the log"
             )
         return mounting.sensor
     return IDENTITY

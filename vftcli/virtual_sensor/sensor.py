@@ -64,7 +64,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     if not s[1] > LEAST_DIRECTIONS * s[0]:
         raise ParameterError(
             "the sensor's pose cannot be found: the forces lie on one line; push in two "
-            "directions, or give the pose with --sensor-pose x,y,z,roll,pitch,yaw"
+            "directions, or give the pose with --set virtual-sensor.sensor=x,y,z,roll,pitch,yaw"
         )
     # A reflection may fit better than any rotation; the smallest direction gives way.
     turn = np.diag([1.0, 1.0, np.sign(np.linalg.det(Vt.T @ U.T))])
@@ -92,8 +92,8 @@ def find_mounting(
     reading, frame = recording.require("wrench"), recording.wrench_frame or UNSTATED
     if frame.axes != "sensor":
         raise ParameterError(
-            f"--sensor-pose fit: the log's wrench is in {frame}, not in sensor axes; name it with "
-            "--columns wrench[sensor]=…, or leave the option out"
+            f"virtual-sensor.sensor=fit: the log's wrench is in {frame}, not in sensor axes; name "
+            "it with --columns wrench[sensor]=…, or leave the setting away"
         )
     ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, frame.factor * reading)

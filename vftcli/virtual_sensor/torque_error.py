@@ -57,7 +57,7 @@ class TorqueError:
 
 
 def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
-    """The torque error that ``--torque-sd`` states."""
+    """The torque error that ``virtual-sensor.torque-sd`` states."""
     if text == OWN:
         own = {torque.name: torque.sd for torque in torques if torque.sd is not None}
         without = tuple(torque.name for torque in torques if torque.sd is None)
@@ -68,8 +68,8 @@ def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     values = np.array(numbers(text) or ())
     if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
         raise ParameterError(
-            f"--torque-sd {text!r} is not {OWN!r}, one positive number, or one for each of "
-            f"{joints} joints [N·m]"
+            f"virtual-sensor.torque-sd {text!r} is not {OWN!r}, one positive number, or one for "
+            f"each of {joints} joints [N·m]"
         )
     given = np.array(np.broadcast_to(values, (joints,)))
     sd = {torque.name: given for torque in torques}

@@ -7,13 +7,15 @@ from vftcli.signals.errors import ParameterError
 
 
 def test_a_report_has_its_recording_unless_none_is_asked_for() -> None:
-    assert OutputChoice.parsed() == OutputChoice(extras=(), rrd_detail=LEVELS)
-    assert OutputChoice(extras=("rrd",), rrd_detail=FULL).writes_recording
-    assert not OutputChoice.parsed(rrd_detail=NONE).writes_recording
+    assert OutputChoice.parsed() == OutputChoice(extras=(), detail=LEVELS)
+    assert OutputChoice(extras=("rrd",), detail=FULL).writes_recording
+    assert not OutputChoice.parsed(settings={"recording.detail": NONE}).writes_recording
 
 
 def test_words_that_mean_nothing_are_refused() -> None:
-    with pytest.raises(ParameterError, match="--rrd-detail much is none of full, levels and none"):
-        OutputChoice.parsed(rrd_detail="much")
+    with pytest.raises(
+        ParameterError, match=r"recording\.detail=much is none of full, levels and none"
+    ):
+        OutputChoice.parsed(settings={"recording.detail": "much"})
     with pytest.raises(ParameterError, match="writes no recording"):
-        OutputChoice(extras=("rrd",), rrd_detail=NONE)
+        OutputChoice(extras=("rrd",), detail=NONE)

@@ -141,6 +141,6 @@ def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
 ) -> None:
     write_report(tmp_path, without_reference, command="")
     assert (tmp_path / "recording.rrd").exists()
-    none = OutputChoice(rrd_detail=NONE)
+    none = OutputChoice(detail=NONE)
     write_report(tmp_path, without_reference, command="", force=True, choice=none)
     assert not (tmp_path / "recording.rrd").exists()

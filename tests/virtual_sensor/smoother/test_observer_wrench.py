@@ -28,7 +28,7 @@ from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
 
 CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
-FREE = FreeChoice.parsed(free_part="0.3:4")
+FREE = FreeChoice.parsed(free=["0.3:4"])
 
 
 def choice(*names: str, free: FreeChoice = FREE, **wrench: object) -> AnalysisChoice:

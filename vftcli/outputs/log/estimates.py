@@ -45,7 +45,7 @@ def estimates_table(analysis: Analysis, rows: slice = ALL) -> "pl.DataFrame":
     ``contact``, the row's number in the list of contacts or null, where they are listed; where a
     wrench is asked for, and of ``best`` where contacts are listed, ``wrench/<observer>/fx``…``mz``
     [N, N·m], null where the pose cannot tell it, ``wrench_sd/<observer>/fx``…,
-    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by ``--solver map``, what it says of
+    ``null_space/<observer>`` [N·m] and ``sigma_min`` [m]; by the solver ``map``, what it says of
     the masked samples is apart in ``wrench_masked/<observer>/fx``….
     What is not known is null.
     """

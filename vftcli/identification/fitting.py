@@ -1,12 +1,13 @@
 """Logs in, a robot out: `vftcli identify` in the order of its data."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import polars as pl
 
+from vftcli.identification.choice import Task
 from vftcli.identification.methods import chosen_method, friction_method, whole_arm
 from vftcli.identification.payload import (
     LoadFit,
@@ -32,43 +33,17 @@ from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
-from vftcli.signals.errors import IdentificationError, ParameterError
+from vftcli.signals.errors import IdentificationError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
-#: Name at the command line → method; "auto" chooses between the first two.
-METHODS: dict[str, Callable[[Training], MethodResult]] = {
+#: Name at the command line → method; without a name the first two are chosen between.
+FITS: dict[str | None, Callable[[Training], MethodResult]] = {
     "friction": friction_method,
     "base": whole_arm,
     "targets": targets_method,
-    "auto": chosen_method,
+    None: chosen_method,
 }
-
-
-@dataclass(frozen=True, kw_only=True)
-class Task:
-    """Method and options of an identification."""
-
-    method: str | None = "friction"  #: A name in `METHODS`, or None for a payload alone.
-    name: str = ""  #: Name of the new robot.
-    find_payload: bool = False  #: Whether a load on the flange is sought.
-    fit_constants: bool = False  #: Whether the friction method also fits drive constants.
-    #: Whether the joints have friction to be fitted; a simulator's may have none.
-    friction: bool = True
-    processing: Processing = field(default_factory=Processing)  #: Cutoff and decimation.
-
-    def __post_init__(self) -> None:
-        if self.method is not None and self.method not in METHODS:
-            there = ", ".join(METHODS)
-            raise ParameterError(f"--method {self.method!r}; there is {there}")
-        if self.method is None and not self.find_payload:
-            raise ParameterError(f"nothing to identify: give --method {'|'.join(METHODS)}")
-        if self.fit_constants and self.method != "friction":
-            raise ParameterError("--fit-constants is an option of --method friction")
-        if self.method == "targets" and not self.friction:
-            raise ParameterError(
-                "--method targets reads the controller's friction; leave out --friction none"
-            )
 
 
 def identify(
@@ -81,7 +56,7 @@ def identify(
     """Identify a robot from logs of free motion, a load from logs that carry it.
 
     Args:
-        logs: Training logs; with `find_payload` the logs that carry the load, or the pair.
+        logs: Training logs; for a payload the logs that carry the load, or the pair.
         robot: The profile to start from.
         task: What to identify.
         held_out: Logs to score on.
@@ -94,17 +69,18 @@ def identify(
     """
     sources = logs if free is None else [*logs, free]
     refuse_repeated_logs(sources)
-    refuse_repeated_logs(held_out, "--validate")
-    load = find_load(logs, robot, free) if task.find_payload else None
+    refuse_repeated_logs(held_out, "--check")
+    load = find_load(logs, robot, free) if task.method == "payload" else None
+    processing = Processing(cutoff=task.cutoff)
     train = logs if free is None or load is None else [free]
     train = [log for log in train if load is None or not load.carried_by(log)]
     result = MethodResult("payload", robot)
-    if task.method is not None and train:
-        data = prepare_training(train, robot, task.processing, task.fit_constants, task.friction)
-        result = METHODS[task.method](data)
+    if load is None:
+        data = prepare_training(train, robot, processing, task.constants, task.friction)
+        result = FITS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
-        score(log, role, robot, new, task.processing)
+        score(log, role, robot, new, processing)
         for role, some in (("train", train), ("held-out", held_out))
         for log in some
     ]
@@ -127,7 +103,7 @@ def identify(
         shape_choices=pl.DataFrame(result.shape_choices, schema=SHAPE_CHOICES, orient="row"),
         base=result.base,
         traces=traces,
-        processing=task.processing.settings_record(logs[0].median_step),
+        processing=processing.settings_record(logs[0].median_step),
         remarks=tuple(remarks),
     )
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))

@@ -1,4 +1,4 @@
-"""What `vftcli init` writes runs: commands beside it give the numbers of the options typed."""
+"""What `vftcli inspect -o` writes runs: commands beside it give the numbers of typed options."""
 
 import json
 import shutil
@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli.config import NAME
-from vftcli.cli.init import from_folder
+from vftcli.cli.inspect import from_folder
+from vftcli.proposal import ProposedOption
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 
@@ -21,7 +22,9 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def options(folder: Path) -> dict[str, object]:
-    return tomllib.loads((folder / NAME).read_text("utf-8"))
+    """What is taken; a group of settings that are only there to be taken is empty."""
+    found = tomllib.loads((folder / NAME).read_text("utf-8"))
+    return {key: value for key, value in found.items() if value != {}}
 
 
 @pytest.mark.slow
@@ -36,7 +39,7 @@ def options(folder: Path) -> dict[str, object]:
 def test_what_is_written_gives_the_numbers_of_typed_options(
     run, here: Path, log: str, given: tuple[str, ...], expected: dict[str, str]
 ) -> None:
-    code, _, err = run("init", FIXTURES / log, *given)
+    code, _, err = run("inspect", FIXTURES / log, *given, "-o", NAME)
     assert (code, options(here)) == (0, expected)
     assert f"wrote {NAME}: robot, reference; read unasked" in err
     asked = ("compare", FIXTURES / log, "--observer", "gmo", "--json")
@@ -52,7 +55,7 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     for name in ("load_14harm.csv", "free_14harm.csv", "push_pose.csv"):
         shutil.copy(logs / "ur10e" / name, here)
     named = ("load_14harm.csv", "free_14harm.csv", "push_pose.csv")
-    code, out, err = run("init", *named, "--robot", "ur10e", "--json")
+    code, out, err = run("inspect", *named, "--robot", "ur10e", "--json", "-o", NAME)
     assert code == 0
     found = {
         "robot": "ur10e",
@@ -62,7 +65,7 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
     }
     assert options(here) == found == json.loads(out)["options"]
     assert '# free = ["push_pose.csv"]' in (here / NAME).read_text("utf-8")
-    asked = ("load_14harm.csv", "--observer", "gmo", "--no-contacts")
+    asked = ("load_14harm.csv", "--observer", "gmo", "--set", "contacts.list=no")
     assert run("report", *asked, "-o", "kept")[0] == 0
     typed = ["--robot", "ur10e", "--columns", found["columns"], "--free", "free_14harm.csv"]
     (here / NAME).unlink()
@@ -75,14 +78,14 @@ def test_a_second_log_is_offered_as_free_motion(run, here: Path, logs: Path) -> 
 @pytest.mark.slow
 def test_an_effort_that_is_not_what_it_is_called_is_written(run, here: Path, samples: Path) -> None:
     log = samples / "reach" / "ros2_ur_effort_torque"
-    assert run("init", log, "--robot", "ur5")[0] == 0
-    assert options(here) == {"robot": "ur5", "effort": "torque-without-gravity"}
+    assert run("inspect", log, "--robot", "ur5", "-o", NAME)[0] == 0
+    assert options(here) == {"robot": "ur5", "log": {"effort": "torque-without-gravity"}}
     assert run("compare", log, "--reference", "zero", "--interval", "0.5:3.9")[0] == 0
 
 
 @pytest.mark.slow
 def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -> None:
-    code, _, err = run("init", logs / "libfranka_sim" / "pushes.csv.gz")
+    code, _, err = run("inspect", logs / "libfranka_sim" / "pushes.csv.gz", "-o", NAME)
     assert (code, options(here)) == (0, {})
     assert "which arm it is stands open" in err
     assert '# robot = "panda"\n' in (here / NAME).read_text("utf-8")
@@ -90,17 +93,17 @@ def test_what_is_not_settled_is_there_to_be_taken(run, here: Path, logs: Path) -
 
 def test_a_file_that_is_there_is_not_written_over(run, here: Path) -> None:
     (here / NAME).write_text("robot = 'ur3'\n", "utf-8")
-    code, _, err = run("init", FIXTURES / "panda_bag")
+    code, _, err = run("inspect", FIXTURES / "panda_bag", "-o", NAME)
     assert (code, err.count("\n")) == (1, 1)
     assert "--force" in err
     assert options(here) == {"robot": "ur3"}
-    assert run("init", FIXTURES / "panda_bag", "--force", "-q")[0] == 0
+    assert run("inspect", FIXTURES / "panda_bag", "-o", NAME, "--force", "-q")[0] == 0
     assert options(here)["robot"] == "panda"
 
 
 def test_what_cannot_be_read_leaves_no_file(run, here: Path) -> None:
     for words in (("nowhere.csv",), (FIXTURES / "panda_bag", "--robot", "ur9")):
-        code, _, err = run("init", *words)
+        code, _, err = run("inspect", *words, "-o", NAME)
         assert (code, err.count("error: ")) == (1, 1)
         assert not (here / NAME).exists()
 
@@ -108,7 +111,25 @@ def test_what_cannot_be_read_leaves_no_file(run, here: Path) -> None:
 def test_files_are_named_from_the_folder_of_the_file(here: Path) -> None:
     (here / "sub").mkdir()
     (here / "arm.toml").touch()
-    assert from_folder(here / "sub", "robot", "arm.toml") == "../arm.toml"
-    assert from_folder(Path(), "free", ["arm.toml", "0:4"]) == ["arm.toml", "0:4"]
-    assert from_folder(here / "sub", "columns", "arm.toml") == "arm.toml"
-    assert from_folder(here / "sub", "robot", "ur5") == "ur5"
+
+    def named(folder: Path, key: str, value: str | list[str]) -> str | list[str]:
+        return from_folder(folder, ProposedOption("", key, value)).value
+
+    assert named(here / "sub", "robot", "arm.toml") == "../arm.toml"
+    assert named(Path(), "free", ["arm.toml", "0:4"]) == ["arm.toml", "0:4"]
+    assert named(here / "sub", "columns", "arm.toml") == "arm.toml"
+    assert named(here / "sub", "robot", "ur5") == "ur5"
+
+
+def test_the_file_that_is_there_is_not_read(run, here: Path) -> None:
+    """What is written is what the log calls for, not what was kept before."""
+    (here / NAME).write_text("robot = 'ur5'\nno TOML", "utf-8")
+    code, _, err = run("inspect", FIXTURES / "panda_bag", "-o", NAME, "--force")
+    assert (code, options(here)["robot"]) == (0, "panda")
+    assert "note: vftcli.toml gives" not in err
+
+
+def test_nothing_is_written_without_a_name(run, here: Path) -> None:
+    code, out, _ = run("inspect", FIXTURES / "panda_bag", FIXTURES / "ur5_sensor.parquet", "--json")
+    assert (code, list(here.iterdir())) == (0, [])
+    assert [one["joints"] for one in json.loads(out)["logs"]] == [7, 6]

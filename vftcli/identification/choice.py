@@ -1,0 +1,58 @@
+"""Task: what a user may choose of an identification."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import Choice, Option, is_yes, setting
+from vftcli.signals.parsing import interval
+
+#: What ``--method`` takes; the gains of observers are `vftcli.observers.tuning`'s.
+METHODS = ("friction", "base", "targets", "payload", "gains")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task(Choice):
+    """Method and settings of an identification.
+
+    Raises:
+        ParameterError: If there is no such method, or it has no use for what is set.
+    """
+
+    #: Of `METHODS`; None for friction, but base where the profile's links are not the arm's.
+    method: Annotated[
+        str | None,
+        Option("--method", "|".join(METHODS), "Fit friction, base, targets, payload or gains."),
+    ] = None
+    #: Where the band ends that is used. [Hz]
+    cutoff: Annotated[
+        float, setting("identify.cutoff", "HZ", "Cutoff of the zero-phase filter.")
+    ] = 8.0
+    #: Whether the friction method also fits drive constants.
+    constants: Annotated[
+        bool,
+        setting("identify.constants", "yes|no", "Whether friction fits drive constants K.", is_yes),
+    ] = False
+    #: The span of the logs that the result is tried on, None for all. [s]
+    check_interval: Annotated[
+        tuple[float, float] | None,
+        setting("identify.check-interval", "A:B", "Seconds A to B of the --check logs.", interval),
+    ] = None
+    name: str = ""  #: Name of the new robot.
+    #: Whether the joints have friction to be fitted; a simulator's may have none.
+    friction: bool = True
+
+    def __post_init__(self) -> None:
+        if self.method not in {None, *METHODS}:
+            raise ParameterError(f"--method {self.method!r}; there is {', '.join(METHODS)}")
+        if self.constants and self.method not in {None, "friction"}:
+            raise ParameterError("--set identify.constants=yes is for --method friction")
+        if self.method == "targets" and not self.friction:
+            raise ParameterError(
+                "--method targets reads the controller's friction; leave model.friction=none away"
+            )
+
+    @property
+    def keeps_links(self) -> bool:
+        """Whether the profile's links stay, or the fit begins with them."""
+        return self.method in {None, "friction"}
