@@ -17,11 +17,10 @@ import typer
 from typer.core import TyperOption
 
 from vftcli.cli.commands import COMMANDS, now_of
-from vftcli.cli.options import settings_by_name
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
-from vftcli.signals.option import Choice
+from vftcli.signals.option import Choice, settings_by_name
 from vftcli.signals.parsing import did_you_mean, interval, shown, toml_tables
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.

@@ -11,7 +11,7 @@ from vftcli.cli.help import columns, topics, two_columns
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
-from vftcli.signals.option import NUMBERS, Choice, Option
+from vftcli.signals.option import NUMBERS, Choice, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean
 
 #: What is listed → what its list shows.
@@ -131,7 +131,7 @@ def settings() -> Iterator[str]:
 
 def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
     """How each setting of a choice is given, and what it means."""
-    for name, (option, default) in opt.settings_by_name([kind]).items():
+    for name, (option, default) in settings_by_name([kind]).items():
         shown = {True: "yes", False: "no"}[default] if isinstance(default, bool) else default
         kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""
         if name == NUMBERS:
