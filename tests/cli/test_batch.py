@@ -8,7 +8,6 @@ import polars as pl
 import pytest
 
 from vftcli.batch.keys import digest_of
-from vftcli.cli.batch import duration
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 CIRCLE = FIXTURES / "ur5_circle.csv"
@@ -199,7 +198,3 @@ def test_a_reference_that_nothing_is_compared_with_is_left_out(run, tmp_path: Pa
     words = ("--do", do, *ONE, "--jobs", "0", "--reference", "sensor", "-o", tmp_path / "out")
     code, _, err = run("batch", CIRCLE, *words)
     assert (code, "--reference is left out" in err) == (0, True)
-
-
-def test_the_time_that_is_left_is_short() -> None:
-    assert [duration(s) for s in (12.0, 600.0, 7200.0)] == ["12 s", "10 min", "2.0 h"]

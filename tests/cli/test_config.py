@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.cli import config
-from vftcli.cli.options import settings_by_name
+from vftcli.signals.option import settings_by_name
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 LOG = FIXTURES / "ur5_circle.csv"

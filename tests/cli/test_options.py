@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from vftcli.cli import COMMANDS, main, make_app
-from vftcli.cli.options import settings_by_name
+from vftcli.signals.option import settings_by_name
 
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"
 

@@ -1,32 +1,166 @@
-"""The line that says what is being done: stage and share, only once it takes long."""
+"""The line that says how far the work is: bar, stage, time left, and nothing printed into it."""
+
+import os
+import re
+import subprocess
+import sys
+import threading
+from pathlib import Path
 
 import pytest
 
-from vftcli.cli.progress import WIDTH, Stages
+from vftcli.cli.progress import BAR, Stages, clock
 from vftcli.signals.progress import steps
 
+LOG = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
 
-def test_a_stage_is_shown_only_once_it_takes_long(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+
+@pytest.fixture
+def now(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The clock, which goes only as the test moves it; nothing ticks."""
+    time = [0.0]
+    monkeypatch.setattr("vftcli.cli.progress.time.monotonic", lambda: time[0])
+    monkeypatch.setattr(Stages, "_wait", lambda *_: None)
+    monkeypatch.setenv("COLUMNS", "80")
+    return time
+
+
+def bar(done: int) -> str:
+    return f"[{'#' * done}{'.' * (BAR - done)}]"
+
+
+def test_work_over_a_second_shows_share_stage_and_time_left(
+    now: list[float], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    now = [0.0]
-    monkeypatch.setattr("vftcli.cli.progress.time.monotonic", lambda: now[0])
-    monkeypatch.setattr(Stages, "_wait", lambda *_: None)  # the clock stands: nothing ticks
+    def shown() -> str:
+        return capsys.readouterr().err.replace("·", ".")
+
     stages = Stages()
     stages.begin("reading")
-    assert capsys.readouterr().err == ""
-    now[0] = 1.5
+    assert shown() == ""
+    now[0] = 2.0
     stages.begin("running observers", 0.2, 0.6)
-    line = capsys.readouterr().err
-    assert line.startswith("\rrunning observers ")
-    assert line.endswith("  20 %    2 s")
-    assert len(line) == 1 + WIDTH
+    # A fifth in 2 s: the other four fifths take 8 s.
+    assert shown() == f"\r{bar(4)} 20 %  running observers  0:08 left"
+    now[0] = 120.0
     for _ in steps("ab"):
         stages._tick()
-    # half of the stage, which goes from .2 to .6, is .4; it is shown though no stage has begun
-    assert " 20 %" in (shown := capsys.readouterr().err)
-    assert shown.endswith("  40 %    2 s")
+    # Half of the stage, which goes from .2 to .6, is .4; it is shown though no stage has begun.
+    assert shown().endswith(f"\r{bar(8)} 40 %  running observers  3:00 left")
+    # The next log begins anew: its own speed counts, of which nothing is known yet.
+    stages.begin("b.csv: reading", 0.0, 0.1)
+    assert shown().strip("\r").rstrip() == f"{bar(0)}  0 %  b.csv: reading"
     stages.end()
-    assert capsys.readouterr().err.strip() == ""
+    assert shown().strip() == ""
     stages._tick()
-    assert capsys.readouterr().err == ""
+    assert shown() == ""
+
+
+def test_what_is_printed_takes_the_line_away_first(
+    now: list[float], capsys: pytest.CaptureFixture[str]
+) -> None:
+    stages = Stages()
+    stages.begin("one")
+    now[0] = 2.0
+    stages.begin("two")
+    line = capsys.readouterr().err.lstrip("\r")
+    stages.echo("result")
+    out, err = capsys.readouterr()
+    assert (out, err) == ("result\n", "\r" + " " * len(line) + "\r")
+    stages.echo("again")
+    assert capsys.readouterr() == ("again\n", "")
+
+
+def test_a_long_stage_is_cut_to_the_terminal(
+    now: list[float], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    stages = Stages()
+    stages.begin("one")
+    now[0] = 2.0
+    stages.begin("x" * 200, 0.5)
+    line = capsys.readouterr().err.lstrip("\r")
+    assert (len(line), line.endswith("x  0:02 left")) == (59, True)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"), [(8.4, "0:08"), (59.6, "1:00"), (70.0, "1:10"), (3725.0, "1:02:05")]
+)
+def test_times_are_minutes_and_seconds_and_hours_from_one_on(seconds: float, text: str) -> None:
+    assert clock(seconds) == text
+
+
+#: A program whose work counts as long from its begin on, whatever the processor does.
+PROGRAM = """
+import sys
+import vftcli.cli.progress as progress
+progress.QUICK, progress.EVERY = 0.0, 0.01
+sys.argv[0] = "vftcli"
+from vftcli.cli import launch
+launch()
+"""
+
+
+def on_a_terminal(*words: object, **variables: str) -> list[str]:
+    """Run a command on a terminal; return the lines as they stand on the screen at the end."""
+    pty = pytest.importorskip("pty")
+    mine, its = pty.openpty()
+    kept: list[bytes] = []
+
+    def read() -> None:
+        while True:
+            try:
+                if not (some := os.read(mine, 1 << 16)):
+                    return
+            except OSError:  # nobody has the other end any more
+                return
+            kept.append(some)
+
+    reader = threading.Thread(target=read)
+    reader.start()
+    subprocess.run(
+        [sys.executable, "-c", PROGRAM, *map(str, words)],
+        stdout=its,
+        stderr=its,
+        check=False,
+        env={**os.environ, "TERM": "xterm", "COLUMNS": "80", "NO_COLOR": "1", **variables},
+    )
+    os.close(its)
+    reader.join()
+    os.close(mine)
+    text = b"".join(kept).decode("utf-8")
+    assert ("[#" in text or "[·" in text) == ("TERM" not in variables)
+    return [on_screen(line) for line in text.replace("\r\n", "\n").split("\n")]
+
+
+def on_screen(line: str) -> str:
+    """What stands where a line was written, after all that went back to its begin."""
+    seen = ""
+    for part in line.split("\r"):
+        seen = part + seen[len(part) :]
+    return seen.rstrip()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [
+        (LOG,),
+        ("report", LOG, "--wrench", "-o", "out"),
+        ("estimate", LOG, "-o", "out"),
+        ("compare", LOG, "--reference", "zero"),
+        ("compare", LOG, "--reference", "zero", "--json"),
+    ],
+)
+def test_on_a_terminal_no_line_is_printed_into_the_line(
+    words: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = on_a_terminal(*words, "--robot", "ur5", "--interval", "3:6")
+    assert len(lines) > 1
+    assert not [line for line in lines if re.search(r"\[[#·.]+\] +\d+ %", line)]
+
+
+def test_a_dumb_terminal_has_no_line() -> None:
+    lines = on_a_terminal("contacts", LOG, "--interval", "0:2", TERM="dumb")
+    assert "ur5_taps_ur_rtde.csv" in "".join(lines)

@@ -33,9 +33,9 @@ def test_friction_is_told_with_its_numbers_and_how_far_to_trust_it() -> None:
 
 
 def test_the_list_of_robots_has_no_heading() -> None:
-    row = {"name": "ur5", "title": "UR5", "joints": 6, "torque_source": "current", "friction": "x"}
-    (line,) = terminal(robots_grid([row])).splitlines()
-    assert line.split() == ["ur5", "UR5", "6", "joints", "current", "x"]
+    (line,) = terminal(robots_grid([load_robot("panda")])).splitlines()
+    assert line.split()[0] == "panda"
+    assert line.split()[-4:] == ["7", "joints", "link_torque", "sigmoid"]
 
 
 def test_gains_that_were_found() -> None:

@@ -17,6 +17,7 @@ import typer
 
 from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.help import GroupedCommand, JourneyGroup
+from vftcli.cli.progress import echo
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable
 
@@ -60,7 +61,7 @@ def show_version(asked: bool) -> None:
     if asked:
         from vftcli import __version__
 
-        typer.echo(f"vftcli {__version__}")
+        echo(f"vftcli {__version__}")
         raise typer.Exit
 
 
@@ -119,7 +120,7 @@ def launch() -> None:
     except SystemExit as end:
         code = end.code
     except Stopped as stopped:
-        typer.echo("error: interrupted; run the command again", err=True)
+        echo("error: interrupted; run the command again", err=True)
         code = 128 + stopped.number
     with suppress(Stopped):
         atexit._run_exitfuncs()
@@ -190,5 +191,5 @@ def open_streams() -> None:
 
 def fail(message: str) -> None:
     """Print one line to stderr and exit with code 1."""
-    typer.echo(f"error: {printable(' '.join(message.split()))}", err=True)
+    echo(f"error: {printable(' '.join(message.split()))}", err=True)
     raise SystemExit(1)

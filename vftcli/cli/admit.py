@@ -9,6 +9,7 @@ import typer
 from vftcli.admittance.choice import FILE, ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.progress import echo
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
@@ -213,7 +214,7 @@ def looped(
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
     from vftcli.admittance.replay import replay
-    from vftcli.cli.simulate import progress_bar
+    from vftcli.cli.console import steps_of
     from vftcli.observers import KalmanObserver
     from vftcli.robots import load_robot
     from vftcli.signals.errors import ParameterError
@@ -242,7 +243,7 @@ def looped(
         torque=control.loop_torque,
         zero=zero.spans[0] if zero.spans else UNLOADED,
         anyway=analysis.anyway,
-        progress=progress_bar(),
+        progress=steps_of("simulating"),
     )
     result = replay(
         run.wrench,
@@ -268,10 +269,10 @@ def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> Non
     from vftcli.outputs.grid import json_rows
 
     if shown.json:
-        typer.echo(json_rows(result.rows).rstrip("\n"))
+        echo(json_rows(result.rows).rstrip("\n"))
         return
     if shown.latex:
-        typer.echo(latex_text(result).rstrip("\n"))
+        echo(latex_text(result).rstrip("\n"))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))
@@ -279,4 +280,4 @@ def show(result: "Replay", run: "ClosedLoop | None", shown: ShownOptions) -> Non
         detail(f"note: {note}")
     if run is not None:
         say(latency_text(run))
-    typer.echo(comparison_text(result.rows))
+    echo(comparison_text(result.rows))

@@ -123,31 +123,24 @@ def say_passed(names: list[str]) -> None:
 
 def progress_line() -> "Callable[[BatchCount], None]":
     """Who shows how far the batch is: a line that changes on a terminal, else one now and then."""
-    import sys
     import time
 
     from vftcli.cli.console import say
-    from vftcli.cli.progress import STAGES
+    from vftcli.cli.progress import STAGES, clock, is_watched
 
-    watched, last = sys.stderr.isatty(), time.monotonic()
+    watched, last = is_watched(), time.monotonic()
 
     def told(count: "BatchCount") -> None:
         nonlocal last
         rate = count.done / count.seconds if count.seconds else 0.0
         words = f"{count.logs - count.left}/{count.logs} logs, {count.failed} failed"
-        if rate and count.left:
-            words += f", {rate:.2g} logs/s, {duration(count.left / rate)} left"
         if watched:
             STAGES.begin(words, (count.logs - count.left) / max(count.logs, 1))
-        elif time.monotonic() - last > EVERY and count.left:
+            return
+        if rate and count.left:
+            words += f", {rate:.2g} logs/s, {clock(count.left / rate)} left"
+        if time.monotonic() - last > EVERY and count.left:
             last = time.monotonic()
             say(words)
 
     return told
-
-
-def duration(seconds: float) -> str:
-    """A time in seconds, minutes or hours."""
-    if seconds < 90:
-        return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 5400 else f"{seconds / 3600:.1f} h"

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Annotated
 
-import typer
-
 from vftcli.cli import options as opt
+from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import Choice, setting
 
@@ -46,7 +45,7 @@ def bench(
     )
     if latex:
         table = replace(bench_grid(result), title=f"Computing time: {title}")
-        typer.echo(grid.latex(table), nl=False)
+        echo(grid.latex(table), nl=False)
         return
-    typer.echo(title)
-    typer.echo(grid.terminal(bench_grid(result)))
+    echo(title)
+    echo(grid.terminal(bench_grid(result)))

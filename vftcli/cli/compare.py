@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.progress import echo
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
@@ -120,14 +121,14 @@ def compare(
     rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
-        typer.echo(text if analysis.talk.details else f"{text}{MORE}")
+        echo(text if analysis.talk.details else f"{text}{MORE}")
         pairs = [
             paired_significance(a.recording.name, a.estimates, a.reference)
             for a in analyses
             if a.reference is not None and analysis.talk.details
         ]
         if pairs:
-            typer.echo(tables.pairs_text(pl.concat(pairs)))
+            echo(tables.pairs_text(pl.concat(pairs)))
     else:
-        typer.echo(tables.FORMS[table.form](rows, bounds))
+        echo(tables.FORMS[table.form](rows, bounds))
     left_out.end(len(errors))

@@ -17,10 +17,10 @@ import typer
 from typer.core import TyperOption
 
 from vftcli.cli.commands import COMMANDS, now_of
-from vftcli.cli.options import settings_by_name
+from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
-from vftcli.signals.option import Choice
+from vftcli.signals.option import Choice, settings_by_name
 from vftcli.signals.parsing import did_you_mean, interval, shown, toml_tables
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
@@ -148,7 +148,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
         words += [word for one in each if one is not None for word in as_typed(key, one)]
     _taken.set(Taken(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
-    typer.echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
+    echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
 
 def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
@@ -240,7 +240,7 @@ def key_now(path: Path, key: str, value: Any) -> dict[str, Any]:  # noqa: ANN401
     # An argument, of a command or of a xacro, has no key of its own.
     if now is None or not now.startswith("--") or "'" in now or (not text and "VALUE" in now):
         return {key: value}
-    typer.echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
+    echo(printable(f"note: {path}: {key} is now {now.replace('VALUE', '…')}"), err=True)
     option, _, taken = now.removeprefix("--").partition(" ")
     if option == "set":
         name, _, taken = taken.partition("=")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from vftcli.cli.config import effective, typed
-from vftcli.cli.progress import STAGES
+from vftcli.cli.progress import STAGES, echo, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.letters import printable, printable_lines
 from vftcli.signals.packages import check_installed
@@ -57,8 +57,7 @@ def command_line() -> str:
 def say(text: str) -> None:
     """Print words to stderr, unless --quiet; results go to stdout."""
     if _level.get() > QUIET:
-        STAGES.clear()
-        typer.echo(printable_lines(text), err=True)
+        echo(printable_lines(text), err=True)
 
 
 def say_left_out(names: Iterable[Path | str]) -> None:
@@ -78,12 +77,10 @@ def detail(text: str) -> None:
 def show(text: str) -> None:
     """Print a result that stands in a file as well to stdout, unless --quiet.
 
-    Its colours are the canvas's affair: typer, which would take them off, sees none where there
-    shall be none.
+    Its colours are the canvas's affair: there are none where there shall be none.
     """
     if _level.get() > QUIET:
-        STAGES.clear()
-        typer.echo(text, nl=not text.endswith("\n"), color=True)
+        echo(text, nl=not text.endswith("\n"), colour=True)
 
 
 def open_made(path: Path) -> None:
@@ -127,7 +124,7 @@ def say_json(value: object) -> None:
     """Print what a command makes to stdout, for machines; what is no finite number is null."""
     from vftcli.outputs.log.run_record import jsonable
 
-    typer.echo(json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False))
+    echo(json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False))
 
 
 class LeftOut:
@@ -143,15 +140,14 @@ class LeftOut:
             raise error
         reason = " ".join(str(error).split())
         self.reasons[self._library.label(log)] = reason
-        STAGES.clear()
-        typer.echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
+        echo(printable(f"error: {self._library.label(log)} left out: {reason}"), err=True)
 
     def end(self, done: int) -> None:
         """Stop with exit code 1 if any was left out."""
         if not self.reasons:
             return
         if not done:
-            typer.echo("error: none of the logs can be analysed", err=True)
+            echo("error: none of the logs can be analysed", err=True)
         raise typer.Exit(1)
 
 
@@ -227,5 +223,10 @@ def say_remarks(remarks: "Iterable[Remark]") -> None:
 
 def stages() -> "Callable[[str, float, float], None]":
     """Who shows on stderr what is being done, if somebody watches and it takes a while."""
-    watched = _level.get() > QUIET and sys.stderr.isatty()
-    return STAGES.begin if watched else lambda *_: None
+    return STAGES.begin if _level.get() > QUIET and is_watched() else lambda *_: None
+
+
+def steps_of(stage: str) -> "Callable[[int, int], None]":
+    """Who shows how many of the steps of a run are done."""
+    begin = stages()
+    return lambda done, steps: begin(stage, done / steps, done / steps)

@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Option
 
@@ -81,9 +82,9 @@ def print_stored(estimates: Path, form: ListOptions) -> None:
     if form.json:
         say_json(record)
     elif form.csv:
-        typer.echo(contacts_csv([stored_list(record)]), nl=False)
+        echo(contacts_csv([stored_list(record)]), nl=False)
     else:
-        typer.echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
+        echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
 
 
 def print_lists(
@@ -99,7 +100,7 @@ def print_lists(
         records = [output.contacts_record(each) for each in lists]
         say_json(records[0] if len(records) + len(failed) == 1 else records)
     elif form.csv:
-        typer.echo(output.contacts_csv(lists), nl=False)
+        echo(output.contacts_csv(lists), nl=False)
     else:
         screen = canvas()
         texts = (
@@ -109,4 +110,4 @@ def print_lists(
         )
         if not texts or form.all:
             texts += [log_screen(made, screen, every=every) for made in found]
-        typer.echo("\n".join(texts), nl=False, color=screen.colour)
+        echo("\n".join(texts), nl=False, colour=screen.colour)

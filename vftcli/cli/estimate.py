@@ -4,10 +4,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
+from vftcli.cli.progress import echo
 from vftcli.signals.option import WRITE, Option
 
 if TYPE_CHECKING:
@@ -74,7 +73,7 @@ def estimate(
         return
     say_left_out(estimate_files(written.extras))
     if json:
-        typer.echo(record)
+        echo(record)
     else:
         show_estimates(made, output, estimate_files(written.extras))
     if show:

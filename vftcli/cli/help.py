@@ -15,6 +15,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
 from vftcli.cli.config import begin, config_option, forget, is_configured, settle
+from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.letters import printable
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
@@ -74,7 +75,7 @@ class JourneyGroup(TyperGroup):
             if args[0] not in {words[0], *COMMANDS} and args[0] in former()["commands"]:
                 notes.insert(0, f"{args[0]} is now {former()['commands'][args[0]]}")
             for note in notes:
-                typer.echo(printable(f"note: {note}"), err=True)
+                echo(printable(f"note: {note}"), err=True)
         begin(words)
         return super().parse_args(ctx, words)
 

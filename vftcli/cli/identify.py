@@ -5,10 +5,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -140,7 +139,7 @@ def identify_robot(
     for remark in found.remarks:
         detail(f"note: {remark}")
     say(f"wrote {', '.join(map(str, beside(output).values()))}")
-    typer.echo(record.rstrip("\n") if made.json else tables_text(found))
+    echo(record.rstrip("\n") if made.json else tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))
 
@@ -201,5 +200,5 @@ def find_gains(
     say_recording(recording)
     for note in (*arm.remarks, *notes):
         detail(f"note: {note}")
-    typer.echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
+    echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --gains {output}")

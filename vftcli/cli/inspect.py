@@ -10,6 +10,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.config import NAME
+from vftcli.cli.progress import echo
 from vftcli.signals.option import Option
 
 if TYPE_CHECKING:
@@ -55,14 +56,14 @@ def inspect_log(
         examinations.append(examine(recording, arm))
     say_robots(examiner.robots)
     if not json:
-        typer.echo("\n\n".join(map(examination_text, examinations)))
+        echo("\n\n".join(map(examination_text, examinations)))
     written = {} if output is None else write_options(output, logs, logged, force=force)
     if json:
         each = list(map(examination_record, examinations))
         say_json({**(each[0] if len(each) == 1 else {"logs": each}), **written})
     warnings = sum(len(examination.warnings) for examination in examinations)
     if strict and warnings:
-        typer.echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
+        echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)
         raise typer.Exit(1)
 
 

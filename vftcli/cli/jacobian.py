@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from vftcli.cli.console import command_line, say, show
+from vftcli.cli.progress import echo
 
 if TYPE_CHECKING:
     from vftcli.cli.console import LeftOut
@@ -72,7 +71,7 @@ def write_by_jacobian(
     made = judged(log, found, choice)
     record = write_jacobian_folder(output, made, command_line(), force=force)
     if json:
-        typer.echo(record)
+        echo(record)
         return
     if made.errors is not None:
         show(to_terminal(made.errors, every=False))

@@ -8,9 +8,10 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS
 from vftcli.cli.help import columns, topics, two_columns
+from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
-from vftcli.signals.option import NUMBERS, Choice, Option
+from vftcli.signals.option import NUMBERS, Choice, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean
 
 #: What is listed → what its list shows.
@@ -45,21 +46,21 @@ def show_help(
         raise ParameterError(f"help {topic} {name}: a name follows robots or formats only")
     root: Any = ctx.find_root()
     if topic is None:
-        typer.echo("\n".join(contents()))
+        echo("\n".join(contents()))
     elif topic == "robots":
-        typer.echo(robots(name, tip))
+        echo(robots(name, tip))
     elif topic == "formats":
-        typer.echo("\n".join(formats(name)))
+        echo("\n".join(formats(name)))
     elif topic == "observers":
-        typer.echo("\n".join(observers()))
+        echo("\n".join(observers()))
     elif topic == "settings":
-        typer.echo("\n".join(settings()))
+        echo("\n".join(settings()))
     elif topic in topics():
-        typer.echo(topics()[topic]["text"].rstrip())
+        echo(topics()[topic]["text"].rstrip())
     elif topic in COMMANDS:
         asked = root.command.commands[topic]
         of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
-        typer.echo(asked.get_help(of_command))
+        echo(asked.get_help(of_command))
     else:
         there = [*topics(), *LISTS]
         near = did_you_mean(topic, [*there, *COMMANDS])
@@ -78,13 +79,13 @@ def contents() -> Iterator[str]:
 def robots(name: str | None, tip: str | None) -> str:
     """The robot profiles by maker, or one robot and its sources."""
     from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import robot_row, robot_text, robots_grid
+    from vftcli.outputs.listings import robot_text, robots_grid
     from vftcli.robots import MAKERS, load_robot
 
     if name is not None:
         return robot_text(RobotChoice.parsed(robot=name, tip=tip).named())
-    rows = {maker: [robot_row(load_robot(p)) for p in names] for maker, names in MAKERS.items()}
-    return "".join(f"{m}\n{terminal(robots_grid(each))}" for m, each in rows.items()).rstrip("\n")
+    grids = {maker: robots_grid(map(load_robot, names)) for maker, names in MAKERS.items()}
+    return "".join(f"{maker}\n{terminal(grid)}" for maker, grid in grids.items()).rstrip("\n")
 
 
 def observers() -> Iterator[str]:
@@ -130,7 +131,7 @@ def settings() -> Iterator[str]:
 
 def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
     """How each setting of a choice is given, and what it means."""
-    for name, (option, default) in opt.settings_by_name([kind]).items():
+    for name, (option, default) in settings_by_name([kind]).items():
         shown = {True: "yes", False: "no"}[default] if isinstance(default, bool) else default
         kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""
         if name == NUMBERS:

@@ -26,7 +26,17 @@ from typing import (
 import typer
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import ESTIMATE, LOG, NUMBERS, OUTPUT, WRENCH, WRITE, Choice, Option
+from vftcli.signals.option import (
+    ESTIMATE,
+    LOG,
+    NUMBERS,
+    OUTPUT,
+    WRENCH,
+    WRITE,
+    Choice,
+    Option,
+    settings_by_name,
+)
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import assignment, did_you_mean
 
@@ -227,16 +237,6 @@ def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[s
                 f"{near}"
             )
     return found
-
-
-def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option, object]]:
-    """Name → setting and default, of every setting of the choices."""
-    return {
-        option.name: (option, getattr(kind, field, EMPTY))
-        for kind in choices
-        for field, _, option in kind.options().values()
-        if option.is_setting
-    }
 
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:

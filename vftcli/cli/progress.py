@@ -1,6 +1,9 @@
-"""What is being done and how far it is, on one line of stderr that goes again."""
+"""What is being done and how far it is, on one line of stderr; and what is printed over it."""
 
 import atexit
+import os
+import shutil
+import sys
 import threading
 import time
 
@@ -8,30 +11,39 @@ import typer
 
 QUICK = 1.0  #: Work that is done within this time shows nothing. [s]
 EVERY = 1.0  #: Time after which the line is shown anew, whatever happens. [s]
-WIDTH = 78  #: Columns of the line. [characters]
+WIDTH = 79  #: Most columns of the line: one less than a terminal has. [characters]
+BAR = 20  #: Length of the bar. [characters]
+#: Share of the work after which the rest can be guessed from it.
+ENOUGH = 0.02
 
 
 class Stages:
-    """One line on stderr: stage, share of the work and time, once that takes more than `QUICK`."""
+    """One line on stderr: share of the work, stage and time left, once that takes `QUICK`."""
 
     def __init__(self) -> None:
         self._begun: float | None = None
         self._stage = ""
         self._share = 0.0
-        self._shown = False
+        self._from = (0.0, 0.0)  # time and share since which the speed is measured
+        self._shown = 0  # characters that stand on the line
+        self._lock = threading.RLock()  # who prints and who shows the line take turns
 
     def begin(self, stage: str, begin: float = 0.0, end: float = 1.0) -> None:
         """Say what is done now, and which part of the whole work that is."""
         from vftcli.signals.progress import enter, watch
 
-        self._stage = stage
+        is_new, self._stage = stage != self._stage, stage
+        now = time.monotonic()
         if self._begun is None:
-            self._begun = time.monotonic()
-            watch(self._told)
+            self._begun = now
+            watch(self._see)
             atexit.register(self.end)
             self._wait(QUICK)
+            self._from = (now, begin)
+        if begin < self._share:  # of the next log
+            self._from = (now, begin)
         enter(begin, end)
-        if time.monotonic() - self._begun > QUICK:
+        if is_new and now - self._begun > QUICK:
             self._show()
 
     def end(self) -> None:
@@ -41,11 +53,20 @@ class Stages:
 
     def clear(self) -> None:
         """Take the line away, before something else is printed."""
-        if self._shown:
-            self._shown = False
-            typer.echo("\r" + " " * WIDTH + "\r", err=True, nl=False)
+        with self._lock:
+            if self._shown:
+                typer.echo("\r" + " " * self._shown + "\r", err=True, nl=False)
+                self._shown = 0
 
-    def _told(self, share: float) -> None:
+    def echo(
+        self, text: str, *, err: bool = False, nl: bool = True, colour: bool | None = None
+    ) -> None:
+        """Print where the line stands, which comes again below; colours on a terminal only."""
+        with self._lock:
+            self.clear()
+            typer.echo(text, err=err, nl=nl, color=colour)
+
+    def _see(self, share: float) -> None:
         self._share = share
 
     def _wait(self, seconds: float) -> None:
@@ -60,11 +81,40 @@ class Stages:
             self._wait(EVERY)
 
     def _show(self) -> None:
-        if self._stage and self._begun is not None:
-            self._shown = True
-            tail = f" {100.0 * self._share:3.0f} % {time.monotonic() - self._begun:4.0f} s"
-            room = WIDTH - len(tail)
-            typer.echo(f"\r{self._stage[:room]:<{room}}{tail}", err=True, nl=False)
+        with self._lock:
+            if self._stage:
+                line = self._line()
+                typer.echo(f"\r{line:<{self._shown}}", err=True, nl=False)
+                self._shown = len(line)
+
+    def _line(self) -> str:
+        done = round(BAR * self._share)
+        bar = f"[{'#' * done}{rest() * (BAR - done)}] {100.0 * self._share:2.0f} %"
+        since, first = self._from
+        gained, left = self._share - first, ""
+        if gained > ENOUGH:
+            left = f"  {clock((time.monotonic() - since) * (1.0 - self._share) / gained)} left"
+        room = min(WIDTH, shutil.get_terminal_size().columns - 1) - len(bar) - len(left) - 2
+        return f"{bar}  {self._stage[: max(room, 0)]}{left}"
+
+
+def rest() -> str:
+    """What the bar is made of where work is left, a letter that stderr has."""
+    letters = getattr(sys.stderr, "encoding", None) or ""
+    return "·" if letters.lower().startswith("utf") else "."
+
+
+def clock(seconds: float) -> str:
+    """A time as minutes and seconds, from an hour on with hours."""
+    minutes, second = divmod(round(seconds), 60)
+    hours, minute = divmod(minutes, 60)
+    return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"
+
+
+def is_watched() -> bool:
+    """Whether somebody looks at stderr, on a terminal that can take a line away again."""
+    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
 
 
 STAGES = Stages()  #: The one line that a program has.
+echo = STAGES.echo  #: What prints everything that a command prints.

@@ -4,10 +4,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
+from vftcli.cli.progress import echo
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import Choice, setting
 
@@ -92,7 +91,7 @@ def report(
         )
     say_left_out(FILES)
     if json:
-        typer.echo(record)
+        echo(record)
     else:
         show_report(analyses, output, failed, written.extras, details=analysis.talk.details)
     if show:

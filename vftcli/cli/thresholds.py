@@ -3,10 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
-
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 from vftcli.signals.option import COMPARE, Option
 
@@ -81,7 +80,7 @@ def contact_thresholds(
     say_robots(choice.examiner.robots)
     for remark in (*remarks, *(remark for one in checks for remark in one.remarks)):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
-    typer.echo(thresholds_text(thresholds, counted, checks), nl=False)
+    echo(thresholds_text(thresholds, counted, checks), nl=False)
 
 
 def truth_of(

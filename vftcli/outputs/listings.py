@@ -1,6 +1,6 @@
 """Tables that a command prints and no file holds: robot profiles, gains that were found."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
@@ -10,14 +10,20 @@ if TYPE_CHECKING:
     from vftcli.robots.robot import Robot
 
 
-def robots_grid(rows: Sequence[dict[str, Any]]) -> Grid:
+def robots_grid(robots: "Iterable[Robot]") -> Grid:
     """The robot profiles, one row each, without a heading."""
     return Grid(
         # The widths keep the columns of one release where they were in the one before.
         columns=tuple(Column("", words=True, width=width) for width in (6, 27, 9, 12, 0)),
         rows=tuple(
-            (r["name"], r["title"], f"{r['joints']} joints", r["torque_source"], r["friction"])
-            for r in rows
+            (
+                robot.name,
+                robot.title,
+                f"{robot.joints} joints",
+                robot.torque_source,
+                ", ".join(sorted({f.model for f in robot.friction}) or ["no friction model"]),
+            )
+            for robot in robots
         ),
     )
 
@@ -74,20 +80,6 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
     joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
     words = (Column("observer", words=True), Column("", words=True, width=22))
     return Grid(columns=(*words, *joints), rows=tuple(rows))
-
-
-def robot_row(robot: "Robot") -> dict[str, Any]:
-    """One robot in a few words."""
-    models = sorted({f.model for f in robot.friction}) or ["no friction model"]
-    return {
-        "name": robot.name,
-        "title": robot.title,
-        "joints": robot.joints,
-        "torque_source": robot.torque_source,
-        "friction": ", ".join(models),
-        "observers": sorted(robot.gains),
-        "payloads": sorted(robot.payloads),
-    }
 
 
 def robot_text(robot: "Robot") -> str:

@@ -168,3 +168,13 @@ class Choice:
                 else:
                     values[field] = option.read(tuple(typed) if option.several else typed)
         return cls(**values)
+
+
+def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option, object]]:
+    """Name → setting and default, of every setting of the choices."""
+    return {
+        option.name: (option, getattr(kind, field, None))
+        for kind in choices
+        for field, _, option in kind.options().values()
+        if option.is_setting
+    }

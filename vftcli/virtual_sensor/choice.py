@@ -72,7 +72,7 @@ class WrenchChoice(Choice):
         Option(
             "--frame",
             "FRAME",
-            "Give the wrench in flange, base, tool or sensor (help frames).",
+            "Give the wrench in flange, base, tool or sensor.",
             completes=names_at("virtual_sensor.frames:FRAMES"),
         ),
     ] = "flange"
