@@ -175,7 +175,7 @@ def test_a_wrong_option_is_one_line(
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("words", [("estimate",), ("estimate", FIXTURE), ("frobnicate",)])
+@pytest.mark.parametrize("words", [("estimate",), ("compare", FIXTURE), ("frobnicate",)])
 def test_wrong_usage_exits_two(run: Run, words: tuple[str, ...]) -> None:
     code, _, stderr = run(*words)
     assert code == 2

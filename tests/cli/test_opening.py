@@ -58,7 +58,10 @@ def test_a_command_opens_what_it_made(run: Run, opened: list[str], tmp_path: Pat
     log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
     fast = ("--robot", "ur5", "--causal", "--observer", "gmo", "--interval", "0:4")
     assert run("estimate", log, *fast, "-o", tmp_path / "e", "--open")[0] == 0
-    assert opened == [str(tmp_path / "e" / "recording.rrd")]
+    assert opened == [
+        (tmp_path / "a" / "index.html").as_uri(),
+        str(tmp_path / "e" / "recording.rrd"),
+    ]
 
 
 def test_without_a_folder_there_is_nothing_to_open(run: Run, opened: list[str]) -> None:

@@ -49,7 +49,7 @@ class Case(NamedTuple):
     Attributes:
         name: What to print, and to choose by.
         analysed: Analyses it, given the free part or None for none.
-        free: The free part, as `--free-part` takes it. [s]
+        free: The free part, as `--free` has it. [s]
     """
 
     name: str

@@ -8,7 +8,7 @@ from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals import parsing
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.option import NUMBERS, Choice, Option, setting
+from vftcli.signals.option import NUMBERS, Choice, Option, names_at, setting
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
@@ -87,6 +87,7 @@ class ControlChoice(Choice):
             "As position.stiffness=12, rz.threshold=4, admittance.xi=1, "
             "admittance.threshold_mode=soft.",
             several=True,
+            completes=names_at("admittance.parameters:NUMBERS"),
         ),
     ] = ()
     as_printed: bool = False  #: Whether the paper's printed formulas run.

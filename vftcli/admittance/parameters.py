@@ -35,6 +35,8 @@ PER_AXIS = {
     "speed_limit": ("v_tsd",),
     "speed_scale": ("v0",),
 }
+#: Every number of every group of axes, as ``--set`` names it.
+NUMBERS = tuple(f"{group}.{name}" for group in GROUPS for name in PER_AXIS)
 LETTERS = {letter: name for name, letters in PER_AXIS.items() for letter in letters}
 LETTERS["ts"] = "period"
 MAY_BE_ZERO = ("damping", "threshold", "hysteresis")

@@ -39,9 +39,7 @@ def admit(
     controllers: opt.Typed[ControlChoice],
     release: Annotated[
         list[str] | None,
-        Option(
-            "--release", "AXIS=VALUE", "Release from rest, without a log: x=0.3 [m], rz=0.5 [rad]."
-        ),
+        Option("--release", "AXIS=VALUE", "Release from rest, without a log: x=0.3, rz=0.5."),
     ],
     seed: Annotated[int | None, opt.SEED],
     analysis: AnalysisOptions,

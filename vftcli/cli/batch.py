@@ -11,7 +11,7 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import Option
+from vftcli.signals.option import Option, names_at
 
 if TYPE_CHECKING:
     from vftcli.batch.run import BatchCount
@@ -29,7 +29,15 @@ def batch(
         Option("", "LOG|FOLDER|DATASET...", "Logs, folders, data sets; an episode is a log."),
     ],
     output: opt.Folder,
-    do: Annotated[str, Option("--do", "COMMAND", "Run estimate, compare, report or contacts.")],
+    do: Annotated[
+        str,
+        Option(
+            "--do",
+            "COMMAND",
+            "Run estimate, compare, report or contacts.",
+            completes=names_at("batch.log_work:COMMANDS"),
+        ),
+    ],
     workers: opt.Typed[WorkersChoice],
     reference: opt.Typed[ReferenceChoice],
     analysis: AnalysisOptions,

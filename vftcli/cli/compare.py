@@ -81,7 +81,7 @@ def compare(
     table: TableOptions,
     drawn: DrawnErrors,
 ) -> None:
-    """Print every observer's error against a reference, and its floor.
+    """Print each observer's error against a reference.
 
     Example: vftcli compare fixtures/ur5_circle.csv --robot ur5 --reference zero --interval 0:4
     """

@@ -88,7 +88,7 @@ def config_option() -> TyperOption:
         is_eager=True,
         expose_value=False,
         callback=take,
-        help=f"Options in TOML; unasked {NAME} here; none: neither. See vftcli help config.",
+        help="Read options from FILE; none: from no file.",
         type=str,
     )
 

@@ -35,7 +35,7 @@ def list_contacts(
     anyway: opt.Anyway,
     talk: opt.TalkOptions,
 ) -> None:
-    """List what touched the arm: when, how hard, where, how sure.
+    """List what touched the arm. The default command.
 
     Needs no output folder and no reference; with --free LOG or --free A:B it tells more.
 

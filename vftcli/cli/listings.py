@@ -25,7 +25,15 @@ LISTS = {
 @opt.command
 def show_help(
     ctx: typer.Context,
-    topic: Annotated[str | None, Option("", "[TOPIC]", "A topic or a command; none: the list.")],
+    topic: Annotated[
+        str | None,
+        Option(
+            "",
+            "[TOPIC]",
+            "A topic or a command; none: the list.",
+            completes=lambda: (*topics(), *LISTS, *COMMANDS),
+        ),
+    ],
     name: Annotated[str | None, Option("", "[NAME]", "One robot, robot file or format.")],
     tip: Annotated[str | None, RobotChoice.option("tip")],
 ) -> None:
@@ -122,13 +130,10 @@ def settings() -> Iterator[str]:
 
 def settings_of(kind: type[Choice]) -> Iterator[tuple[str, str]]:
     """How each setting of a choice is given, and what it means."""
-    for field, _, option in kind.options().values():
-        if option.is_setting:
-            default = getattr(kind, field, None)
-            if isinstance(default, bool):
-                default = "yes" if default else "no"
-            kept = f"; default {default}" if isinstance(default, str | int | float) else ""
-            if option.name == NUMBERS:
-                yield option.metavar, option.help
-            else:
-                yield option.name, f"{option.help} ({option.metavar}{kept})"
+    for name, (option, default) in opt.settings_by_name([kind]).items():
+        shown = {True: "yes", False: "no"}[default] if isinstance(default, bool) else default
+        kept = f"; default {shown}" if isinstance(shown, str | int | float) else ""
+        if name == NUMBERS:
+            yield option.metavar, option.help
+        else:
+            yield name, f"{option.help} ({option.metavar}{kept})"

@@ -26,7 +26,7 @@ from typing import (
 import typer
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import ESTIMATE, LOG, OUTPUT, WRENCH, WRITE, Choice, Option
+from vftcli.signals.option import ESTIMATE, LOG, NUMBERS, OUTPUT, WRENCH, WRITE, Choice, Option
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import assignment, did_you_mean
 
@@ -182,8 +182,9 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
     arguments = inspect.signature(function).parameters.values()
     part = members("", {a.name: (a.annotation, a.default) for a in arguments})
     if any(option.is_setting for kind in part.choices for _, _, option in kind.options().values()):
+        own = SET._replace(completes=lambda: set_words(part.choices))
         part.parameters.extend(
-            taken_apart("set", Annotated[list[str] | None, SET], None).parameters
+            taken_apart("set", Annotated[list[str] | None, own], None).parameters
         )
 
     def called(**values: Any) -> None:  # noqa: ANN401
@@ -236,6 +237,13 @@ def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option,
         for field, _, option in kind.options().values()
         if option.is_setting
     }
+
+
+def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:
+    """What may stand behind ``--set``, each name with its equals sign."""
+    for kind in choices:
+        for name, (option, _) in settings_by_name([kind]).items():
+            yield from (f"{each}=" for each in (option.values() if name == NUMBERS else [name]))
 
 
 class Part(NamedTuple):
@@ -293,6 +301,8 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
         default = None if option.metavar else False
     how: dict[str, Any] = {"help": option.help, "min": option.least, "max": option.most}
     how |= {"metavar": option.metavar or None, "show_default": False}
+    if option.completes or option.values():
+        how["autocompletion"] = option.values
     info = typer.Option(*option.name.split("/"), **how) if option.name else typer.Argument(**how)
     single = inspect.Parameter(
         name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[what, info]

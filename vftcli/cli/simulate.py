@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.signals.option import Option
+from vftcli.signals.option import Option, names_at
 
 WIDTH = 30  #: Width of the progress bar. [characters]
 QUICK = 1.0  #: Runs shorter than this show no bar. [s]
@@ -20,7 +20,13 @@ def simulate_log(
     scenario: Annotated[str, Option("", "SCENARIO", "list, a scenario's name or a FILE.toml.")],
     seed: Annotated[int | None, opt.SEED],
     log_format: Annotated[
-        str, Option("--as", "FORMAT", "Write rtde, ur-rtde, libfranka, rosbag2 or parquet.")
+        str,
+        Option(
+            "--as",
+            "FORMAT",
+            "Write rtde, ur-rtde, libfranka, rosbag2 or parquet.",
+            completes=names_at("simulation.writers:WRITERS"),
+        ),
     ] = "",
     changes: Annotated[list[str] | None, opt.SET._replace(group="")],
     output: Annotated[Path | None, opt.OUT],

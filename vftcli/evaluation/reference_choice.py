@@ -23,7 +23,13 @@ class ReferenceChoice(Choice):
 
     #: One of `NAMES`, or ``file:PATH``.
     name: Annotated[
-        str, Option("--reference", "REF", "Compare with two-cycle, sensor, vendor, zero, file.")
+        str,
+        Option(
+            "--reference",
+            "REF",
+            "Compare with two-cycle, sensor, vendor, zero, file.",
+            completes=lambda: (*NAMES, FILE),
+        ),
     ]
     #: The column description of a reference file, None to recognise its columns.
     columns: Annotated[

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import ESTIMATE, NUMBERS, Choice, Option, setting
+from vftcli.signals.option import ESTIMATE, NUMBERS, Choice, Option, names_at, setting
 from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
@@ -70,7 +70,11 @@ class ObserverChoice(Choice):
     names: Annotated[
         tuple[str, ...],
         Option(
-            "--observer", "NAME", "Run this observer. Repeatable (help observers).", several=True
+            "--observer",
+            "NAME",
+            "Run this observer. Repeatable (help observers).",
+            several=True,
+            completes=names_at("observers.table:OBSERVERS"),
         ),
     ] = ()
     #: Whether to leave out what could not run while the log is being written.
@@ -84,13 +88,18 @@ class ObserverChoice(Choice):
             "A number, or one a joint: gmo.gain=5,3,4,10,10,10, kfo.noise_convention=density.",
             settings_of,
             several=True,
+            completes=names_at("observers.table:NUMBERS"),
         ),
     ] = field(default_factory=dict)
     #: Which gains the observers have that bring none of their own: `PAPER_GAINS` or `LOG_GAINS`.
     gains: Annotated[
         "str | Path | Goal",
         Option(
-            "--gains", "SOURCE", "Take gains from auto, paper, FILE... (help gains).", source_of
+            "--gains",
+            "SOURCE",
+            "Take gains from auto, paper, FILE... (help gains).",
+            source_of,
+            completes=lambda: (LOG_GAINS, PAPER_GAINS, "delay=", "bandwidth=", "false-alarms="),
         ),
     ] = PAPER_GAINS
     #: Whether the paper's printed formulas run, and its numeric dynamics.

@@ -29,6 +29,8 @@ PARAMETERS: dict[str, tuple[str, ...]] = {
     "gmo": ("gain",),
     "kfo": ("r_diag", "q_p_diag", "q_tau_diag", "decay", "noise_convention"),
 }
+#: Every number of every observer, as ``--set`` names it.
+NUMBERS = tuple(f"{name}.{number}" for name, each in PARAMETERS.items() for number in each)
 #: What an assignment of ``--set`` looks like.
 FORM = "OBSERVER.PARAMETER=VALUE, as gmo.gain=30 or gmo.gain=5,3,4,10,10,10"
 WORDS = {"noise_convention"}  #: Parameters with words as values.

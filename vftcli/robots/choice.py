@@ -31,7 +31,12 @@ class RobotChoice(Choice):
     #: Profile name, robot file or description, None to take what the log settles.
     name: Annotated[
         str | None,
-        Option("--robot", "NAME|FILE", "Name the arm: profile, TOML, URDF, xacro, MJCF."),
+        Option(
+            "--robot",
+            "NAME|FILE",
+            "Name the arm: profile, TOML, URDF, xacro, MJCF.",
+            completes=lambda: PROFILES,
+        ),
     ] = None
     friction: Annotated[
         str,

@@ -7,7 +7,9 @@ the file of options and notebooks. What few users need is a setting, given by ``
     period: Annotated[float | None, setting("two-cycle.period", "S", "Commanded period.")] = None
 """
 
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping
+from importlib import import_module
 from inspect import get_annotations
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self, get_args
@@ -18,6 +20,9 @@ from vftcli.signals.errors import ParameterError
 LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
     "The log", "How to estimate", "How to compare", "The wrench", "What to write", "Output"
 )  # fmt: skip
+
+
+WORD = re.compile("[a-z][a-z-]+")  #: A value in a metavar, as `svg`; numbers and paths are none.
 
 
 class Option(NamedTuple):
@@ -34,6 +39,14 @@ class Option(NamedTuple):
     group: str = ""  #: The heading under which it is listed, "" for the command's own.
     least: float | None = None  #: Smallest number that is taken.
     most: float | None = None  #: Largest number that is taken.
+    #: What a shell offers for its value; None for the words of `metavar`.
+    completes: Callable[[], Iterable[str]] | None = None
+
+    def values(self) -> list[str]:
+        """What a shell offers for its value; where that is none, files."""
+        if self.completes is not None:
+            return list(self.completes())
+        return [word for word in self.metavar.split("|") if WORD.fullmatch(word)]
 
     def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
         """What a typed value means, None where nothing was typed."""
@@ -69,6 +82,12 @@ class Option(NamedTuple):
             what = "a whole number" if kind is int else "a number"
             raise ParameterError(f"--set {self.name}={text} is not {what}{bound}")
         return value
+
+
+def names_at(place: str) -> Callable[[], Iterable[str]]:
+    """A function that lists the names of ``module:TABLE``, which is loaded only then."""
+    module, _, table = place.partition(":")
+    return lambda: getattr(import_module(f"vftcli.{module}"), table)
 
 
 def setting(

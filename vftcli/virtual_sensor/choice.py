@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRENCH, Choice, Option, setting
+from vftcli.signals.option import WRENCH, Choice, Option, names_at, setting
 from vftcli.signals.parsing import check_known, interval
 
 if TYPE_CHECKING:
@@ -70,7 +70,10 @@ class WrenchChoice(Choice):
     frame: Annotated[
         str,
         Option(
-            "--frame", "FRAME", "Give the wrench in flange, base, tool or sensor (help frames)."
+            "--frame",
+            "FRAME",
+            "Give the wrench in flange, base, tool or sensor (help frames).",
+            completes=names_at("virtual_sensor.frames:FRAMES"),
         ),
     ] = "flange"
     #: A key of `vftcli.virtual_sensor.solvers.SOLVERS`, or `SMOOTHER`; None for the smoother where

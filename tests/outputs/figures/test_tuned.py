@@ -23,7 +23,7 @@ def spectra() -> Spectra:
 
 @pytest.fixture(scope="module")
 def tuned(spectra: Spectra) -> tuple[Tuned, ...]:
-    return tune_all(spectra, parse_goal("rmse"))
+    return tune_all(spectra, parse_goal("auto"))
 
 
 @pytest.mark.slow
