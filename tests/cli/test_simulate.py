@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from vftcli.cli.simulate import progress_bar, simulate_log
+from vftcli.cli.simulate import simulate_log
 from vftcli.readers import read
 from vftcli.signals.errors import VftError
 
@@ -87,7 +87,3 @@ def test_nothing_is_overwritten_without_force(tmp_path: Path) -> None:
 def test_without_a_place_nothing_is_simulated() -> None:
     result = CliRunner().invoke(app, ["ur5-circle"])
     assert (result.exit_code, "-o PATH says where" in result.output) == (2, True)
-
-
-def test_no_bar_without_a_terminal() -> None:
-    assert progress_bar() is None

@@ -1,7 +1,5 @@
 """`vftcli simulate`: an experiment as a log a robot would write, with the truth beside it."""
 
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -9,9 +7,6 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.signals.option import Option, names_at
-
-WIDTH = 30  #: Width of the progress bar. [characters]
-QUICK = 1.0  #: Runs shorter than this show no bar. [s]
 
 
 @opt.command
@@ -40,7 +35,7 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.cli.console import command_line, say, say_json, say_left_out
+    from vftcli.cli.console import command_line, say, say_json, say_left_out, stages
     from vftcli.outputs.simulation import free_path, log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
@@ -62,7 +57,8 @@ def simulate_log(
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
-    runs = simulate_pair(setup, seed, progress_bar())
+    progress = stages()
+    runs = simulate_pair(setup, seed, lambda k, of: progress("simulating", k / of, k / of))
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, log_format, force, command_line())]
     say_left_out(files)
@@ -73,24 +69,3 @@ def simulate_log(
         return
     for file in files:
         say(f"wrote {file}")
-
-
-def progress_bar() -> Callable[[int, int], None] | None:
-    """A line on stderr that says how far the run is, if somebody watches and it takes a while."""
-    import time
-
-    if not sys.stderr.isatty():
-        return None
-    begun = time.monotonic()
-
-    def show(done: int, total: int) -> None:
-        if time.monotonic() - begun < QUICK:
-            return
-        filled = WIDTH * done // max(total, 1)
-        typer.echo(
-            f"\r[{'#' * filled:<{WIDTH}}] {100 * done // max(total, 1)} %", err=True, nl=False
-        )
-        if done >= total:
-            typer.echo("\r" + " " * (WIDTH + 8) + "\r", err=True, nl=False)
-
-    return show
