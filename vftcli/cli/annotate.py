@@ -43,7 +43,13 @@ def annotate_dataset(
     wrench: opt.Typed[WrenchChoice],
     add: Annotated[
         list[str] | None,
-        Option("--add", "NAMES", "Add wrench, sd or contact columns as well.", group=WRITE),
+        Option(
+            "--add",
+            "NAMES",
+            "Add wrench, sd or contact columns as well.",
+            group=WRITE,
+            completes=lambda: ADDED,
+        ),
     ],
     workers: opt.Typed[WorkersChoice],
     anyway: opt.Anyway,

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
@@ -101,10 +101,12 @@ def identify_robot(
     from vftcli.readers.library import Library
 
     chosen, task, without_load = logged.robot.choice(), asked.choice(), free.choice()
+    refinement = bias.choice()
     pages = {"--check": check, "--open": show}
     check_uses(task, without_load, logs, {**pages, "--gains": goal.words["gains"]})
     if task.method == "gains":
-        find_gains(logs[0], output, logged, free, bias, goal.choice(), made, anyway=anyway)
+        also = {"free": without_load, "refinement": refinement, "anyway": anyway}
+        find_gains(logs[0], output, logged, goal.choice(), made, **also)
         return
     form, choice = made.figures, logged.reading.choice()
     # An episode is one of LOG's; the others are logs of their own.
@@ -148,12 +150,9 @@ def find_gains(
     log: Path,
     output: Path | None,
     logged: LogOptions,
-    free: opt.Typed[FreeChoice],
-    bias: opt.Typed[RefinementChoice],
     goal: GoalChoice,
     made: opt.MadeOptions,
-    *,
-    anyway: bool,
+    **others: Any,  # noqa: ANN401 - choices
 ) -> None:
     """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
     from vftcli.cli.console import command_line, detail, say, say_json, say_recording
@@ -172,10 +171,8 @@ def find_gains(
     wanted = parse_goal(goal.gains, goal.threshold)
     choice = logged.asked(
         Library([log]),
-        anyway=anyway,
-        free=free.choice(),
         observers=ObserverChoice(gains=LOG_GAINS, causal=True),
-        refinement=bias.choice(),
+        **others,
     )
     recording, arm = prepared(choice.library.open(log, choice.read), choice)
     output = output or file_for(arm)

@@ -5,7 +5,7 @@ from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, Option, is_yes, setting
-from vftcli.signals.parsing import interval
+from vftcli.signals.parsing import check_known, interval
 
 #: What ``--method`` takes; the gains of observers are `vftcli.observers.tuning`'s.
 METHODS = ("friction", "base", "targets", "payload", "gains")
@@ -43,8 +43,8 @@ class Task(Choice):
     friction: bool = True
 
     def __post_init__(self) -> None:
-        if self.method not in {None, *METHODS}:
-            raise ParameterError(f"--method {self.method!r}; there is {', '.join(METHODS)}")
+        if self.method is not None:
+            check_known(self.method, METHODS, f"--method {self.method}")
         if self.constants and self.method not in {None, "friction"}:
             raise ParameterError("--set identify.constants=yes is for --method friction")
         if self.method == "targets" and not self.friction:
