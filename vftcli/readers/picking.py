@@ -64,6 +64,8 @@ def picked(
     stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
+    if constants and np.isfinite(constants).all():
+        more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
     remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
     more.setdefault("wrench_frame", wrench.frame if wrench else None)
@@ -73,7 +75,6 @@ def picked(
         clock=words,
         signals=arrays,
         remarks=(*remarks, *more.pop("remarks", ())),
-        constants=constants,
         **more,
     )
 
