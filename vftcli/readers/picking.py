@@ -111,7 +111,7 @@ def _stamps(
     stamps = _ticks(table, picks, loaded, rows)
     if picks.clock is None:
         rate = picks.rate or 0.0
-        return stamps, 1 / rate, rate_words(rate)
+        return stamps, 1 / rate, clock_name or f"none: {rate:g} Hz as stated"
     cell = picks.clock.cells[0]
     name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
     words = clock_name or f"column {name}" if table.names else name
@@ -140,11 +140,6 @@ def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int) 
     column = loaded[cell.column]
     stamps: Column = column if cell.element is None else column[:, cell.element]
     return _of_pair(table, stamps, loaded[rest[0].column]) if rest else stamps
-
-
-def rate_words(rate: float) -> str:
-    """What the clock of a table without one is, given its rate. [Hz]"""
-    return f"none: {rate:g} Hz as stated"
 
 
 def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:

@@ -339,9 +339,3 @@ def arm_of(
         )
     taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
     return arms[0], (taken,)
-
-
-def refuse_arm(path: Path | str, request: ReadChoice) -> None:
-    """Refuse ``--arm`` for a log of one arm."""
-    if request.arm is not None:
-        raise LogError(f"{path}: a log of one arm; leave --arm out.")

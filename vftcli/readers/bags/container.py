@@ -9,7 +9,7 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.opening import check_unpacked
+from vftcli.readers.opening import check_unpacked, natural
 from vftcli.readers.reader import LogFile
 from vftcli.signals import letters
 from vftcli.signals.errors import LogError
@@ -174,12 +174,7 @@ def storage_files(file: LogFile) -> list[str]:
     """
     names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
     plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
-
-    def place(name: str) -> tuple[list[int], str]:  # bag_10.mcap behind bag_9.mcap
-        tail = name.split(".", maxsplit=1)[0].rpartition("_")[2]
-        return ([int(tail)] if tail.isdecimal() else [], name)
-
-    return sorted(plain, key=place)
+    return sorted(plain, key=natural)
 
 
 def printable(name: str) -> str:
