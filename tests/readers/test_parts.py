@@ -3,10 +3,12 @@
 from pathlib import Path
 
 import pytest
+import seed_logs
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.readers.reader import ReadChoice, arm_of, episode_of, refuse_arm
+from vftcli.readers import read
+from vftcli.readers.reader import ReadChoice, arm_of, episode_of
 from vftcli.signals.errors import LogError, ParameterError
 
 PATH = Path("log")
@@ -40,8 +42,11 @@ def test_one_arm_of_two_has_to_be_named_but_to_look_at() -> None:
         arm_of(PATH, ReadChoice(), arms)
     with pytest.raises(LogError, match="holds the left arm alone"):
         arm_of(PATH, ReadChoice(arm="right"), arms[:1])
-    with pytest.raises(LogError, match="one arm"):
-        refuse_arm(PATH, ReadChoice(arm="left"))
+
+
+def test_an_arm_of_a_log_of_one_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match="a log of one arm; leave --arm out"):
+        read(seed_logs.table_csv(tmp_path / "x"), arm="left")
 
 
 @pytest.mark.parametrize(("text", "number", "every"), [("3", 3, False), ("all", None, True)])

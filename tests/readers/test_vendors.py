@@ -3,6 +3,7 @@
 import json
 import os
 import pickle
+import tomllib
 import zipfile
 from collections import OrderedDict
 from pathlib import Path
@@ -24,7 +25,7 @@ from seed_logs import (
     ur_csv,
 )
 
-from vftcli.readers import read
+from vftcli.readers import FORMATS, LogFormat, read
 from vftcli.signals.errors import LogError
 from vftcli.signals.wrench import WrenchFrame
 
@@ -143,15 +144,15 @@ def test_states_as_json_lines(tmp_path: Path) -> None:
     lines = path.read_text().splitlines()
     lines[50] = lines[50].replace('"q": [', '"q": [nan, ', 1)
     path.write_text("\n".join(lines))
-    with pytest.raises(LogError, match="q is not 7 numbers in every state"):
+    with pytest.raises(LogError, match="q is not the same numbers in each of the objects"):
         read(path)
 
 
 def test_json_that_is_nested_or_endless_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "x"
-    for line in ('{"O_T_EE": ' + "[" * 50_000, '{"O_T_EE": "' + "x" * 100_000 + '"}'):
+    for line in ('{"O_T_EE": ' + "[" * 50_000, '{"O_T_EE": "' + "x" * (1 << 20) + '"}'):
         path.write_text(f"{line}\n{line}\n")
-        with pytest.raises(LogError, match="line 1 is not a robot state"):
+        with pytest.raises(LogError, match="line 1 is not one JSON object"):
             read(path)
 
 
@@ -252,3 +253,39 @@ def test_lerobot_reads_the_first_episode(tmp_path: Path) -> None:
     np.testing.assert_allclose(second.q, log["q"][30:], atol=1e-7)  # float32
     with pytest.raises(LogError, match="no episode 2; it holds 2 episodes, 0 to 1"):
         read(data / "file-000.parquet", episode=2)
+
+
+def test_a_format_that_nobody_has_yet_is_one_entry(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A table of a maker's own names, unit, sign and payload: an entry as in layouts.toml."""
+    entry = tomllib.loads(
+        """
+        title = "ACME controller"
+        recording = "acme log"
+        takes = "angles, torques"
+        pitfalls = "none"
+        [reader]
+        module = "tables"
+        line = 'tick;ang_1;'
+        columns = "t[ms]=tick,q[deg]=ang_{i},-tau=trq_{i}"
+        joints = 6
+        payload = "load"
+        clock = "controller clock"
+        """
+    )
+    made = LogFormat(name="acme", **entry.pop("reader"), **entry)
+    monkeypatch.setitem(FORMATS, "acme", made)
+    log = motion()
+    names = [f"{word}_{j}" for word in ("ang", "trq") for j in range(1, 7)]
+    lines = [";".join(["tick", *names, "load"])]
+    for k, row in enumerate(np.hstack([log["q"], log["tau"]])):
+        lines.append(";".join([str(8 * k), *map(repr, row.tolist()), "1.25"]))
+    path = tmp_path / "x"
+    path.write_text("\n".join(lines) + "\n")
+    recording = read(path)
+    assert (recording.source.format, recording.source.clock) == ("acme", "controller clock [ms]")
+    assert recording.payload_mass == 1.25
+    np.testing.assert_allclose(recording.q, np.radians(log["q"]), rtol=1e-15)  # one product
+    np.testing.assert_array_equal(recording.torque, 0.0 - log["tau"])
+    np.testing.assert_allclose(recording.t, log["t"], atol=1e-12)  # whole ms as float64

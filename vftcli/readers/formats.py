@@ -37,9 +37,10 @@ class LogFormat:
     takes_columns: bool = True  #: Whether the columns may be described by ``--columns``.
     describes: bool = False  #: Whether it reads ``--columns`` itself where its files are text.
     episodes: bool = False  #: Whether a file may hold several recordings.
-    arms: bool = False  #: Whether a log may be of two arms.
     columns: str = ""  #: The columns that its program writes, in the grammar of ``--columns``.
     joints: int = 0  #: How many joints such a log has, 0 for any number.
+    #: Columns of which the last values are the payload's mass and, if there, its centre of mass.
+    payload: str = ""
     clock: str = ""  #: Which clock its stamps are from, in words; "" for the column's name.
     remedy: str = ""  #: What to do where clock or positions are missing.
 

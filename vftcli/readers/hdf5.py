@@ -19,8 +19,7 @@ from typing import Any, NamedTuple
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.opening import check_unpacked, unpacked_limit
-from vftcli.readers.picking import rate_words
+from vftcli.readers.opening import check_unpacked, natural, unpacked_limit
 from vftcli.readers.reader import (
     ARMS,
     Episodes,
@@ -29,7 +28,6 @@ from vftcli.readers.reader import (
     ReadChoice,
     arm_of,
     open_log,
-    refuse_arm,
 )
 from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, described, from_table
@@ -174,12 +172,6 @@ def is_signal(dataset: Any, fewest_rows: int) -> bool:  # noqa: ANN401 - h5py
     return not dataset.is_virtual and not dataset.external
 
 
-def natural(name: str) -> list[tuple[int, int, str]]:
-    """A key that puts demo_2 before demo_10."""
-    parts = re.split(r"(\d{1,9})", name)
-    return [(1, int(p), "") if p.isdecimal() else (0, 0, p) for p in parts]
-
-
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
 ALOHA_WIDTH, ALOHA_ARM = 14, 7  #: Two arms of six joints, a gripper behind each.
 ALOHA, DYNAMIXEL = "observations/qpos", "observations/effort"  #: ALOHA's positions and efforts.
@@ -221,8 +213,7 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     names = table.names
     if table.lists.get(names.index(ALOHA), 1) != ALOHA_WIDTH:
         return read_any(table, request)
-    if stated := request.spec.item("q") is not None:
-        refuse_arm(table.path, request)
+    stated = request.spec.item("q") is not None
     places = "left: columns 0-5, right: columns 7-12"
     arm, remarks = (ARMS[0], ()) if stated else arm_of(table.path, request, ARMS, places)
     first = ALOHA_ARM * ARMS.index(arm)
@@ -231,15 +222,13 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     usual += f",current[mA]={DYNAMIXEL}{span}"
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
-    raw = described(table, usual, request, remarks=remarks)
-    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention"
-    own = raw.clock == rate_words(ALOHA_RATE)
-    return replace(raw, clock=clock if own else raw.clock, part="" if stated else f"{arm} arm")
+    clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention" if not request.spec.item("t") else ""
+    raw = described(table, usual, request, remarks=remarks, clock_name=clock)
+    return replace(raw, part="" if stated else f"{arm} arm")
 
 
 def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
-    refuse_arm(table.path, request)
     if request.spec.item("q"):
         return from_table(table, request)
     names = table.names
@@ -264,7 +253,6 @@ def robot_of(folder: Path) -> str | None:
 
 def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """Any other file: by --columns, or by alias among the datasets of one group."""
-    refuse_arm(table.path, request)
     if request.spec.item("q"):
         return from_table(table, request)
     if len(fitting := [x.name for x in LAYOUTS if x.groups(table.names)]) > 1:

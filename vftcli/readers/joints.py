@@ -33,11 +33,21 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
     """Positions of the arm's joints among `names`, base to tip.
 
     Franka and UR joints are found by name wherever they stand, prefixes and further joints (a
-    gripper's fingers) set aside; unknown names keep the file's order.
+    gripper's fingers) set aside; UR's words and joints called joint1, joint_2, … where there are no
+    others. Unknown names keep the file's order.
     """
-    for order in (_franka_order(names), _ur_order(names), _word_order(names), _numbered(names)):
-        if order:
-            return order
+    words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
+    numbers = (NUMBERED.fullmatch(name) for name in names)
+    every: tuple[tuple[int, list[int | None]], ...] = (
+        (7, [int(m[2]) if (m := FRANKA.fullmatch(name)) else None for name in names]),
+        (6, [next((j for j, u in enumerate(UR_NAMES) if n.endswith(u)), None) for n in names]),
+        (6, [UR_WORDS.index(w) if len(words) == 6 and w in UR_WORDS else None for w in words]),
+        (len(names), [int(m[1]) if m else None for m in numbers]),
+    )
+    for count, places in every:
+        found = {place: k for k, place in enumerate(places) if place is not None}
+        if len(found) == count == len(places) - places.count(None):
+            return tuple(found[place] for place in sorted(found))
     return tuple(range(len(names)))
 
 
@@ -90,42 +100,6 @@ def laid_along(raw: RawLog, names: Sequence[str], request: ReadChoice) -> RawLog
         robot_hint=robot_of(ordered),
         remarks=remarks,
     )
-
-
-def _franka_order(names: Sequence[str]) -> tuple[int, ...]:
-    """Franka's seven joints by their numbers, () if there are not exactly seven of them."""
-    found = {int(m[2]): k for k, name in enumerate(names) if (m := FRANKA.fullmatch(name))}
-    if len(found) != 7 or sum(bool(FRANKA.fullmatch(name)) for name in names) != 7:
-        return ()
-    return tuple(found[j] for j in range(1, 8))
-
-
-def _ur_order(names: Sequence[str]) -> tuple[int, ...]:
-    """UR's joints by the drivers' names, () if one is missing or stands twice."""
-    order = []
-    for wanted in UR_NAMES:
-        found = [k for k, name in enumerate(names) if name.endswith(wanted)]
-        if len(found) != 1:
-            return ()
-        order.append(found[0])
-    return tuple(order)
-
-
-def _word_order(names: Sequence[str]) -> tuple[int, ...]:
-    """UR's joints by the names on the teach pendant, () for other names."""
-    words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
-    if sorted(words) != sorted(UR_WORDS):
-        return ()
-    return tuple(words.index(word) for word in UR_WORDS)
-
-
-def _numbered(names: Sequence[str]) -> tuple[int, ...]:
-    """Joints called joint1, joint_2, …: by number, if every one has its own and they are whole."""
-    matches = [NUMBERED.fullmatch(name) for name in names]
-    numbers = [int(m[1]) for m in matches if m]
-    if len(numbers) != len(names) or len(set(numbers)) != len(numbers):
-        return ()
-    return tuple(int(k) for k in sorted(range(len(numbers)), key=lambda k: numbers[k]))
 
 
 def robot_of(names: Sequence[str]) -> str | None:

@@ -24,7 +24,6 @@ from vftcli.readers.reader import (
     ReadChoice,
     arm_of,
     open_log,
-    refuse_arm,
 )
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described
@@ -101,7 +100,6 @@ def read_episode(
     names: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     if request.spec.item("q"):
-        refuse_arm(file.path, request)
         usual, side = "t=timestamp,q=observation.state", ""
     else:
         each_of = info.get("features")
@@ -140,8 +138,6 @@ def columns_of(
         side, said = arm_of(path, request, sides)
         remarks = (*remarks, *said)
         there = [e for e in there if e.side in {side, ""}]
-    else:
-        refuse_arm(path, request)
     by_signal = {s: [e for e in there if e.signal == s] for s in MEASURED}
     if not by_signal["q"]:
         raise LogError(

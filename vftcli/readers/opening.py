@@ -2,12 +2,14 @@
 
 import hashlib
 import mmap
+import re
 import threading
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from vftcli.signals.errors import LogError
 
@@ -104,50 +106,43 @@ class Unpacker:
         self.ended = False
 
     def pieces(self) -> Iterator[bytes]:
-        """The content, piece by piece."""
-        total = 0
-        for piece in self._gunzipped() if self.wrapping == "gzip" else self._unzstd():
-            total += len(piece)
-            if total > self.limit:
-                raise LogError(
-                    f"{self.path}: unpacks to more than {self.limit >> 20} MiB, more than a log "
-                    f"this small can hold. If it is genuine, unpack it ({self.wrapping} -d) and "
-                    "give the unpacked file."
-                )
-            yield piece
+        """The content, piece by piece: members of gzip, or frames of zstd, one after another."""
+        new: Callable[[], Any]
+        damage: type[Exception]
+        if gzip := self.wrapping == "gzip":
+            new, damage, size = partial(zlib.decompressobj, wbits=31), zlib.error, CHUNK // 16
+        else:
+            import zstandard
 
-    def _gunzipped(self) -> Iterator[bytes]:
-        """The content of a gzip file, member by member."""
+            new = zstandard.ZstdDecompressor(max_window_size=1 << 27).decompressobj
+            damage, size = zstandard.ZstdError, ZSTD_BYTES
+        unpacker, total = new(), 0
         with self.path.open("rb") as file:
-            unpacker = zlib.decompressobj(wbits=31)
-            while packed := file.read(CHUNK // 16):
-                try:
-                    while packed:
-                        yield unpacker.decompress(packed, CHUNK)
-                        packed = unpacker.unconsumed_tail
-                        if unpacker.eof and (packed := unpacker.unused_data.lstrip(b"\0")):
-                            unpacker = zlib.decompressobj(wbits=31)  # the next member
-                except zlib.error as error:
-                    raise LogError(f"{self.path}: the gzip file is damaged ({error})") from None
-            self.ended = unpacker.eof
+            while packed := file.read(size):
+                while packed:
+                    try:
+                        piece = unpacker.decompress(packed, *[CHUNK] * gzip)
+                    except damage as error:
+                        told = f"{self.path}: the {self.wrapping} file is damaged ({error})"
+                        raise LogError(told) from None
+                    total += len(piece)
+                    if total > self.limit:
+                        raise LogError(
+                            f"{self.path}: unpacks to more than {self.limit >> 20} MiB, more than "
+                            "a log this small can hold. If it is genuine, unpack it "
+                            f"({self.wrapping} -d) and give the unpacked file."
+                        )
+                    yield piece
+                    packed = unpacker.unconsumed_tail if gzip else b""
+                    if unpacker.eof and (packed := unpacker.unused_data.lstrip(b"\0" * gzip)):
+                        unpacker = new()
+        self.ended = unpacker.eof
 
-    def _unzstd(self) -> Iterator[bytes]:
-        """The content of a zstd file, frame by frame."""
-        import zstandard
 
-        context = zstandard.ZstdDecompressor(max_window_size=1 << 27)
-        with self.path.open("rb") as file:
-            unpacker = context.decompressobj()
-            while packed := file.read(ZSTD_BYTES):
-                try:
-                    while packed:
-                        yield unpacker.decompress(packed)
-                        packed = b""
-                        if unpacker.eof and (packed := unpacker.unused_data):
-                            unpacker = context.decompressobj()  # the next frame
-                except zstandard.ZstdError as error:
-                    raise LogError(f"{self.path}: the zstd file is damaged ({error})") from None
-            self.ended = unpacker.eof
+def natural(name: str) -> list[tuple[int, int, str]]:
+    """A key that puts demo_2 before demo_10."""
+    parts = re.split(r"(\d{1,9})", name)
+    return [(1, int(p), "") if p.isdecimal() else (0, 0, p) for p in parts]
 
 
 def files_of(path: Path) -> list[Path]:

@@ -64,6 +64,8 @@ def picked(
     stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
+    if constants and np.isfinite(constants).all():
+        more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
     remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
     wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
     more.setdefault("wrench_frame", wrench.frame if wrench else None)
@@ -73,7 +75,6 @@ def picked(
         clock=words,
         signals=arrays,
         remarks=(*remarks, *more.pop("remarks", ())),
-        constants=constants,
         **more,
     )
 
@@ -110,7 +111,7 @@ def _stamps(
     stamps = _ticks(table, picks, loaded, rows)
     if picks.clock is None:
         rate = picks.rate or 0.0
-        return stamps, 1 / rate, rate_words(rate)
+        return stamps, 1 / rate, clock_name or f"none: {rate:g} Hz as stated"
     cell = picks.clock.cells[0]
     name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
     words = clock_name or f"column {name}" if table.names else name
@@ -139,11 +140,6 @@ def _ticks(table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int) 
     column = loaded[cell.column]
     stamps: Column = column if cell.element is None else column[:, cell.element]
     return _of_pair(table, stamps, loaded[rest[0].column]) if rest else stamps
-
-
-def rate_words(rate: float) -> str:
-    """What the clock of a table without one is, given its rate. [Hz]"""
-    return f"none: {rate:g} Hz as stated"
 
 
 def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:

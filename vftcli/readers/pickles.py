@@ -5,14 +5,12 @@ import pickle
 import pickletools
 import re
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.arrays_file import dictionary_episodes
-from vftcli.readers.reader import Episodes, LogFile
+from vftcli.readers.reader import LogFile
 from vftcli.signals.errors import LogError
 
 #: Numbers that a pickle of any size may build; a larger one as many as it has bytes.
@@ -236,15 +234,3 @@ def _check_opcodes(content: bytes) -> None:
         # A memo index allocates a list of its size.
         if isinstance(argument, int) and "PUT" in opcode.name and argument > len(content):
             raise Refused("a memo larger than the file")
-
-
-@contextmanager
-def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of a pickled dictionary: panda-py's get_log(), frankapy's skills."""
-    log = load_arrays_only(file)
-    if not isinstance(log, dict):
-        raise LogError(
-            f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of arrays. "
-            "Save the log with np.savez."
-        )
-    yield dictionary_episodes(file, log)

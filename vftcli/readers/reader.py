@@ -1,6 +1,5 @@
 """Reader: what a log format is to this package, and the file a reader is handed."""
 
-import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -110,8 +109,6 @@ class RawLog:
     degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
     #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: "tuple[Remark, ...]" = ()
-    #: Last values of the columns with the payload: its mass, its centre of mass.
-    constants: tuple[float, ...] = ()
     payload_mass: float | None = None  #: Mass the controller was told of. [kg]
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
@@ -121,17 +118,6 @@ class RawLog:
     rows: "Indices | None" = None
     #: Rows of the file that were left out because a value is no number.
     unknown: "Indices | None" = None
-
-    def told_payload(self, constants: tuple[float, ...]) -> Self:
-        """The log with the payload that its controller was told of last.
-
-        Args:
-            constants: Mass and centre of mass, as `constants` has them. [kg, m]
-        """
-        if len(constants) != 4 or not all(map(math.isfinite, constants)):
-            return self
-        mass, *com = constants
-        return replace(self, constants=constants, payload_mass=mass, payload_com=tuple(com))
 
 
 ARMS = ("left", "right")  #: Values of ``--arm``.
@@ -336,9 +322,3 @@ def arm_of(
         )
     taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
     return arms[0], (taken,)
-
-
-def refuse_arm(path: Path | str, request: ReadChoice) -> None:
-    """Refuse ``--arm`` for a log of one arm."""
-    if request.arm is not None:
-        raise LogError(f"{path}: a log of one arm; leave --arm out.")

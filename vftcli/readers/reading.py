@@ -16,7 +16,6 @@ from vftcli.readers.reader import (
     RawLog,
     ReadChoice,
     open_log,
-    refuse_arm,
 )
 from vftcli.signals.arrays import number_array
 from vftcli.signals.errors import (
@@ -77,8 +76,6 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     reader = _reader(file, choice.format, choice.columns)
     if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
-    if not reader.arms:
-        refuse_arm(path, choice)
     digest = Digest((path,))
     if "polars" not in sys.modules and not reader.episodes:
         digest.start()  # its import takes longer than the hash and leaves a core idle
@@ -87,6 +84,8 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
         raw = reader.read(file, choice)
         raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
         raw = without_unknown_rows(raw) if choice.skips_unknown else raw
+    if choice.arm is not None and not raw.part.endswith("arm"):
+        raise LogError(f"{path}: a log of one arm; leave --arm out.")
     digest = Digest(raw.files) if raw.files else digest
     if not raw.part:
         digest.start()  # of one of many parts it may never be asked for

@@ -1,11 +1,9 @@
-"""Generic tables: headed by aliases or described by --columns; text, npy, npz and Parquet."""
+"""Generic tables: headed by aliases, described by --columns, or by the layout of a format."""
 
 import math
-import tokenize
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -23,11 +21,6 @@ from vftcli.readers.table import Cell, Column, Table, missing_column, named_cell
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
-#: What NumPy raises for a header or content that is no array.
-NOT_AN_ARRAY = (
-    ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
-    RecursionError, tokenize.TokenError,
-)  # fmt: skip
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
@@ -67,7 +60,6 @@ def read_layout(
     table: Table,
     layout: LogFormat,
     request: ReadChoice,
-    constants: Sequence[str] = (),
     **more: Any,  # noqa: ANN401
 ) -> RawLog:
     """Read a table by the columns of its format; what it has not of them is left out.
@@ -76,7 +68,6 @@ def read_layout(
         table: The table.
         layout: Its format.
         request: What is wanted.
-        constants: Names of columns of which the last value counts.
         more: Further fields of the RawLog.
 
     Raises:
@@ -88,8 +79,9 @@ def read_layout(
     picks, names = picks_of(table, spec), table.names
     # Of the vendors' signals libfranka's residual alone is turned.
     signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
-    places = tuple(names.index(name) for name in constants if name in names)
-    picks = replace(picks, signals=tuple(signals), constants=places)
+    payload = layout.payload.split()
+    constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
+    picks = replace(picks, signals=tuple(signals), constants=constants)
     return picked(table, picks, request, clock_name=layout.clock, **more)
 
 
@@ -208,53 +200,6 @@ class ArrayTable:
         return loaded
 
 
-def numpy_array(path: Path, content: Any) -> Column:  # noqa: ANN401 - any readable buffer
-    """One array of an .npy file, never executing what it may carry."""
-    try:
-        array = np.lib.format.read_array(BytesIO(content), allow_pickle=False)
-    except NOT_AN_ARRAY as error:
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: not a readable array ({reason}). Save it with np.save.") from None
-    return np.asarray(array)
-
-
-def read_npy(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read an .npy file: a matrix with one row a sample, or a structured array."""
-    check_npy_header(file, len(file.content))
-    array = numpy_array(file.path, file.content)
-    if array.dtype.names:
-        return from_table(
-            ArrayTable(path=file.path, columns={n: array[n] for n in array.dtype.names}), request
-        )
-    if array.ndim != 2 or array.size == 0:
-        raise LogError(
-            f"{file.path}: the array has shape {array.shape}; a log is a matrix, a row a sample."
-        )
-    columns = {str(k): array[:, k] for k in range(array.shape[1])}
-    return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
-
-
-def check_npy_header(file: LogFile, size: int) -> None:
-    """Raise a LogError if the array that the header claims is larger than `size` bytes."""
-    stream = BytesIO(file.head)
-    try:
-        version = np.lib.format.read_magic(stream)
-        header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, _, dtype = header(stream)
-        claimed = int(np.prod([int(s) for s in shape], dtype=object)) * dtype.itemsize
-    except NOT_AN_ARRAY as error:
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{file.path}: not a readable .npy file ({reason})") from None
-    if claimed != size - stream.tell() or any(s < 0 for s in shape):
-        raise LogError(
-            f"{file.path}: the header claims {claimed} bytes of numbers, the file holds "
-            f"{size - stream.tell()}; it is cut, damaged, or holds more than one array."
-        )
-
-
 def recognises(file: LogFile, layout: LogFormat) -> bool:
     """Whether a text is a table without a header, or a line of names above mostly numbers."""
     if not file.lines:
@@ -270,9 +215,7 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read a table of text by its layout, --columns or aliases, or an .npy file."""
-    if layout.name == "npy":
-        return read_npy(file, request)
+    """Read a table of text by its layout, --columns or aliases."""
     if layout.columns:
         return read_layout(TextTable(file), layout, request)
     return from_table(TextTable(file), request)

@@ -1,29 +1,19 @@
-"""What vendors' own programs write: UR's real-time data exchange, and libfranka's robot states.
+"""UR's real-time data exchange: the official client's text and binary files, and ur_rtde's CSV."""
 
-RTDE comes as the official client's text and binary files, and as ur_rtde's CSV.
-"""
-
-import json
-import re
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
-from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.formats import FORMATS, LogFormat
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice
-from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, read_layout
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import WrenchFrame
 
-#: The payload that is set in the controller; its last value counts.
-PAYLOAD = ("payload", "payload_cog_0", "payload_cog_1", "payload_cog_2")
 #: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
 CB3_CYCLE = 8e-3
 E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
@@ -39,13 +29,10 @@ BINARY_TYPES = {
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read a table of RTDE names, or robot states in JSON."""
-    if layout.name == "libfranka-json":
-        return read_states(file, request, layout)
+    """Read a table of RTDE names."""
     table = binary_table(file) if layout.name == "ur-binary" else TextTable(file)
-    raw = read_layout(table, FORMATS["ur-csv"], request, PAYLOAD)
-    raw = replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
-    return raw.told_payload(raw.constants)
+    raw = read_layout(table, FORMATS["ur-csv"], request)
+    return replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
 
 
 def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
@@ -96,63 +83,3 @@ def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
     if unknown := set(types) - set(BINARY_TYPES):
         raise LogError(f"{file.path}: unknown column type {unknown.pop()!r} in the second line.")
     return names, types, len(first) + len(second) + 2
-
-
-#: Non-finite numbers as C++ streams print them.
-NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
-MAX_LINE = 64 * 1024  #: A robot state takes 1.7 kB; a line longer than this is no robot state.
-
-
-def read_states(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read libfranka's robot states, printed one a line."""
-    states, skipped, cut = [], 0, False
-    lines = bytes(file.content).replace(b"\r", b"\n").split(b"\n")
-    numbered = [(k, line) for k, line in enumerate(lines, start=1) if line.strip()]
-    for number, line in numbered:
-        if not line.lstrip().startswith(b"{"):
-            skipped += 1
-        elif (state := state_in(line)) is not None:
-            states.append(state)
-        elif number == numbered[-1][0]:
-            cut = True
-        else:
-            raise LogError(f"{file.path}: line {number} is not a robot state in JSON.")
-    if not states:
-        raise LogError(f"{file.path}: no robot state in any line.")
-    remarks = [fact("lines-skipped", lines=skipped)] if skipped else []
-    remarks += [fact("line-cut")] if cut else []
-    columns = {"time": field_of(file, states, "time", ())}
-    for item in parse_columns(layout.columns).items:
-        if (name := str(item.pattern)) in states[0] and item.signal != "t":
-            width = 6 if item.signal == "wrench" else layout.joints
-            columns[name] = field_of(file, states, name, (width,))
-    table = ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
-    mass = states[-1].get("m_load")
-    mass_kg = float(mass) if isinstance(mass, int | float) else None
-    return read_layout(table, layout, request, payload_mass=mass_kg)
-
-
-def state_in(line: bytes) -> dict[str, Any] | None:
-    """The robot state that a line holds, or None."""
-    if len(line) > MAX_LINE:
-        return None
-    text = NOT_JSON.sub(lambda m: m[1] + {b"nan": b"NaN", b"inf": b"Infinity"}[m[2]], line)
-    try:
-        state = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    return state if isinstance(state, dict) else None
-
-
-def field_of(
-    file: LogFile, states: list[dict[str, Any]], name: str, shape: tuple[int, ...]
-) -> Column:
-    """One field of all states. (T, *shape)"""
-    try:
-        column = np.array([state[name] for state in states], dtype=np.float64)
-    except (KeyError, ValueError, TypeError, OverflowError):
-        column = np.empty(0)
-    if column.shape != (len(states), *shape):
-        wanted = f"{shape[0]} numbers" if shape else "one number"
-        raise LogError(f"{file.path}: {name} is not {wanted} in every state.")
-    return column

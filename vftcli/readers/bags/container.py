@@ -4,12 +4,12 @@ import io
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, BinaryIO, Literal, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.opening import check_unpacked
+from vftcli.readers.opening import check_unpacked, natural
 from vftcli.readers.reader import LogFile
 from vftcli.signals import letters
 from vftcli.signals.errors import LogError
@@ -17,11 +17,6 @@ from vftcli.signals.remarks import Remark, caution, fact, warning
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
-Encoding = Literal["ros1", "cdr", "json", "protobuf", "other"]
-
-ROSBAG1 = b"#ROSBAG V2.0\n"
-MCAP = b"\x89MCAP0\r\n"
-SQLITE = b"SQLite format 3\0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +25,7 @@ class Channel:
 
     topic: str  #: Its name.
     type: str  #: Message type as package/Name, without the middle part that ROS 2 writes.
-    encoding: Encoding  #: How its messages are serialised.
+    encoding: str  #: How its messages are serialised: ros1, cdr, json, protobuf, or other.
     definition: str = ""  #: Text of the message definition, or nothing if the container has none.
     idl: bool = False  #: Whether the definition is in IDL.
 
@@ -179,14 +174,7 @@ def storage_files(file: LogFile) -> list[str]:
     """
     names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
     plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
-    return sorted(plain, key=_numbers_in)
-
-
-def _numbers_in(name: str) -> tuple[list[int], str]:
-    """What sorts bag_10.mcap behind bag_9.mcap."""
-    stem = name.split(".", maxsplit=1)[0]
-    tail = stem.rpartition("_")[2]
-    return ([int(tail)] if tail.isdecimal() else [], name)
+    return sorted(plain, key=natural)
 
 
 def printable(name: str) -> str:
@@ -200,15 +188,25 @@ def type_name(name: str) -> str:
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
 
-def unpack_chunk(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
-    """Unpack one chunk of a bag or MCAP, bounded by the size that it claims."""
+def file_of(content: memoryview) -> BinaryIO:
+    """A log's content as a file that libraries read, from its start, without a copy."""
+    whole: Any = content.obj
+    if isinstance(whole, bytes):
+        return io.BytesIO(whole)
+    whole.seek(0)  # a mapped file
+    mapped: BinaryIO = whole
+    return mapped
+
+
+def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesIO:
+    """One chunk of a bag or MCAP, unpacked to the size that it claims, as libraries read a file."""
     import bz2
 
     import lz4.frame
     import zstandard
 
     if name in {"", "none"}:
-        return packed
+        return io.BytesIO(packed)
     ingest.claim(size)
     content: bytes
     if name == "lz4":
@@ -221,22 +219,6 @@ def unpack_chunk(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
         raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
     if len(content) != size:
         raise LogError(f"{ingest.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
-    return content
-
-
-def file_of(content: memoryview) -> BinaryIO:
-    """A log's content as a file that libraries read, from its start, without a copy."""
-    whole: Any = content.obj
-    if isinstance(whole, bytes):
-        return io.BytesIO(whole)
-    whole.seek(0)  # a mapped file
-    mapped: BinaryIO = whole
-    return mapped
-
-
-def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesIO:
-    """One chunk of a bag or MCAP, unpacked, as a file that libraries read."""
-    content = unpack_chunk(ingest, name, packed, size)
     usual = len(content) <= USUAL_RATIO * len(packed)
     return io.BytesIO(content) if usual else _Counted(content, ingest)
 

@@ -3,6 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,81 +15,57 @@ from vftcli.readers.joints import in_order, kinematic_order
 from vftcli.readers.table import Column
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
-from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
-
-VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
 
-@dataclass(frozen=True, kw_only=True)
-class Kind:
+def paths_by_name(text: str) -> dict[str, tuple[str, ...]]:
+    """Name → paths, of words as "q=position|q": two paths are two releases' names of one field."""
+    words = (word.split("=") for word in text.split())
+    return {name: tuple(paths.split("|")) for name, paths in words}
+
+
+class Kind(NamedTuple):
     """One message type."""
 
-    #: Signal → dotted paths to try in turn; a path that ends in `.wrench` means its six numbers.
+    #: Signal → dotted paths to try in turn; a path of six numbers means force and torque below it.
     #: `effort` is decided later, by the joints' names.
     signals: Mapping[str, tuple[str, ...]]
-    names: tuple[str, ...] = ()  #: Path of the joints' names.
-    robot_time: str = "time"  #: Path of the robot's own clock. [s]
+    names: str = ""  #: Path of the joints' names.
     frame: str = ""  #: Path of the frame's name.
-    #: Name → path of a number of which the last value counts.
-    constants: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    rank: int = 0  #: Which type is preferred as the clock when two run at one rate; the larger.
-    turned: frozenset[str] = frozenset()  #: Signals whose sign has to be turned.
-    wrench_frame: WrenchFrame | None = None  #: What is known of its wrench.
+    #: Name → paths to try of the load's numbers, of which the last value counts.
+    constants: Mapping[str, tuple[str, ...]] = {}
+    #: Whether it is Franka's: it leads, its residual is to be turned, its wrench's frame is known.
+    franka: bool = False
 
 
-#: Message type → the signals that are read from it.
-KINDS: dict[str, Kind] = {
+#: Path of a robot's own clock in any type. [s]
+ROBOT_TIME = "time"
+#: Message type → what is read from it.
+KINDS = {
     "sensor_msgs/JointState": Kind(
-        signals={"q": ("position",), "dq": ("velocity",), "effort": ("effort",)},
-        names=("name",),
-        rank=1,
+        paths_by_name("q=position dq=velocity effort=effort"), names="name"
     ),
     "franka_msgs/FrankaState": Kind(
-        signals={
-            "q": ("q",),
-            "dq": ("dq",),
-            "torque": ("tau_J",),
-            "target_q": ("q_d",),
-            "target_dq": ("dq_d",),
-            "tau_ext": ("tau_ext_hat_filtered",),
-            "wrench": ("O_F_ext_hat_K",),
-        },
-        constants={
-            "mass": ("m_load",),
-            "com": ("F_x_Cload",),
-        },
-        rank=2,
-        turned=frozenset({"tau_ext"}),
-        wrench_frame=FRANKA_FRAME,
+        paths_by_name(
+            "q=q dq=dq torque=tau_J target_q=q_d target_dq=dq_d tau_ext=tau_ext_hat_filtered "
+            "wrench=O_F_ext_hat_K"
+        ),
+        constants=paths_by_name("mass=m_load com=F_x_Cload"),
+        franka=True,
     ),
     "franka_msgs/FrankaRobotState": Kind(
-        signals={
-            "q": ("measured_joint_state.position", "q"),
-            "dq": ("measured_joint_state.velocity", "dq"),
-            "torque": ("measured_joint_state.effort", "tau_j"),
-            "target_q": ("desired_joint_state.position", "q_d"),
-            "target_dq": ("desired_joint_state.velocity", "dq_d"),
-            "tau_ext": ("tau_ext_hat_filtered.effort", "tau_ext_hat_filtered"),
-            "wrench": ("o_f_ext_hat_k.wrench", "o_f_ext_hat_k"),
-        },
-        names=("measured_joint_state.name",),
-        constants={"mass": ("inertia_load.inertia.m", "m_load"), "com": ("f_x_cload",)},
-        rank=2,
-        turned=frozenset({"tau_ext"}),
-        wrench_frame=FRANKA_FRAME,
+        paths_by_name(
+            "q=measured_joint_state.position|q dq=measured_joint_state.velocity|dq "
+            "torque=measured_joint_state.effort|tau_j target_q=desired_joint_state.position|q_d "
+            "target_dq=desired_joint_state.velocity|dq_d "
+            "tau_ext=tau_ext_hat_filtered.effort|tau_ext_hat_filtered "
+            "wrench=o_f_ext_hat_k.wrench|o_f_ext_hat_k"
+        ),
+        names="measured_joint_state.name",
+        constants=paths_by_name("mass=inertia_load.inertia.m|m_load com=f_x_cload"),
+        franka=True,
     ),
-    "geometry_msgs/WrenchStamped": Kind(signals={"wrench": ("wrench",)}, frame="header.frame_id"),
+    "geometry_msgs/WrenchStamped": Kind(paths_by_name("wrench=wrench"), frame="header.frame_id"),
 }
-
-
-def paths_in(kind: Kind, signal: str, leaves: Mapping[str, object]) -> tuple[str, ...]:
-    """The paths of a signal that a message has: one, or the six of a wrench; () if none."""
-    for path in kind.signals[signal]:
-        if path in leaves:
-            return (path,)
-        if all(f"{path}.{part}" in leaves for part in VECTORS):
-            return tuple(f"{path}.{part}" for part in VECTORS)
-    return ()
 
 
 #: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary.
@@ -183,26 +160,16 @@ class Decoder:
     def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
         """Decode the messages of one length, layout by layout."""
         rows = np.flatnonzero(batch.lengths == length)
-        known = topic.layouts.setdefault(length, [])
-        for layout in known:
-            rows = self._matching(batch, topic, layout, rows)
+        known, place = topic.layouts.setdefault(length, []), 0
         while rows.size:
-            layout = self._walked(batch, topic, int(rows[0]))
-            known.append(layout)
-            if sum(map(len, topic.layouts.values())) > LAYOUTS:
-                raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
-            rows = self._matching(batch, topic, layout, rows)
-
-    def _matching(
-        self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers
-    ) -> Integers:
-        """Decode the rows that have a layout and return the others."""
-        if rows.size == 0:
-            return rows
-        fits = layout.fits(batch.buffer, batch.offsets[rows])
-        if fits.any():
-            self._decode(batch, topic, layout, rows[fits])
-        return rows[~fits]
+            if place == len(known):
+                known.append(self._walked(batch, topic, int(rows[0])))
+                if sum(map(len, topic.layouts.values())) > LAYOUTS:
+                    raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
+            fits = known[place].fits(batch.buffer, batch.offsets[rows])
+            if fits.any():
+                self._decode(batch, topic, known[place], rows[fits])
+            rows, place = rows[~fits], place + 1
 
     def _walked(self, batch: Batch, topic: _Topic, row: int) -> MessageLayout:
         """The layout of one message."""
@@ -219,18 +186,13 @@ class Decoder:
                 if self._walked(batch, topic, int(row)).leaves != layout.leaves:
                     raise LayoutError("two walks of one message differ")
         kind = KINDS[batch.channel.type]
-        offsets = batch.offsets[rows]
-        signals = {}
-        for signal in kind.signals:
-            paths = paths_in(kind, signal, layout.leaves)
-            columns = [layout.numbers(path, batch.buffer, offsets) for path in paths]
-            if columns and (value := np.hstack(columns)).shape[1]:
-                signals[signal] = value
-        for name, places in kind.constants.items():
-            if path := next((place for place in places if place in layout.leaves), None):
-                last = layout.numbers(path, batch.buffer, offsets[-1:])[0]
-                topic.constants[name] = tuple(float(value) for value in last)
-        names = next((layout.texts[p] for p in kind.names if p in layout.texts), ())
+        at = batch.buffer, batch.offsets[rows]
+        each = {signal: layout.numbers(paths, *at) for signal, paths in kind.signals.items()}
+        signals = {signal: value for signal, value in each.items() if value.shape[1]}
+        for name, paths in kind.constants.items():
+            if (last := layout.numbers(paths, *at)[-1]).size:
+                topic.constants[name] = tuple(last.tolist())
+        names = layout.texts.get(kind.names, ())
         order = kinematic_order(names)
         # Some drivers publish joints alphabetically; every message of a layout has one order.
         mixed = order != tuple(range(len(names)))
@@ -242,11 +204,13 @@ class Decoder:
             }
             names = tuple(names[k] for k in order)
         frame = "".join(layout.texts.get(kind.frame, ()))
-        has_clock = kind.robot_time in layout.leaves
-        clock = layout.numbers(kind.robot_time, batch.buffer, offsets)[:, 0] if has_clock else None
-        own = {"header": _stamps(layout, batch, offsets), "robot": clock}
-        part = {name: values for name, values in own.items() if values is not None} | signals
-        part |= {"place": topic.seen + rows, "receive": batch.times[rows]}
+        part = signals | {"place": topic.seen + rows, "receive": batch.times[rows]}
+        if (clock := layout.numbers([ROBOT_TIME], *at)).size:
+            part["robot"] = clock[:, 0]
+        # float64 holds both whole.
+        stamp = [layout.numbers([f"header.stamp.{part}"], *at) for part in ("sec", "nanosec")]
+        if all(number.size for number in stamp):
+            part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
         key = names, frame, tuple(signals)
         topic.parts.setdefault(key, []).append(part)
         topic.mixed |= {key} if mixed else set()
@@ -275,16 +239,6 @@ class Decoder:
                     signals={name: found[name] for name in signals if name in found},
                     constants=topic.constants,
                 )
-
-
-def _stamps(layout: MessageLayout, batch: Batch, offsets: Integers) -> Integers | None:
-    """Header stamps in nanoseconds, or None if the type has no header. (k,)"""
-    if "header.stamp.sec" not in layout.leaves or "header.stamp.nanosec" not in layout.leaves:
-        return None
-    seconds = layout.whole_numbers("header.stamp.sec", batch.buffer, offsets)
-    return seconds * 1_000_000_000 + layout.whole_numbers(
-        "header.stamp.nanosec", batch.buffer, offsets
-    )
 
 
 def in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:

@@ -5,14 +5,16 @@ import struct
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
+from vftcli.readers.bags.decode import KINDS, Stream
+from vftcli.readers.bags.layout import VECTORS
 from vftcli.readers.joints import in_order, kinematic_order, laid_along
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.arrays import Array
@@ -25,26 +27,6 @@ JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 STAMPS = ("header.stamp", "timestamp", "stamp")
 SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "nanosec")
 Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
-
-
-def message_streams(
-    channel: Channel, rows: Sequence[Document], times: Sequence[int]
-) -> Iterator[Stream]:
-    """The streams of a channel whose documents are JointState or WrenchStamped messages.
-
-    Nothing where a document is something else, or its stamp no whole seconds and nanoseconds.
-    """
-    if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
-        yield from _stream(channel, WRENCH, rows, times, ())
-        return
-    if not all(is_joint_state(row) for row in rows):
-        return
-    by_names: dict[tuple[str, ...], list[int]] = {}
-    for k, row in enumerate(rows):
-        by_names.setdefault(tuple(row["name"]), []).append(k)
-    for names, at in by_names.items():
-        own, stamps = [rows[k] for k in at], [times[k] for k in at]
-        yield from _stream(channel, JOINT_STATE, own, stamps, names)
 
 
 def is_joint_state(row: Document) -> bool:
@@ -61,16 +43,12 @@ def _stream(
     rows: Sequence[Document],
     times: Sequence[int],
     names: tuple[str, ...],
-) -> Iterator[Stream]:
-    """One stream, none where its numbers or stamps are not what they should be."""
+) -> Stream | None:
+    """One stream, None where its numbers or stamps are not what they should be."""
     stamps = [stamp_of(row) for row in rows]
-    header = None
-    if any(stamp is not None for stamp in stamps):
-        if not all(stamp is not None for stamp in stamps):
-            return
-        header = np.array(stamps, dtype=np.int64)
-    elif any(key.startswith(STAMPS) for key in rows[0]):
-        return
+    without = all(stamp is None for stamp in stamps)
+    if any(key.startswith(STAMPS) for key in rows[0]) if without else None in stamps:
+        return None
     signals = {}
     order = kinematic_order(names)
     for signal, paths in KINDS[kind].signals.items():
@@ -78,19 +56,20 @@ def _stream(
         values = matrix(rows, keys, len(names) if names else len(VECTORS))
         if values is not None:
             signals[signal] = in_order(values, order, len(names)) if names else values
-    if "q" in signals or "wrench" in signals:
-        yield Stream(
-            channel=replace(channel, type=kind),
-            kind=KINDS[kind],
-            names=tuple(names[k] for k in order),
-            mixed=bool(names) and order != tuple(range(len(names))),
-            frame=str(rows[0].get("header.frame_id", "")),
-            receive=np.array(times, dtype=np.int64),
-            header=header,
-            robot=None,
-            signals=signals,
-            constants={},
-        )
+    if "q" not in signals and "wrench" not in signals:
+        return None
+    return Stream(
+        channel=replace(channel, type=kind),
+        kind=KINDS[kind],
+        names=tuple(names[k] for k in order),
+        mixed=bool(names) and order != tuple(range(len(names))),
+        frame=str(rows[0].get("header.frame_id", "")),
+        receive=np.array(times, dtype=np.int64),
+        header=None if without else np.array(stamps, dtype=np.int64),
+        robot=None,
+        signals=signals,
+        constants={},
+    )
 
 
 def matrix(rows: Sequence[Document], keys: Sequence[str], width: int) -> Array | None:
@@ -125,8 +104,8 @@ class Documents:
 
     def __init__(self, ingest: Ingest) -> None:
         self.ingest = ingest
-        self.rows: dict[Channel, list[dict[str, Any]]] = {}
-        self.times: dict[Channel, list[int]] = {}
+        #: The documents of each channel, and when each was recorded. [ns]
+        self.found: dict[Channel, tuple[list[dict[str, Any]], list[int]]] = {}
 
     def take(self, batch: Batch) -> bool:
         """Take up a batch of JSON or JointStates; False if it is neither."""
@@ -134,8 +113,7 @@ class Documents:
         json_like = channel.encoding == "json"
         if not json_like and not (channel.encoding == "protobuf" and channel.type == FOXGLOVE):
             return False
-        rows = self.rows.setdefault(channel, [])
-        times = self.times.setdefault(channel, [])
+        rows, times = self.found.setdefault(channel, ([], []))
         for offset, length, time in zip(batch.offsets, batch.lengths, batch.times, strict=True):
             message = batch.buffer[offset : offset + length].tobytes()
             try:
@@ -149,16 +127,43 @@ class Documents:
         return True
 
     def streams(self, request: ReadChoice) -> list[Stream]:
-        """The channels that hold ROS messages, unless --columns speaks of other fields."""
-        fields = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
-        if not fields <= {"", "position", "velocity", "effort"}:
-            return []
-        found = (
-            stream
-            for channel, rows in self.rows.items()
-            for stream in message_streams(channel, rows, self.times[channel])
-        )
-        return list(found)
+        """The channels whose documents are JointState or WrenchStamped messages.
+
+        None where --columns speaks of other fields; no channel where its stamps are no whole
+        seconds and nanoseconds.
+        """
+        asked = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
+        streams: list[Stream | None] = []
+        for channel, (rows, times) in self.found.items():
+            if not asked <= {"", "position", "velocity", "effort"}:
+                break
+            if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
+                streams.append(_stream(channel, WRENCH, rows, times, ()))
+                continue
+            by_names: dict[tuple[str, ...], list[int]] = {}
+            if all(map(is_joint_state, rows)):
+                for k, row in enumerate(rows):
+                    by_names.setdefault(tuple(row["name"]), []).append(k)
+            for names, at in by_names.items():
+                own, stamps = [rows[k] for k in at], [times[k] for k in at]
+                streams.append(_stream(channel, JOINT_STATE, own, stamps, names))
+        return [stream for stream in streams if stream is not None]
+
+    def read(self, request: ReadChoice) -> RawLog:
+        """Read the channel whose documents hold joint positions."""
+        path = self.ingest.path
+        failures = []
+        for channel, (rows, times) in self.found.items():
+            try:
+                raw = _read(path, channel, rows, times, request)
+            except LogError as error:
+                failures.append((len(rows), error))
+                continue
+            left = sorted({other.topic for other in self.found} - {channel.topic})
+            told = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
+            return replace(raw, remarks=(*raw.remarks, *told))
+        # The fullest channel is the one that was meant; what it lacks is what the user can mend.
+        raise max(failures, key=lambda failure: failure[0])[1]
 
 
 def joint_states(message: bytes) -> dict[str, Any]:
@@ -248,26 +253,8 @@ def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  
         flat[path] = value
 
 
-def read_documents(file: LogFile, documents: Documents, request: ReadChoice) -> RawLog:
-    """Read the channel whose documents hold joint positions."""
-    failures = []
-    for channel, rows in documents.rows.items():
-        try:
-            raw = _read(file, channel, rows, documents.times[channel], request)
-        except LogError as error:
-            failures.append((len(rows), error))
-            continue
-        left = sorted({other.topic for other in documents.rows} - {channel.topic})
-        told = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
-        return replace(raw, remarks=(*raw.remarks, *told))
-    if not failures:
-        raise LogError(f"{file.path}: no messages of a kind that is known.")
-    # The fullest channel is the one that was meant; what it lacks is what the user can mend.
-    raise max(failures, key=lambda failure: failure[0])[1]
-
-
 def _read(
-    file: LogFile,
+    path: Path,
     channel: Channel,
     rows: list[dict[str, Any]],
     times: list[int],
@@ -287,7 +274,7 @@ def _read(
         columns["timestamp_ns" if stamps.dtype == np.int64 else "timestamp"] = stamps
     else:
         columns["timestamp_ns"] = np.array(times, dtype=np.int64)
-    table = ArrayTable(path=f"{file.path}: topic {channel.topic}", columns=columns)
+    table = ArrayTable(path=f"{path}: topic {channel.topic}", columns=columns)
     raw = from_table(table, request, clock_name=clock)
     if not named or len(names) != raw.signals["q"].shape[1]:
         return raw

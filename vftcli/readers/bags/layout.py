@@ -30,6 +30,10 @@ SIZES = {
 }  # fmt: skip
 
 
+#: The numbers below a wrench.
+VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
+
+
 class Field(NamedTuple):
     """One field of a message type."""
 
@@ -86,19 +90,21 @@ class MessageLayout:
             same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
         return same
 
-    def numbers(self, path: str, buffer: Bytes, offsets: Integers) -> NDArray[np.float64]:
-        """The numbers at a path of each message. (k, count)"""
-        leaf = self.leaves[path]
-        dtype = np.dtype(leaf.code)
-        raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
-        return np.ascontiguousarray(raw).view(dtype).astype(np.float64)
+    def numbers(
+        self, paths: Sequence[str], buffer: Bytes, offsets: Integers
+    ) -> NDArray[np.float64]:
+        """The numbers of each message at the first path that is there. (k, count)
 
-    def whole_numbers(self, path: str, buffer: Bytes, offsets: Integers) -> Integers:
-        """The whole numbers at a path of each message, one each. (k,)"""
-        leaf = self.leaves[path]
-        dtype = np.dtype(leaf.code)
-        raw = strided(buffer, offsets, leaf.offset, leaf.offset + dtype.itemsize)
-        return np.ascontiguousarray(raw).view(dtype)[:, 0].astype(np.int64)
+        At a path without numbers of its own are the six of a wrench, or none.
+        """
+        each = [[p] if p in self.leaves else [f"{p}.{part}" for part in VECTORS] for p in paths]
+        found = next((names for names in each if self.leaves.keys() >= set(names)), [])
+        columns = [np.empty((len(offsets), 0))]
+        for leaf in map(self.leaves.__getitem__, found):
+            dtype = np.dtype(leaf.code)
+            raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
+            columns.append(np.ascontiguousarray(raw).view(dtype).astype(np.float64))
+        return np.hstack(columns) if len(columns) != 2 else columns[1]
 
 
 class Walker:

@@ -19,7 +19,6 @@ from vftcli.readers.bags.container import (
     Census,
     Channel,
     ChannelRun,
-    Encoding,
     Ingest,
     batched,
     chunk_file,
@@ -27,6 +26,7 @@ from vftcli.readers.bags.container import (
     printable,
     type_name,
 )
+from vftcli.readers.reader import LogFile
 from vftcli.signals.errors import LogError
 
 DATA = (
@@ -35,14 +35,12 @@ DATA = (
 )  # fmt: skip
 DATA_END_BYTES = 13  #: Length of the record that ends the data, its head included.
 
-ENCODINGS: dict[str, Encoding] = {
-    "cdr": "cdr", "ros1": "ros1", "json": "json", "protobuf": "protobuf",
-}  # fmt: skip
+ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
+def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of an MCAP file, up to the last whole chunk."""
-    return batched(_Mcap(ingest).runs(content), ingest)
+    return batched(_Mcap(ingest).runs(file.content), ingest)
 
 
 def _records(
@@ -123,7 +121,7 @@ class _Mcap:
         self.channels[record.id] = Channel(
             topic=printable(record.topic),
             type=type_name(schema.name) if text else printable(schema.name),
-            encoding=ENCODINGS.get(record.message_encoding, "other"),
+            encoding=record.message_encoding if record.message_encoding in ENCODINGS else "other",
             definition=text,
             idl=schema.encoding == "ros2idl",
         )

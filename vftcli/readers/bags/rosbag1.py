@@ -13,7 +13,6 @@ import numpy as np
 from rosbags.rosbag1.reader import Header, ReaderError, RecordType, read_bytes, read_uint32
 
 from vftcli.readers.bags.container import (
-    ROSBAG1,
     Batch,
     Bytes,
     Census,
@@ -26,27 +25,29 @@ from vftcli.readers.bags.container import (
     strided,
     type_name,
 )
+from vftcli.readers.reader import LogFile
 from vftcli.signals.errors import LogError
 
 MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
+MAGIC_SIZE = 13  #: Bytes before the first record.
 ROWS = 65_536  #: Heads that are gathered at once.
 #: What a field of a header takes at least, but for those that no recorder writes.
 BYTES_PER_FIELD = 8
 
 
-def batches(content: memoryview, ingest: Ingest) -> Iterator[Batch]:
+def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of a bag, chunk by chunk, up to the last whole chunk."""
-    bag, file = _Bag(ingest), file_of(content)
-    end = file.seek(len(ROSBAG1))
+    bag, records = _Bag(ingest), file_of(file.content)
+    end = records.seek(MAGIC_SIZE)
     while True:
         try:
-            header, data = _record(file, ingest)
+            header, data = _record(records, ingest)
         except ReaderError:  # the content ends before or inside it
             break
         yield from bag.take(header, data)
-        end = file.tell()
+        end = records.tell()
     yield from bag.last_chunk()
-    bag.census.tell(ingest, len(content) - end, "its index")
+    bag.census.tell(ingest, len(file.content) - end, "its index")
 
 
 def _record(file: BinaryIO, ingest: Ingest) -> tuple[Header, bytes]:

@@ -18,7 +18,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.names import EFFORTS
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
 
 TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
 VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
@@ -120,8 +120,9 @@ class Gathering:
                 # Drivers publish NaN for what they do not measure.
                 self.remarks.append(fact("signal-empty", signal=signal))
             else:
-                self.signals[signal] = 0.0 - value if signal in lead.kind.turned else value
-        if lead.kind.turned & set(self.signals):
+                turned = lead.kind.franka and signal == "tau_ext"
+                self.signals[signal] = 0.0 - value if turned else value
+        if lead.kind.franka and "tau_ext" in self.signals:
             self.remarks.append(RESIDUAL_TURNED)
         self._tell_effort()
 
@@ -160,7 +161,8 @@ class Gathering:
                 continue
             values = self.interpolated(stream, signal)
             if values is not None:
-                self.signals[signal] = 0.0 - values if signal in stream.kind.turned else values
+                turned = stream.kind.franka and signal == "tau_ext"
+                self.signals[signal] = 0.0 - values if turned else values
 
     def _take_own(self, stream: Stream) -> None:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
@@ -196,7 +198,7 @@ class Gathering:
 
         A sensor's topic goes before the vendor's, the fullest before the others.
         """
-        frame = self.lead.kind.wrench_frame
+        frame = FRANKA_FRAME if self.lead.kind.franka else None
         found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
         sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
         if (not sensors and "wrench" in self.lead.signals) or "wrench" in self.chosen:
@@ -303,7 +305,7 @@ def leading(
     most = max(s.messages for s in found)
     # Topics of one rate may differ by the messages lost at either end.
     near = [s for s in found if s.messages >= 0.9 * most]
-    best = max(near, key=lambda s: (s.kind.rank, "effort" in s.signals, s.messages))
+    best = max(near, key=lambda s: (s.kind.franka, "effort" in s.signals, s.messages))
     # A stream of as many joints with other names, of the same type and rate, is another arm.
     width, joints = best.signals["q"].shape[1], set(best.names)
     rivals = [
