@@ -14,7 +14,7 @@ from vftcli.outputs.examination import (
     overridden_lines,
 )
 from vftcli.outputs.log.run_record import to_json
-from vftcli.outputs.page.shell import alarms, health
+from vftcli.outputs.page.shell import part
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.source import Source
@@ -79,7 +79,7 @@ def test_the_page_shows_warnings_first_and_escapes_names(sound: bool) -> None:
     note = fact("short", duration_s=1.0)
     made = examination(*([] if sound else [WRONG]), note)
     made = replace(made, recording=replace(LOG, source=Source(label="<b>.csv")))
-    page = alarms([made, made]) + health([made, made], opened=True)
+    page = part("parts/alarms", [made, made]) + part("parts/health", [made, made], opened=True)
     assert "<b>.csv" not in page
     assert "&lt;b&gt;.csv" in page
     warnings_shown, notes = page.split("<strong>short</strong>", 1)
@@ -87,4 +87,4 @@ def test_the_page_shows_warnings_first_and_escapes_names(sound: bool) -> None:
     assert (" open>" in page) == (not sound)
     assert notes.count("<strong>short</strong>") == 1  # the second log's
     assert page.startswith('<p class="alarm">MEANINGLESS') == (not sound)
-    assert health([]) == ""
+    assert part("parts/health", []) == ""

@@ -21,7 +21,7 @@ from vftcli.outputs.grid import (
     markdown,
     terminal,
 )
-from vftcli.outputs.page.shell import table
+from vftcli.outputs.page.shell import part
 
 HOSTILE = '<b>&_%|*$#"\\{a}'
 
@@ -181,7 +181,7 @@ class Cells(HTMLParser):
 
 
 def test_html_escapes_every_text_and_marks_best_floor_and_observers(grid: Grid) -> None:
-    found = Cells(table(grid))
+    found = Cells(part("parts/table", grid))
     assert "b" not in [tag for tag, _ in found.elements]
     assert HOSTILE in found.words
     assert ("td", {"class": "best"}) in found.elements

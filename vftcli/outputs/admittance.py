@@ -3,7 +3,6 @@
 The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
@@ -29,10 +28,10 @@ from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.grid import json_rows
+from vftcli.outputs.grid import Grid, json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
-from vftcli.outputs.page import shell
 from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
+from vftcli.outputs.page.shell import page
 from vftcli.outputs.palette import SPARE
 from vftcli.outputs.quantity import counted
 from vftcli.outputs.seals import SEAL
@@ -168,12 +167,6 @@ def loop_record(run: ClosedLoop) -> dict[str, Any]:
     return about | {"latencies": latency_rows(run)}
 
 
-def deviations_from_paper() -> dict[str, str]:
-    """Differences from the paper → reasons, from the table beside this file."""
-    text = Path(__file__).with_name("deviations_from_paper.toml").read_text(encoding="utf-8")
-    return {entry["what"]: entry["why"] for entry in tomllib.loads(text)["difference"]}
-
-
 def render_admittance(
     replay: Replay,
     record: Mapping[str, Any],
@@ -195,62 +188,28 @@ def render_admittance(
     )
     controllers = counted(len(replay.controllers), "admittance controller")
     warnings = [sentence(remark) for remark in replay.remarks if remark.level == "warning"]
-    parts = (
-        shell.alarms(examinations),
-        shell.top(eyebrow, f"The same force through {controllers}.", shell.lead(*warnings)),
-        closed_loop_section(run),
-        comparison_section(replay),
-        "<h2>Force and motion over time</h2>",
-        *(
-            # The deviation is open at once.
-            shell.section(
-                c.title, shell.multiples(c) + shell.large(c), name=c.key, opened=c.key == "x"
-            )
-            for c in drawn
-        ),
-        shell.soft(
-            "Deviation of the flange (Figs 6b, 9b, 7, 10, 13), force with the threshold band (Figs "
-            "6a, 9a, 12), speed with its limit, and the Lyapunov function W of the recovery phases "
-            "beside the printed V, which rises."
-        ),
-        "<h2>Details</h2>",
-        shell.section("Parameters", shell.table(parameter_grid(replay))),
-        shell.section(
-            "Stability before motion",
-            shell.table(stability_grid(replay))
-            + shell.soft(
-                "The escape bound is the largest deviation from which a release at rest would not "
-                "run away if there were no speed limit."
-            ),
-        ),
-        shell.section(
-            "What differs from the paper, and why",
-            shell.bullets(f"{what} {why}" for what, why in deviations_from_paper().items()),
-        ),
-        shell.health(examinations, opened=True),
-        shell.all_remarks(replay.remarks),
-        shell.provenance(record),
+    return page(
+        "admittance.html",
+        f"{title}: admittance",
+        drawn,
+        {controller.name: (colour, "") for controller, colour in painted(replay)},
+        eyebrow=eyebrow,
+        headline=f"The same force through {controllers}.",
+        warnings=warnings,
+        run=run,
+        latencies=None if run is None else latency_grid(run),
+        comparison=named_comparison(replay),
+        drawn=drawn,
+        parameters=parameter_grid(replay),
+        stability=stability_grid(replay),
+        examinations=examinations,
+        remarks=replay.remarks,
+        record=record,
     )
-    styles = {controller.name: (colour, "") for controller, colour in painted(replay)}
-    return shell.document(f"{title}: admittance", "".join(parts), drawn, styles)
 
 
-def closed_loop_section(run: ClosedLoop | None) -> str:
-    """Latencies of the loop, or nothing without one."""
-    if run is None:
-        return ""
-    state = "" if run.stable else f"<p>The arm ran away at {run.t[-1]:.2f} s.</p>"
-    words = shell.soft(
-        "The paper measured 0.24 and 0.28 s from detection to motion, 0.26 and 0.12 s from "
-        "withdrawal to the turn on its UR5 (docs/admittance.md)."
-    )
-    return f"<h2>Closed loop in simulation</h2>{state}{shell.table(latency_grid(run))}{words}"
-
-
-def comparison_section(replay: Replay) -> str:
+def named_comparison(replay: Replay) -> Grid:
     """Every controller on one force, axis by axis (Figs 7 and 10)."""
-    if not replay.rows:
-        return "<h2>Comparison</h2><p>No axis was dragged.</p>"
 
     def name_of(row: Mapping[str, Any]) -> str:
         """A variable controller by the name that the charts' legend has for its α."""
@@ -260,16 +219,7 @@ def comparison_section(replay: Replay) -> str:
                 return controller.name
         return str(row["controller"])
 
-    grid = comparison_grid(replay.rows, name_of, "The same force through every controller")
-    words = shell.soft(
-        "Times to the peak and idle times count from the start of a drag, return times from its "
-        "release: the last moment at which the deviation is beyond that share of its value at the "
-        "release. “–” did not happen before the next drag or the end. Advance: how much sooner "
-        "than with the traditional controller the peak is reached. Overshoot: to the other side, "
-        "as a share of the deviation at the release. Work: what the hand does on the arm while it "
-        "drags."
-    )
-    return f"<h2>Comparison</h2>{shell.table(grid)}{words}"
+    return comparison_grid(replay.rows, name_of, "The same force through every controller")
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:

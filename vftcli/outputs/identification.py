@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from html import escape
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -26,9 +25,10 @@ from vftcli.outputs.log.run_record import (
     seal,
     versions,
 )
-from vftcli.outputs.page import shell, svg
+from vftcli.outputs.page import svg
 from vftcli.outputs.page.charts import Chart, ChartLine, families_of
 from vftcli.outputs.page.log_charts import joint_panels
+from vftcli.outputs.page.shell import page
 from vftcli.outputs.palette import SPARE
 from vftcli.outputs.quantity import DASH, counted, signed
 from vftcli.outputs.seals import SEAL
@@ -116,80 +116,51 @@ def render_identification(
     title, charts = found.robot.title or found.robot.name, torque_charts(found)
     source = f" from {counted(len(logs), 'log')}" if logs else ""
     grids = {
-        "residuals": residual_grid(found),
         "Identified numbers": parameter_grid(found),
         "Friction models compared": shape_choice_grid(found.shape_choices),
     }
     if found.base is not None:
         grids[f"Base parameters ({len(found.base)})"] = base_grid(found.base)
-    tables = {name: shell.table(grid) for name, grid in grids.items() if grid.rows}
-    residuals = tables.pop("residuals", "")
-    over_time = "".join(
-        f"<h3>{escape(c.title)}</h3>{shell.multiples(c)}{shell.large(c)}" for c in charts
-    )
-    inputs = [f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record.get("inputs", ())]
-    made = f"<pre>{escape(str(record.get('command', '')))}</pre>{shell.bullets(inputs)}"
-    shown = shown_trace(found) if charts else None
-    about = "Residual: measured less predicted torque, from the first to the last movement."
-    parts = (
-        shell.alarms(examinations, fitting=False),
-        shell.top(
-            (title, f"method {found.method}", ", ".join(logs)),
-            f"{title}{source}.",
-            shell.lead(about),
-        ),
-        residuals and f"<h2>How much torque is left unexplained</h2>{residuals}",
-        velocity_section(found),
-        "<h2>Details</h2>",
-        *(shell.section(name, x, opened=name.startswith("Ident")) for name, x in tables.items()),
-        shell.section("Torques over time", over_time, shown.motion.recording.name if shown else ""),
-        shell.health(examinations, opened=True),
-        shell.section("Signal processing", shell.pairs(found.processing)),
-        shell.all_remarks(found.remarks),
-        shell.section("Provenance", made + shell.pairs(record.get("versions", {}))),
-    )
-    return shell.document(f"{found.robot.name}: identification", "".join(parts), charts)
-
-
-def velocity_section(found: Identification) -> str:
-    """Residual over velocity, one small plot a joint: friction that is missed shows here."""
-    if not found.traces:
-        return ""
-    coloured = [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(found.traces)]
-    plots = "".join(velocity_plot(coloured, j) for j in range(found.robot.joints))
-    key = "".join(
-        f'<span style="color:{colour}">● {escape(t.motion.recording.name)} ({t.role})</span> '
-        for t, colour in coloured
-    )
-    words = "Friction that the model misses shows here as a curve."
-    return (
-        f'<h2>Residual over velocity</h2><p class="legend">{key}</p>'
-        f'<div class="multiples">{plots}</div>{shell.soft(words)}'
+    traces = [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(found.traces)]
+    return page(
+        "identification.html",
+        f"{found.robot.name}: identification",
+        charts,
+        examinations=examinations,
+        eyebrow=(title, f"method {found.method}", ", ".join(logs)),
+        headline=f"{title}{source}.",
+        residuals=residual_grid(found),
+        traces=traces,
+        plots=(velocity_plot(traces, j) for j in range(found.robot.joints)),
+        grids=grids,
+        drawn=charts,
+        shown=shown_trace(found).motion.recording.name if charts else "",
+        processing=found.processing,
+        remarks=found.remarks,
+        record=record,
+        inputs=[f"{log.get('path')}: sha256 {log.get('sha256')}" for log in record["inputs"]],
     )
 
 
-def velocity_plot(coloured: Sequence[tuple[Trace, str]], j: int) -> str:
-    """One joint: residual over velocity, each log in its colour."""
+def velocity_plot(
+    coloured: Sequence[tuple[Trace, str]], j: int
+) -> tuple[str, svg.Scales, list[tuple[str, str]]]:
+    """A joint's residual over velocity: its name, scales, and each log's colour and dots."""
     # One scale for all logs of a joint, or their dots could not be compared.
     speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
     across, up = svg.Span(-speed, speed), svg.Span(-high, high)
-    scales = svg.Scales(svg.Box(height=180), across, up)
-    drawn = [shell.axes(scales, "rad/s", (4, 4))]
+    scales, drawn = svg.Scales(svg.Box(height=180), across, up), []
     for trace, colour in coloured:
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
         x = scales.across(trace.motion.dq[pick, j])
         y = scales.up(np.clip(trace.residual[pick, j], *up))
         # One path of strokes without length: 600 circles a log and joint would make a slow page.
-        path = "".join(f"M{a:.1f} {b:.1f}h.01" for a, b in zip(x, y, strict=True))
-        drawn.append(
-            f'<path d="{path}" stroke="{colour}" stroke-width="2.4" stroke-linecap="round" '
-            'stroke-opacity=".55" fill="none"/>'
-        )
-    picture = shell.frame(scales.box, f"Residual over velocity, J{j + 1}", "".join(drawn))
-    return f"<figure><figcaption>J{j + 1} <span>N·m</span></figcaption>{picture}</figure>"
+        dots = (svg.polyline(dot[None]) for dot in np.column_stack([x, y]))
+        drawn.append((colour, "".join(dots)))
+    return f"J{j + 1}", scales, drawn
 
 
 def shown_trace(found: Identification) -> Trace:

@@ -12,17 +12,7 @@ from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.log.run_record import seal, versions
-from vftcli.outputs.page.shell import (
-    bullets,
-    document,
-    large,
-    lead,
-    multiples,
-    section,
-    soft,
-    table,
-    top,
-)
+from vftcli.outputs.page.shell import page
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
@@ -136,31 +126,17 @@ def seeds_line(jobs: Sequence[Job], paper: Paper) -> tuple[str, ...]:
 
 def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job]) -> str:
     """The page: self-contained, nothing is loaded from anywhere."""
-    about = lead(f"{paper.title}.") + lead(*paper.setting)
-    parts = [
-        top((paper.name, f"doi {paper.doi}"), "The paper, run again", about),
-        table(overview(found)),
-        soft(RATIOS),
-        *(item_section(name, shown) for name, shown in found.items()),
-        "<h2>What was run</h2>",
-        bullets(seeds_line(jobs, paper)),
-    ]
-    charts = [shown.chart for shown in found.values() if shown.chart is not None]
-    return document(f"{paper.name}, reproduced", "".join(parts), charts)
-
-
-def item_section(name: str, shown: ShownItem) -> str:
-    """One table or figure: the reason first, then numbers and traces."""
-    item = shown.item
-    parts = [f'<h2 id="{name}">{escape(item.label)}: {escape(item.title)}</h2>']
-    parts += [f'<p class="alarm">{escape(line)}</p>' for line in shown.failures]
-    parts.append(f"<p><strong>{escape(item.answer)}</strong> {escape(item.why)}</p>")
-    if item.lines:
-        parts.append(table(item_grid(shown)))
-    if shown.chart is not None:
-        drawn = multiples(shown.chart) + large(shown.chart)
-        parts.append(section("Traces", drawn, shown.chart.title, opened=True))
-    return "".join(parts)
+    return page(
+        "reproduction.html",
+        f"{paper.name}, reproduced",
+        [shown.chart for shown in found.values() if shown.chart is not None],
+        paper=paper,
+        overview=overview(found),
+        ratios=RATIOS,
+        found=found,
+        item_grid=item_grid,
+        seeds=seeds_line(jobs, paper),
+    )
 
 
 def render_markdown(

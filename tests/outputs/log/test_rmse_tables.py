@@ -12,7 +12,7 @@ from vftcli.outputs.log.rmse_tables import (
     marks_in_words,
     rmse_grid,
 )
-from vftcli.outputs.page.shell import table
+from vftcli.outputs.page.shell import part
 
 
 def errors(*changed: dict[str, object]) -> pl.DataFrame:
@@ -56,7 +56,7 @@ def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
     (block,) = blocks(errors({}, rests, {"rmse_Nm": 0.9}, rests))
     grid = rmse_grid(block)
     assert block.means.errors == {"fdo": 0.6, "gmo": 0.9}
-    for text in (terminal(grid), markdown(grid), latex(grid), table(grid)):
+    for text in (terminal(grid), markdown(grid), latex(grid), part("parts/table", grid)):
         assert "0.600" in text
         assert "1.30" not in text  # the mean of .6 and 2
     assert "mean: without J2" in terminal(grid) + marks_in_words([block])

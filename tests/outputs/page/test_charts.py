@@ -17,7 +17,7 @@ from vftcli.outputs.page.charts import (
     packed_charts,
     quantised,
 )
-from vftcli.outputs.page.shell import multiples
+from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.svg import ends_of_family
 
 
@@ -74,13 +74,13 @@ def test_a_ribbon_is_grey_where_no_contact_is_listed() -> None:
     (lines,) = packed(chart(t, line), 100)["series"][0]["lines"]
     assert np.isnan(unpacked(lines["half"])).tolist() == quiet.tolist()
     assert np.isnan(unpacked(lines["quiet"])).tolist() == (~quiet).tolist()
-    html = multiples(chart(t, line))
+    html = part("svg/multiples", chart(t, line))
     assert html.count('class="rim"/>') == 1 + 1  # one more in the legend
     assert html.count('class="floor"/>') == 1
     assert QUIET in html
     plain = chart(t, line._replace(quiet=None))
     assert "quiet" not in packed(plain, 100)["series"][0]["lines"][0]
-    assert QUIET not in multiples(plain)
+    assert QUIET not in part("svg/multiples", plain)
 
 
 @pytest.mark.slow
@@ -129,14 +129,14 @@ def test_only_what_is_shown_stands_in_the_small_pictures() -> None:
         ChartLine("<i>", np.ones((3, 2)), "#445566"),
         ChartLine("later", np.ones((3, 2)), "#778899", shown=False),
     )
-    html = multiples(chart(t, *lines))
+    html = part("svg/multiples", chart(t, *lines))
     assert html.count("<figure") == 2
     assert html.count('stroke="#112233"') == 2 + 1  # one more in the legend
     assert "#778899" not in html
     assert "<i>" not in html
     assert "&lt;i&gt;" in html
     assert "legend" in html
-    assert "legend" not in multiples(chart(t, lines[0]))  # one line needs none
+    assert "legend" not in part("svg/multiples", chart(t, lines[0]))  # one line needs none
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.outputs.page.details import contact_details, joint_values, model_pairs
 from vftcli.outputs.page.pages import render
-from vftcli.outputs.page.shell import table
+from vftcli.outputs.page.shell import part
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def test_few_joints_tell_when_but_not_how_hard(found: ContactList, pushed: Analy
     two = replace(found, contacts=tuple(map(bare, found.contacts[:2])), smallest_force=None)
     page = render(replace(pushed, contacts=two)).partition('id="believed"')[0]
     assert page.count('<td class="num big">unknown</td>') == 2
-    assert "–" in table(contact_details(two)[0])
+    assert "–" in part("parts/table", contact_details(two)[0])
 
 
 def test_rows_are_the_anchors_of_the_list(found: ContactList, pushed: Analysis) -> None:
@@ -52,7 +52,7 @@ def test_rows_are_the_anchors_of_the_list(found: ContactList, pushed: Analysis) 
 
 
 def test_the_details_hold_every_number(found: ContactList) -> None:
-    shown = table(contact_details(found)[1])
+    shown = part("parts/table", contact_details(found)[1])
     first = found.contacts[0]
     assert (
         f"{first.joint_torque[1]:.2f} ± {first.joint_torque_sd[1]:.2f}".replace("-", "−") in shown

@@ -5,18 +5,7 @@ import pytest
 from jinja2 import UndefinedError
 
 from vftcli.outputs.page.charts import Chart, ChartLine
-from vftcli.outputs.page.shell import (
-    all_remarks,
-    bullets,
-    document,
-    lead,
-    page,
-    pairs,
-    provenance,
-    script_json,
-    section,
-    top,
-)
+from vftcli.outputs.page.shell import page, part, script_json
 from vftcli.signals import remarks as remarks_module
 from vftcli.signals.remarks import fact, warning
 
@@ -26,12 +15,12 @@ HOSTILE = "<b>&</script>\u2028"
 @pytest.mark.parametrize(
     "html",
     [
-        top((HOSTILE,), HOSTILE, lead(HOSTILE)),
-        pairs({HOSTILE: HOSTILE}),
-        bullets([HOSTILE]),
-        section(HOSTILE, "x", HOSTILE),
-        document(HOSTILE, ""),
-        provenance({"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}),
+        part("parts/top", (HOSTILE,), HOSTILE, part("parts/lead", HOSTILE)),
+        part("parts/pairs", {HOSTILE: HOSTILE}),
+        part("parts/bullets", [HOSTILE]),
+        part("parts/section", HOSTILE, "x", HOSTILE),
+        page("page.html", HOSTILE),
+        part("parts/provenance", {"command": HOSTILE, "versions": {HOSTILE: HOSTILE}}),
     ],
 )
 def test_no_word_from_outside_becomes_an_element(html: str) -> None:
@@ -48,41 +37,43 @@ def test_data_reads_back_and_cannot_end_its_element() -> None:
 
 
 def test_a_page_without_charts_has_no_script() -> None:
-    assert "<script" not in document("t", "body")
+    assert "<script" not in page("page.html", "t")
     chart = Chart("k", "K", ("N",), ("a",), np.arange(3.0), (ChartLine("l", np.ones((3, 1))),))
-    page = document("t", "body", [chart])
-    assert page.count("<script") == 3  # the data, the library with its licence, and the glue
-    assert "Permission is hereby granted" in page
+    html = page("page.html", "t", [chart])
+    assert html.count("<script") == 3  # the data, the library with its licence, and the glue
+    assert "Permission is hereby granted" in html
 
 
 def test_nothing_to_say_is_nothing_shown() -> None:
-    assert all_remarks([]) == ""
-    assert section("more", "") == ""
-    assert lead("") == ""
+    assert part("parts/all_remarks", []) == ""
+    assert part("parts/section", "more", "") == ""
+    assert part("parts/lead", "") == ""
 
 
 def test_a_remark_is_said_once_and_the_worst_first() -> None:
     turned, cut = fact("sign-turned", signal="q"), warning("topic-too-short", signal="a", topic="b")
-    html = all_remarks([turned, cut, turned])
+    html = part("parts/all_remarks", [turned, cut, turned])
     assert html.count("<li>") == 2
     assert html.index("/b" if "/b" in html else "b") < html.index("turned the sign")
 
 
 def test_a_name_that_could_end_a_rule_has_no_swatch() -> None:
     styles = {"gmo": ("#112233", "2 2"), 'x"]{}</style>': ("#445566", "")}
-    page = document("t", "body", styles=styles)
-    assert '[data-swatch="gmo"]::before{border-top:3px dotted #112233}' in page
-    assert "#445566" not in page
+    html = page("page.html", "t", styles=styles)
+    assert '[data-swatch="gmo"]::before{border-top:3px dotted #112233}' in html
+    assert "#445566" not in html
 
 
 def test_a_remark_shows_its_long_words(monkeypatch: pytest.MonkeyPatch) -> None:
     words = '[test-code]\nshort = "in short {a_s:.1f} s"\nlong = "at length {a_s:.2f} s"\n'
     monkeypatch.setattr(remarks_module, "catalogue", lambda: (words,))
-    assert "at length 0.25 s" in bullets([fact("test-code", a_s=0.25)])
+    assert "at length 0.25 s" in part("parts/bullets", [fact("test-code", a_s=0.25)])
 
 
 def test_provenance_without_a_log_names_none() -> None:
-    html = provenance({"command": "", "input": None, "robot": {"name": "ur5"}, "versions": {}})
+    html = part(
+        "parts/provenance", {"command": "", "input": None, "robot": {"name": "ur5"}, "versions": {}}
+    )
     assert "Log sha256" not in html
     assert "through the Python interface" in html
     assert "ur5 (built in)" in html

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.page.shell import axes, frame
+from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.svg import (
     Box,
     Scales,
@@ -48,7 +48,7 @@ def test_numbers_of_axes() -> None:
     assert decades(Span(0.02, 62.5)) == [0.1, 1.0, 10.0]
     assert decades(Span(0.1, 10.0)) == [0.1, 1.0, 10.0]  # its ends are on it
     assert (label(-0.5), label(-0.0), label(1e6)) == ("−0.5", "0", "1e+06")
-    text = axes(SCALES, "<s>")
+    text = part("svg/axes", SCALES, "<s>")
     assert "&lt;s&gt;" in text
     assert "<s>" not in text
 
@@ -93,4 +93,4 @@ def test_no_spike_is_lost() -> None:
 
 
 def test_the_title_is_words() -> None:
-    assert "&lt;b&gt;" in frame(Box(), "<b>", "<g/>")
+    assert "&lt;b&gt;" in part("svg/svg", Box(), "<b>", "<g/>")

@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -100,16 +100,6 @@ def page(
     return templates().get_template(template).render(**frame, **view) + "\n"
 
 
-def document(
-    title: str,
-    body: str,
-    charts: Sequence[Chart] = (),
-    styles: Mapping[str, LineStyle] | None = None,
-) -> str:
-    """A page around a body that is HTML already."""
-    return page("page.html", title, charts, styles, body=body)
-
-
 def asset(name: str) -> str:
     """The text of a style sheet or script that comes with the package."""
     return (HERE / name).read_text(encoding="utf-8")
@@ -120,13 +110,3 @@ def script_json(data: object) -> str:
     # "<" could begin "</script>"; the two separators end a line in JavaScript but not in JSON.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
-
-
-#: Parts as functions, for pages that are put together in Python.
-alarms, all_remarks = partial(part, "parts/alarms"), partial(part, "parts/all_remarks")
-bullets, health = partial(part, "parts/bullets"), partial(part, "parts/health")
-lead, pairs, top = (partial(part, f"parts/{name}") for name in ("lead", "pairs", "top"))
-provenance, section = partial(part, "parts/provenance"), partial(part, "parts/section")
-soft, table = partial(part, "parts/soft"), partial(part, "parts/table")
-axes, frame = partial(part, "svg/axes"), partial(part, "svg/svg")
-large, multiples = partial(part, "svg/large"), partial(part, "svg/multiples")
