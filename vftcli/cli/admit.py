@@ -213,7 +213,7 @@ def looped(
     """A scenario with a controller in the loop, and the force it acted on through all of them."""
     from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
     from vftcli.admittance.replay import replay
-    from vftcli.cli.simulate import progress_bar
+    from vftcli.cli.console import steps
     from vftcli.observers import KalmanObserver
     from vftcli.robots import load_robot
     from vftcli.signals.errors import ParameterError
@@ -242,7 +242,7 @@ def looped(
         torque=control.loop_torque,
         zero=zero.spans[0] if zero.spans else UNLOADED,
         anyway=analysis.anyway,
-        progress=progress_bar(),
+        progress=steps(),
     )
     result = replay(
         run.wrench,

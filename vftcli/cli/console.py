@@ -229,3 +229,9 @@ def stages() -> "Callable[[str, float, float], None]":
     """Who shows on stderr what is being done, if somebody watches and it takes a while."""
     watched = _level.get() > QUIET and sys.stderr.isatty()
     return STAGES.begin if watched else lambda *_: None
+
+
+def steps() -> "Callable[[int, int], None]":
+    """Who shows on stderr how many steps of a simulation are done, as `stages` does."""
+    show = stages()
+    return lambda done, of: show("simulating", done / of, done / of)

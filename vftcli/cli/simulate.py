@@ -35,7 +35,7 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.cli.console import command_line, say, say_json, say_left_out, stages
+    from vftcli.cli.console import command_line, say, say_json, say_left_out, steps
     from vftcli.outputs.simulation import free_path, log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
@@ -57,8 +57,7 @@ def simulate_log(
     paths = [output, free_path(output)] if setup.pair else [output]
     log_folder(paths, force)
     usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
-    progress = stages()
-    runs = simulate_pair(setup, seed, lambda k, of: progress("simulating", k / of, k / of))
+    runs = simulate_pair(setup, seed, steps())
     places = dict(zip(paths, runs, strict=True))
     files = [str(f) for f in save(places, log_format, force, command_line())]
     say_left_out(files)
