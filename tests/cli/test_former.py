@@ -66,17 +66,17 @@ def test_a_former_option_does_what_its_setting_does(run: Run) -> None:
     typed = ("--set", "log.effort=current", "--set", "model.friction=none")
     code, expected, _ = run("contacts", LOG, *SHORT, *typed)
     assert (code, expected == run("contacts", LOG, *SHORT)[1]) == (0, False)
-    code, out, err = run(LOG, *SHORT, "--set", "log.effort=current", "--set model.friction=none")
+    code, out, err = run(LOG, *SHORT, "--effort", "current", "--friction=none")
     assert (code, out) == (0, expected)
     assert err.splitlines() == [
-        "note: log.effort is now --set log.effort=…",
-        "note: model.friction is now --set model.friction=…",
+        "note: --effort is now --set log.effort=…",
+        "note: --friction is now --set model.friction=…",
     ]
 
 
 def test_the_command_line_of_run_json_has_today_s_words(run: Run, here: Path) -> None:
     words = ("--interval", "0:2", "--observer", "gmo", "--robot", "ur5", "-o", "out")
-    code, _, err = run("estimate", LOG, *words, "--set", "contacts.list=no", "--gains", "bandwidth=2")
+    code, _, err = run("estimate", LOG, *words, "--no-contacts", "--match", "bandwidth=2")
     assert (code, err.count(" is now ")) == (0, 2)
     command = json.loads((here / "out/run.json").read_text("utf-8"))["command"]
     assert command.endswith(" --set contacts.list=no --gains bandwidth=2")
@@ -107,7 +107,7 @@ def test_the_arguments_of_a_xacro_go_to_the_robot(run: Run, here: Path) -> None:
     [
         (("open", "out"), "open is gone; open DIR/index.html in a browser, or DIR/recording.rrd"),
         (("batch", LOG, "--limit", "3"), "--limit is gone; leave it out"),
-        (("report", LOG, "two-cycle.low-pass"), "two-cycle.low-pass is now --set two-cycle.low-pass=…; give a"),
+        (("report", LOG, "--low-pass"), "--low-pass is now --set two-cycle.low-pass=…; give a"),
     ],
 )
 def test_what_is_gone_is_one_line(run: Run, words: tuple[object, ...], said: str) -> None:
@@ -117,9 +117,9 @@ def test_what_is_gone_is_one_line(run: Run, words: tuple[object, ...], said: str
 
 
 def test_behind_two_dashes_there_are_logs(run: Run) -> None:
-    code, _, err = run("contacts", "--", "two-cycle.low-pass")
+    code, _, err = run("contacts", "--", "--low-pass")
     assert (code, "is now" in err) == (1, False)
-    assert err.startswith("error: two-cycle.low-pass: ")
+    assert err.startswith("error: --low-pass: ")
 
 
 def test_former_keys_of_a_file_of_options_are_read(run: Run, here: Path) -> None:
