@@ -79,7 +79,7 @@ class Row(NamedTuple):
 
 ROWS = [
     # cli
-    Row("give one of LOG, --release", lambda _: ["admit", "--robot", "ur5"], "--release", "x=0.3"),
+    Row("give one of LOG, SCENARIO, --release", lambda _: ["admit", "--robot", "ur5"], "--release", "x=0.3"),
     Row("are of what -o DIR writes", lambda _: [*RELEASE, "--figures", "svg"], "-o", "out"),
     Row("choose one of --json and --latex", lambda _: [*RELEASE, "--json", "--latex"], "--latex",
         LEFT_OUT),
