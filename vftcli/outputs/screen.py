@@ -23,8 +23,7 @@ from vftcli.outputs.canvas import Canvas
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
 from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, terminal
-from vftcli.outputs.log.rmse_tables import Block, blocks
-from vftcli.outputs.log.wrench_tables import contact_grids
+from vftcli.outputs.log.rmse_tables import Block, blocks, contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence

@@ -14,15 +14,18 @@ from vftcli.outputs.answer import hardest_words, headline, otherwise
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.grid import Column, Grid, GridCell
-from vftcli.outputs.log.rmse_tables import blocks, detail_grids, marks_on_page, rmse_grid
-from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.log.wrench_tables import (
+from vftcli.outputs.log.rmse_tables import (
     axis_grids,
+    blocks,
     contact_grids,
+    detail_grids,
     drift_grid,
+    marks_on_page,
     nothing_to_compare,
     paper_bounds,
+    rmse_grid,
 )
+from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import details, log_charts
 from vftcli.outputs.page.charts import Chart, observer_lines
 from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
