@@ -6,13 +6,12 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import JointMeans
 from vftcli.outputs.answer import hardest_words, headline, otherwise
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
 from vftcli.outputs.contacts import by_force
+from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Column, Grid, GridCell
 from vftcli.outputs.log.rmse_tables import (
     axis_grids,
@@ -103,8 +102,8 @@ def eyebrow(analysis: Analysis) -> tuple[str, ...]:
         measured = "beside a sensor's own wrench"
     elif recording.tau_ext is not None:
         measured = "beside the controller's own estimate"
-    rate = 1.0 / recording.median_step if recording.samples > 1 else float("nan")
-    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if np.isfinite(rate) else "")
+    rate = rate_of(recording)
+    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
     return recording.name, robot.title or robot.name, span, measured
 
 
