@@ -94,7 +94,7 @@ def compare(
     from vftcli.evaluation import paired_significance
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
-    from vftcli.outputs.log.wrench_tables import paper_bounds
+    from vftcli.outputs.log.rmse_tables import paper_bounds
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 

@@ -135,8 +135,8 @@ def show_report(
     from vftcli.cli.console import canvas, show
     from vftcli.outputs.log.estimates import extra_files
     from vftcli.outputs.log.report import FILES, SUMMARY_FILES
+    from vftcli.outputs.log.rmse_tables import paper_bounds
     from vftcli.outputs.log.tables import print_text, to_terminal
-    from vftcli.outputs.log.wrench_tables import paper_bounds
     from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
     several = len(analyses) + len(failed) > 1

@@ -21,10 +21,10 @@ from vftcli.outputs.believability import (
 )
 from vftcli.outputs.canvas import Canvas
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
+from vftcli.outputs.examination import rate_of
 from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, terminal
-from vftcli.outputs.log.rmse_tables import Block, blocks
-from vftcli.outputs.log.wrench_tables import contact_grids
+from vftcli.outputs.log.rmse_tables import Block, blocks, contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
 from vftcli.signals.letters import printable
 from vftcli.signals.remarks import sentence
@@ -93,8 +93,7 @@ def facts(analysis: Analysis) -> str:
         left = percent(match.misfit)
         fit = f" (model error {left})" if match.fits else f" (does not fit: model error {left})"
     span = f"{recording.duration:.1f} s"
-    if recording.samples > 1:
-        rate = 1.0 / recording.median_step
+    if rate := rate_of(recording):
         span += f" at {rate:.0f} Hz" if rate >= 100.0 else f" at {rate:.3g} Hz"
     return " · ".join((printable(recording.name), f"{printable(analysis.robot.name)}{fit}", span))
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from math import ceil, isnan
-from typing import Any, NamedTuple
+from typing import Any
 
 from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
@@ -200,20 +200,13 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
     }
 
 
-class Interface(NamedTuple):
-    """Thresholds in one robot's interface."""
-
-    joints: int | None  #: How many joint torques it takes, None for any number.
-    write: Callable[[Thresholds], str]  #: Makes the text of it.
-
-
 def calls(thresholds: Thresholds) -> dict[str, str]:
     """Name of every interface that takes as many joints as there are → its text."""
     count = len(thresholds.joints)
     written = {
-        name: interface.write(thresholds)
-        for name, interface in INTERFACES.items()
-        if interface.joints in (None, count)
+        name: write(thresholds)
+        for name, (joints, write) in INTERFACES.items()
+        if joints in (None, count)
     }
     # An interface that needs an unknown number gets no text.
     return {name: text for name, text in written.items() if text}
@@ -310,10 +303,10 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Name → its thresholds.
-INTERFACES = {
-    "libfranka": Interface(7, libfranka_call),
-    "franka_ros": Interface(7, franka_ros_parameters),
-    "ur_script": Interface(6, ur_script),
-    "toml": Interface(None, toml_text),
+#: Interface of a robot → how many joint torques it takes, None for any number, and its text.
+INTERFACES: dict[str, tuple[int | None, Callable[[Thresholds], str]]] = {
+    "libfranka": (7, libfranka_call),
+    "franka_ros": (7, franka_ros_parameters),
+    "ur_script": (6, ur_script),
+    "toml": (None, toml_text),
 }

@@ -3,6 +3,7 @@ import pytest
 
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.page.svg import (
+    STRETCHES,
     Box,
     Scales,
     Span,
@@ -86,7 +87,7 @@ def test_no_spike_is_lost() -> None:
     t = np.linspace(1.0, 1000.0, 20_000)
     y = np.zeros_like(t)
     y[[777, 15_000]] = 9.0, -9.0
-    for found in (thinned(t, y), thinned_log(t, y)):
+    for found in (thinned(t, y, STRETCHES), thinned_log(t, y, STRETCHES)):
         assert len(found[0]) < 1200
         assert {9.0, -9.0} <= set(found[1])
         assert found[0][np.argmax(found[1])] == t[777]

@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.outputs.figures.paper import sheet, shortened
 from vftcli.outputs.log.rmse_tables import DAGGER
 from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.svg import ends_of_family, thinned, thinned_log
+from vftcli.outputs.page.svg import drawn_line, ends_of_family
 from vftcli.signals.arrays import Array
 
 if TYPE_CHECKING:
@@ -161,11 +161,8 @@ def draw_over(axes: "Axes", plot: Plot, *, named: bool) -> None:
 
 def draw_line(axes: "Axes", chart: Chart, series: ChartLine, j: int) -> None:
     """One line of a panel with its ribbon."""
-    x = chart.x if series.x is None else series.x
-    thin = thinned_log if chart.log else thinned
-    t, y = thin(x, series.values[:, j], STRETCHES)
-    for width, style in zip(series.ribbons(j) or (), ribbon_looks(series), strict=False):
-        half = np.interp(t, x, width)
+    t, y, halves = drawn_line(chart, series, j, STRETCHES)
+    for half, style in zip(halves, ribbon_looks(series), strict=False):
         axes.fill_between(t, y - half, y + half, **style)
     axes.plot(t, y, **look(series))
 

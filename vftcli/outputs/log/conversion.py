@@ -11,9 +11,9 @@ from vftcli.outputs.log.mcap_output import (
     joint_topic,
     source_stamps,
     stamps_of,
+    wrench_topic,
     write_topics,
 )
-from vftcli.readers.bags.ros_messages import Value, in_parts
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
 from vftcli.signals.names import COLUMN_NAMES, JOINT_SIGNALS
@@ -98,12 +98,8 @@ def topics(recording: Recording) -> Iterator[OutputTopic]:
             yield joint_topic(f"/vftcli/{COLUMN_NAMES.get(name, name)}", names, effort=value)
     if recording.wrench is not None:
         frame = recording.wrench_frame
-        values: dict[str, Value] = {
-            "header.frame_id": frame.notation if frame is not None else "",
-            **in_parts("wrench.force", "xyz", recording.wrench[:, :3]),
-            **in_parts("wrench.torque", "xyz", recording.wrench[:, 3:]),
-        }
-        yield OutputTopic("/vftcli/wrench", "geometry_msgs/WrenchStamped", values)
+        notation = frame.notation if frame is not None else ""
+        yield wrench_topic("/vftcli/wrench", notation, recording.wrench)
 
 
 #: Ending of the file's name → how it is written.

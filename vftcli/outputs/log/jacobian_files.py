@@ -6,7 +6,7 @@ from typing import Any
 
 from vftcli.evaluation.logged_jacobian import JacobianJudgement
 from vftcli.outputs.files import OutputFolder, table_file
-from vftcli.outputs.log.report import ERROR_TABLES
+from vftcli.outputs.log.report import ERROR_TABLES, put_errors
 from vftcli.outputs.log.run_record import CONVENTIONS, seal, versions
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
@@ -47,9 +47,7 @@ def write_jacobian_folder(
     with OutputFolder(path, force, names) as folder:
         with table_file(folder / "estimates.parquet") as file:
             table.write_parquet(file, compression="zstd", arrow_schema=schema)
-        if made.errors is not None:
-            for name, text_of in ERROR_TABLES.items():
-                folder.write(name, text_of(made.errors, {}))
+        put_errors(folder, "", made.errors, [])
         return seal(folder, SEAL, jacobian_record(made, command))
 
 

@@ -99,12 +99,15 @@ def topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
     if analysis.reference is not None:
         yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
     for wrench in analysis.wrenches:
-        parts: dict[str, Value] = {
-            "header.frame_id": frame_id(wrench),
-            **in_parts("wrench.force", "xyz", wrench.known[:, :3]),
-            **in_parts("wrench.torque", "xyz", wrench.known[:, 3:]),
-        }
-        yield OutputTopic(f"/vftcli/wrench/{ros_name(wrench.name)}", WRENCH, parts)
+        name = f"/vftcli/wrench/{ros_name(wrench.name)}"
+        yield wrench_topic(name, frame_id(wrench), wrench.known)
+
+
+def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
+    """A topic of WrenchStamped messages. (T, 6) [N, N·m]"""
+    force = in_parts("wrench.force", "xyz", values[:, :3])
+    moment = in_parts("wrench.torque", "xyz", values[:, 3:])
+    return OutputTopic(name, WRENCH, {"header.frame_id": frame, **force, **moment})
 
 
 def frame_id(wrench: Wrench) -> str:

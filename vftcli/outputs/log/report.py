@@ -15,8 +15,8 @@ from vftcli.outputs.log import tables
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
+from vftcli.outputs.log.rmse_tables import PaperBounds, paper_bounds
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
-from vftcli.outputs.log.wrench_tables import PaperBounds, paper_bounds
 from vftcli.outputs.page.pages import render, render_index
 from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed

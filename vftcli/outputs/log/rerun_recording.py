@@ -23,10 +23,9 @@ from vftcli.outputs.log.contact_recording import (
     painted_links,
     send_contacts,
 )
-from vftcli.outputs.log.rmse_tables import DAGGER
+from vftcli.outputs.log.rmse_tables import DAGGER, paper_bounds
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
-from vftcli.outputs.log.wrench_tables import paper_bounds
 from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import (
     condition_charts,

@@ -16,7 +16,7 @@ from vftcli.analysis import Analysis
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
 from vftcli.outputs.contacts import contacts_record
-from vftcli.outputs.examination import health_record
+from vftcli.outputs.examination import health_record, rate_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
@@ -157,7 +157,7 @@ def input_record(recording: Recording) -> dict[str, Any]:
         "joints": recording.joints,
         "start_s": float(recording.t[0]),
         "end_s": float(recording.t[-1]),
-        "rate_hz": 1.0 / recording.median_step if recording.samples > 1 else None,
+        "rate_hz": rate_of(recording),
         "signals": list(recording.signals),
     }
 

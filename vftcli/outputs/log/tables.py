@@ -21,16 +21,14 @@ from vftcli.outputs.grid import (
 from vftcli.outputs.log.rmse_tables import (
     DAGGER,
     LATEX_DAGGER,
-    blocks,
-    detail_grids,
-    marks_in_words,
-    rmse_grid,
-)
-from vftcli.outputs.log.wrench_tables import (
     PaperBounds,
     axis_grids,
+    blocks,
     contact_grids,
+    detail_grids,
+    marks_in_words,
     nothing_to_compare,
+    rmse_grid,
 )
 from vftcli.outputs.quantity import significant
 from vftcli.signals.letters import printable

@@ -6,23 +6,25 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import JointMeans
 from vftcli.outputs.answer import hardest_words, headline, otherwise
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
 from vftcli.outputs.contacts import by_force
+from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Column, Grid, GridCell
-from vftcli.outputs.log.rmse_tables import blocks, detail_grids, marks_on_page, rmse_grid
-from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.log.wrench_tables import (
+from vftcli.outputs.log.rmse_tables import (
     axis_grids,
+    blocks,
     contact_grids,
+    detail_grids,
     drift_grid,
+    marks_on_page,
     nothing_to_compare,
     paper_bounds,
+    rmse_grid,
 )
+from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import details, log_charts
 from vftcli.outputs.page.charts import Chart, observer_lines
 from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
@@ -100,8 +102,8 @@ def eyebrow(analysis: Analysis) -> tuple[str, ...]:
         measured = "beside a sensor's own wrench"
     elif recording.tau_ext is not None:
         measured = "beside the controller's own estimate"
-    rate = 1.0 / recording.median_step if recording.samples > 1 else float("nan")
-    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if np.isfinite(rate) else "")
+    rate = rate_of(recording)
+    span = f"{recording.duration:.1f} s" + (f" at {rate:.0f} Hz" if rate else "")
     return recording.name, robot.title or robot.name, span, measured
 
 

@@ -139,12 +139,19 @@ def scales_of(chart: Chart) -> Iterator[Scales]:
 
 def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
     """A line's paths in a panel: its ribbon, the ribbon's grey part, and itself; "" for none."""
-    x = chart.x if line.x is None else line.x
-    thin = thinned_log if chart.log else thinned
-    t, y = thin(x, line.values[:, panel])
-    halves = [np.interp(t, x, half) for half in line.ribbons(panel) or ()]
+    t, y, halves = drawn_line(chart, line, panel)
     own, quiet = (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
     return own, quiet, path_of(scales, t, y)
+
+
+def drawn_line(
+    chart: Chart, line: ChartLine, panel: int, stretches: int = STRETCHES
+) -> tuple[Array, Array, list[Array]]:
+    """A line's points in a panel, and there the half widths of its ribbon and its grey part."""
+    x = chart.x if line.x is None else line.x
+    thin = thinned_log if chart.log else thinned
+    t, y = thin(x, line.values[:, panel], stretches)
+    return t, y, [np.interp(t, x, half) for half in line.ribbons(panel) or ()]
 
 
 def path_of(scales: Scales, t: Array, y: Array) -> str:
@@ -187,13 +194,13 @@ def stripes(scales: Scales, spans: Sequence[tuple[float, float]]) -> str:
     return path
 
 
-def thinned(t: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
+def thinned(t: Array, values: Array, stretches: int) -> tuple[Array, Array]:
     """One series as it is drawn: of every stretch its lowest and its highest sample."""
     (drawn,) = decimated(t, values[:, None], stretches)
     return drawn.t, drawn.y
 
 
-def thinned_log(x: Array, values: Array, stretches: int = STRETCHES) -> tuple[Array, Array]:
+def thinned_log(x: Array, values: Array, stretches: int) -> tuple[Array, Array]:
     """One series as drawn over a logarithmic axis: stretches of equal width there."""
     if len(x) <= 2 * stretches:
         return x, values
