@@ -215,7 +215,8 @@ ROWS = [
     Row("gaps", of(dropped_span), "interval", "0:9"),
     Row("load-changes", of(partial(picked_up, mass=3.0)), "interval", "0:9"),
     Row("position-jump", of(rehomed), "interval", "0:11"),
-    Row("velocity-of-another-kind", of(lambda t: replace(t, dq=t.dq * THIRD_IN_DEGREES)), "log.derive"),
+    Row("velocity-of-another-kind", of(lambda t: replace(t, dq=t.dq * THIRD_IN_DEGREES)),
+        "log.derive"),
     Row("no-effort", lambda f: renamed(sound(), "current", "pull", f), "columns",
         "current=pull{i}"),
     Row("zero-effort", lambda f: renamed(

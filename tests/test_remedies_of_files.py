@@ -79,7 +79,8 @@ class Row(NamedTuple):
 
 ROWS = [
     # cli
-    Row("give one of LOG, SCENARIO, --release", lambda _: ["admit", "--robot", "ur5"], "--release", "x=0.3"),
+    Row("give one of LOG, SCENARIO, --release", lambda _: ["admit", "--robot", "ur5"],
+        "--release", "x=0.3"),
     Row("are of what -o DIR writes", lambda _: [*RELEASE, "--figures", "svg"], "-o", "out"),
     Row("choose one of --json and --latex", lambda _: [*RELEASE, "--json", "--latex"], "--latex",
         LEFT_OUT),
@@ -322,11 +323,13 @@ WITHOUT_ROW = {
         "only _:* covers", "give it once",
         "--columns: … has no unit", "has no field", "is neither a number, as in 0, nor all",
         "--columns turns the sign of the clock", "names a column of … twice",
-        "is no address, as tcp", "--tip …: ", "--reference-columns names no tau_ext",
-        "is for a xacro, which this is not", "is not a number or a list",
+        "--tip …: ", "--figures … is not … or …", "--reference-columns names no tau_ext",
+        "is not a number or a list", "is no setting; vftcli help settings lists them",
+        "this command has no such setting", "--set …=… is not ……",
     ),
     NOTHING: (
-        "and none ran", "is what an MJCF gives its joints", "the xacro cannot be expanded",
+        "is now --robot", "is what an MJCF gives its joints", "makes no use of …; leave it away",
+        "takes one LOG; name free motion",
         "do not tell those of robot", "Say which: --set log.format=NAME.",
     ),
     ELSEWHERE: (
@@ -338,9 +341,9 @@ WITHOUT_ROW = {
         "--set log.derive=dq makes them", "gravity would be written as force",
     ),
     CLUSTER: (
-        "add --set cluster.address=ADDRESS", "need Dask and cryptography",
-        "(all three) belong together", "leave --jobs out", "are given together",
-        "can run code as you", "workers need a certificate", "no Dask scheduler answers",
+        "add --set cluster.address=ADDRESS", "need Dask and cryptography", "is no address, as tcp",
+        "leave --jobs out",
+        "can run code as you", "workers need a certificate",
         "has no worker; start some",
     ),
 }  # fmt: skip
@@ -356,7 +359,7 @@ def texts() -> dict[str, str]:
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 if isinstance(node, ast.Raise) and node.exc is not None:
                     text = "".join(spoken(node.exc))
-                    if re.search(r"--[a-z]|vftcli [a-z]", text):
+                    if re.search(r"--[a-z]|vftcli [a-z]|[a-z]\.[a-z_-]+=", text):
                         found[f"{path.relative_to(PACKAGE)}:{node.lineno}"] = text
     return found
 

@@ -17,9 +17,10 @@ from vftcli.refinement.limits import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
+from vftcli.signals.errors import VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark
+from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
 from vftcli.virtual_sensor.frames import NOTHING, from_base
@@ -79,8 +80,12 @@ def judge(
         sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
         errors = with_wrenches(errors, recording.name, sensed)
     if choice.contacts:
-        scores = judge_contacts(estimates, sensed, reference, told)
-        errors = with_contacts(errors, recording.name, reference.name, scores)
+        try:
+            scores = judge_contacts(estimates, sensed, reference, told)
+            errors = with_contacts(errors, recording.name, reference.name, scores)
+        except VftError as error:
+            reason = caution("contacts-not-judged", reason=str(error))
+            reference = replace(reference, remarks=(*reference.remarks, reason))
     return Judgement(reference=reference, errors=errors, virtual_sensor=sensed)
 
 

@@ -37,7 +37,9 @@ class OutputChoice(Choice):
                 f"--set recording.detail={self.detail} is none of {FULL}, {LEVELS} and {NONE}"
             )
         if self.detail == NONE and "rrd" in self.extras:
-            raise ParameterError("recording.detail=none writes no recording; leave one away")
+            raise ParameterError(
+                "recording.detail=none writes no recording; leave it or --rrd away"
+            )
 
     @property
     def writes_recording(self) -> bool:
