@@ -94,7 +94,7 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
 
 @pytest.mark.slow
 def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
-    asked = {"robot": "ur5", "observers": "gmo", "interval": "0:6", "free_part": "0:4"}
+    asked = {"robot": "ur5", "observers": "gmo", "interval": "0:6", "free": "0:4"}
     vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["command"].startswith("vftcli.report(")

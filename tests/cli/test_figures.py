@@ -53,8 +53,6 @@ def test_compare_draws_into_a_folder_and_nowhere_else(
     assert names == ["errors-double.svg", "errors-single.svg"]
     assert "need each other" in run(*words, "--figures", "svg", code=2)
     assert "need each other" in run(*words, "-o", out, code=2)
-    lost = run(*words, "--figures", "svg", "-o", tmp_path / "b", "--details", code=2)
-    assert "leave --details away" in lost
 
 
 def test_admit_prints_tables_three_and_four_for_latex_and_draws_the_release(

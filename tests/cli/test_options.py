@@ -186,8 +186,9 @@ def test_summaries_are_those_of_the_commands() -> None:
 
 ROOT = Path(__file__).parent.parent.parent
 OF_OTHER_TOOLS = {"--binary", "--storage", "--help", "--all-extras", "--dist", "--nthreads",
-                  "--protocol", "--tls-ca-file"}  # fmt: skip
-"""Options in the documents that are those of pip, of ros2 bag, of Dask, or of all programs."""
+                  "--protocol", "--tls-ca-file",
+                  "--tls-cert", "--tls-key", "--rounds"}  # fmt: skip
+"""Options in documents that are those of pip, ros2 bag, Dask, our benchmark, or of all programs."""
 
 
 @pytest.mark.slow

@@ -127,7 +127,7 @@ def test_what_makes_results_meaningless_refuses_and_no_more(
         assert bool(codes & (REFUSING - NO_FIT)) == (fault in REFUSED - {"wrong_robot"})
 
 
-OPTION = re.compile(r"--(columns|robot|effort)[ =]('[^']+'|[^\s,;]+)")
+OPTION = re.compile(r"--(columns|robot|set)[ =]('[^']+'|[^\s,;]+)")
 """An option in a remedy with its value."""
 
 ADVISED = {

@@ -12,10 +12,8 @@ from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.outputs.answer import headline, load_doubt, otherwise
 from vftcli.outputs.believability import (
-    MARKS,
     Ground,
     grounds,
-    grounds_record,
     health,
     joint_words,
     resting,
@@ -261,10 +259,3 @@ def test_a_reference_without_a_floor(without_reference: Analysis) -> None:
 def test_words_of_joints() -> None:
     assert joint_words([0, 1, 2]) == "J1…J3"
     assert joint_words([0, 2, 3]) == "J1, J3, J4"
-
-
-def test_machines_get_the_same(without_reference: Analysis) -> None:
-    found = grounds(without_reference)
-    rows = grounds_record(found)
-    assert [row["subject"] for row in rows] == [ground.subject for ground in found]
-    assert all(MARKS[row["standing"]] for row in rows)

@@ -39,7 +39,7 @@ def test_the_ur5e_of_mujoco_reads_its_truth(logs: Path) -> None:
         wrench=WrenchChoice(frame="base"),
         read=ReadChoice(columns=MUJOCO),
         robot=RobotChoice(name=str(folder / "robot.toml")),
-        observers=ObserverChoice.parsed(observer=("gmo",), set=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(observer=("gmo",), settings={"gmo.gain": "30"}),
         reference=ReferenceChoice(name="sensor"),
     )
     analysis = analysed(folder / "circle.csv", request)
@@ -66,7 +66,7 @@ def test_the_fr3_behind_libfranka_reads_its_truth(logs: Path, tmp_path: Path) ->
         wrench=WrenchChoice(frame="base"),
         read=ReadChoice(interval=(1.5, 27.5)),
         robot=RobotChoice(name=str(logs / "libfranka_sim" / "robot.toml")),
-        observers=ObserverChoice.parsed(observer=("gmo",), set=("gmo.gain=30",)),
+        observers=ObserverChoice.parsed(observer=("gmo",), settings={"gmo.gain": "30"}),
         reference=ReferenceChoice(name=f"file:{tmp_path / 'pushes_truth.csv'}"),
     )
     analysis = analysed(tmp_path / "pushes.csv", request)

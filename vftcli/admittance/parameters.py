@@ -183,9 +183,9 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
     return settings
 
 
-def is_admittance_setting(assignment: str) -> bool:
-    """Whether an assignment of the command line speaks of the admittance, not of an observer."""
-    section, dot, _ = assignment.partition("=")[0].strip().rpartition(".")
+def is_admittance_setting(name: str) -> bool:
+    """Whether a setting is one of the admittance's parameters."""
+    section, dot, _ = name.rpartition(".")
     return not dot or section in GROUPS
 
 

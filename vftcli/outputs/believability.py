@@ -6,8 +6,8 @@ terminal, the page and ``run.json`` show the same items.
 """
 
 import shlex
-from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -123,11 +123,6 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
 def health(found: Sequence[Ground]) -> Ground:
     """The worst of what was found in a log itself, the first of several equally bad."""
     return min((g for g in found if g.of_log), key=lambda ground: SEVERITY.index(ground.standing))
-
-
-def grounds_record(found: Iterable[Ground]) -> list[dict[str, Any]]:
-    """The grounds for machines."""
-    return [{key: g._asdict()[key] for key in Ground._fields[:4]} for g in found]
 
 
 #: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or

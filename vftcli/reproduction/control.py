@@ -68,7 +68,7 @@ def looped(
     alone = ControlChoice(as_printed=variant == AS_PRINTED)
     parameters = alone.parameters(arm)
     observers = ObserverChoice.parsed(
-        observer=["kfo-fe"], set=[f"kfo.noise_convention={CONVENTIONS[variant]}"]
+        observer=["kfo-fe"], settings={"kfo.noise_convention": CONVENTIONS[variant]}
     )
     observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     assert isinstance(observer, KalmanObserver)

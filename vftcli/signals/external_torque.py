@@ -91,15 +91,6 @@ class ExternalTorque(Shown):
         return int(self.tau.shape[1])
 
     @property
-    def mostly_rests(self) -> tuple[bool, ...]:
-        """Whether a joint moves in less than half of its known samples, joint by joint."""
-        if self.moving is None:
-            return (False,) * self.joints
-        known = np.maximum(np.count_nonzero(self.known, axis=0), 1)
-        used = np.count_nonzero(self.moving & self.known, axis=0)
-        return tuple(bool(rests) for rests in used < 0.5 * known)
-
-    @property
     def known(self) -> Mask:
         """Whether a joint's torque is known, sample by sample. (T, n)"""
         return np.isfinite(self.tau)

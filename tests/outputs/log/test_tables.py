@@ -102,7 +102,6 @@ def test_pairs_name_the_better_first() -> None:
         "0.200",
     ]
     assert lines[3] == "*: p below 0.05"
-    assert json.loads(tables.pairs_text(rows, as_json=True)) == rows.to_dicts()
 
 
 def test_what_is_for_details_can_be_left_out(errors: pl.DataFrame) -> None:

@@ -159,10 +159,8 @@ def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
     return (row["recording"], f"J{row['joint']}", *names, by, interval, f"{p:.3f}{star}")
 
 
-def pairs_text(rows: pl.DataFrame, *, as_json: bool = False) -> str:
-    """The paired differences of all logs, as a terminal table or a JSON array of rows."""
-    if as_json:
-        return to_json(rows)
+def pairs_text(rows: pl.DataFrame) -> str:
+    """The paired differences of all logs, as a terminal table."""
     heads = ("recording", "joint", "better", "than", "by [N·m]", "95 % interval", "p")
     first, *others = heads
     grid = Grid(
