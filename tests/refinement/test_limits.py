@@ -109,7 +109,7 @@ def test_the_ratio_is_that_of_the_bands(analysis: Analysis) -> None:
 @pytest.mark.slow
 def test_other_gains_in_the_run_do_not_change_what_the_paper_s_cost(analysis: Analysis) -> None:
     """Those of --gains auto and of --set ran; the paper's run beside them for the line."""
-    for words in ({"gains": "auto"}, {"set": ["gmo.gain=30"]}, {"observer": ["best"]}):
+    for words in ({"gains": "auto"}, {"settings": {"gmo.gain": "30"}}, {"observer": ["best"]}):
         other = analyse_log(FIXTURE, replace(UR5, observers=ObserverChoice.parsed(**words)))
         assert gaps(other)[0].values["ratio"] == pytest.approx(
             gaps(analysis)[0].values["ratio"], rel=1e-12
