@@ -52,7 +52,9 @@ def test_no_browser_is_said(run: Run, tmp_path: Path, monkeypatch: pytest.Monkey
 
 
 def test_a_command_opens_what_it_made(run: Run, opened: list[str], tmp_path: Path) -> None:
-    """Of estimate --open implies the recording."""
+    """A release makes a page; of estimate --open implies the recording."""
+    released = ("--release", "x=0.1", "--robot", "ur5", "--set", "admittance.duration=1")
+    assert run("admit", *released, "-o", tmp_path / "a", "--open")[0] == 0
     log = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
     fast = ("--robot", "ur5", "--causal", "--observer", "gmo", "--interval", "0:4")
     assert run("estimate", log, *fast, "-o", tmp_path / "e", "--open")[0] == 0
