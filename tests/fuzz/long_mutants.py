@@ -68,7 +68,9 @@ def long_words(seed: Seed, place: Path, rng: Rng, folder: Path) -> list[str]:
     else:
         command = pick(rng, list(CHOICES))
         words = [command, str(place), "--robot", seed.model.robot]
-        words += [word for option, v in CHOICES[command].items() for word in (option, pick(rng, v))]
+        for option, values in CHOICES[command].items():
+            value = pick(rng, values)
+            words += [option, value] if option.startswith("-") else ["--set", f"{option}={value}"]
     if words[0] in {"contacts", "thresholds"}:
         words.append("--json")
     else:
