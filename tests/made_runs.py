@@ -5,9 +5,9 @@ import numpy as np
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
-from vftcli.signals.terms import DynamicsTerms
 
 
 def run_of(terms: DynamicsTerms, q: Array | None = None, robot: Robot | None = None) -> Run:

@@ -63,7 +63,6 @@ FILES = (
     "robots/robot_file.py",
     "robots/writing.py",
     "robots/xml_text.py",
-    "signals/identity.py",  # the digest of what was read
     "signals/remarks.py",  # the catalogue of words
     "simulation/load.py",
     "simulation/scenario.py",

@@ -29,8 +29,8 @@ from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition import alignment
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import run as modelled
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, RobotError
 from vftcli.signals.remarks import Remark
 from vftcli.virtual_sensor.choice import WrenchChoice

@@ -34,7 +34,7 @@ from test_remedies import (
 
 import vftcli
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 
 PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",

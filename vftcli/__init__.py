@@ -49,13 +49,12 @@ if TYPE_CHECKING:
     from vftcli.repetition.choice import FreeChoice
     from vftcli.repetition.two_cycle import two_cycle_difference
     from vftcli.robots import Payload, Robot, load_robot
+    from vftcli.robots.chain import flange_jacobian, link_poses
     from vftcli.robots.choice import RobotChoice
-    from vftcli.robots.kinematics import flange_jacobian, link_poses
-    from vftcli.robots.terms import dynamics_terms
+    from vftcli.robots.terms import DynamicsTerms, dynamics_terms
     from vftcli.signals.errors import VftError
-    from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
-    from vftcli.signals.terms import DynamicsTerms
+    from vftcli.signals.wrench import ExternalTorque
     from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 
 __version__ = VERSION

@@ -18,8 +18,7 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, Runs
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, Remarks, Where, caution
 
 if TYPE_CHECKING:

@@ -14,12 +14,12 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.robots.drive import effort_name
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs
+from vftcli.robots.terms import effort_name
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import MissingSignalError, RobotError, VftError
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 
 MOST_ROBOTS = 5  #: Profiles that are named where none is settled.

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 
 QUIET = 8.0
 """Nobody pushes before this time. [s]"""

@@ -19,7 +19,7 @@ from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.simulation import load_scenario
 from vftcli.simulation.experiment import simulate
 

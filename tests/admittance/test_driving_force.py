@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.admittance.driving_force import sensor_force, stored_force, truth_force
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame

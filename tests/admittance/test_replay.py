@@ -10,7 +10,7 @@ from vftcli.admittance.law import UnstableError, controllers, variable
 from vftcli.admittance.parameters import from_table, parse_settings
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.signals.errors import ClockError, ParameterError
 from vftcli.signals.pose import exp_matrix
 from vftcli.signals.remarks import fact

@@ -11,7 +11,7 @@ import numpy as np
 
 from vftcli.contacts.contact_list import Contact
 from vftcli.signals.arrays import Array
-from vftcli.signals.intervals import intervals
+from vftcli.signals.series import intervals
 from vftcli.virtual_sensor.contact import credits, overlaps
 
 LEAST_FORCE, LEAST_MOMENT, GAP = 1.0, 0.2, 0.12

@@ -128,7 +128,7 @@ def scored(name: str, seed: int, more: Sequence[str] = STICKS) -> LogScore:
 
 def in_flange_axes(robot: object, q: Array, wrench: Array) -> Array:
     """A wrench in base axes about the flange point as the flange's axes see it. (T, 6)"""
-    from vftcli.robots.kinematics import link_poses
+    from vftcli.robots.chain import link_poses
 
     R = link_poses(robot.chain, q).rotation[:, -1]  # type: ignore[attr-defined]
     turned = [np.einsum("tji,tj->ti", R, part) for part in (wrench[:, :3], wrench[:, 3:])]

@@ -26,8 +26,8 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log, analyse_logs, list_touches
 from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 LOGS = Path(os.environ.get("VFT_LOGS", "."))

@@ -16,7 +16,7 @@ from vftcli.contacts.model_error import error_course
 from vftcli.contacts.search import turned_round
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import runs_of
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:

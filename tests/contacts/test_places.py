@@ -11,7 +11,7 @@ from vftcli.contacts.places import (
     those_that_fit,
 )
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 
 Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
 

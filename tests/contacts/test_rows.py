@@ -20,7 +20,7 @@ from vftcli.contacts.rows import (
 )
 from vftcli.readers import read
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame

@@ -15,8 +15,7 @@ from vftcli.contacts.thresholds import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.recording import Recording
-from vftcli.signals.source import Source
+from vftcli.signals.recording import Recording, Source
 
 STEADY = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
 """The moments alone."""

@@ -24,9 +24,9 @@ from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.signals.terms import DynamicsTerms
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 

@@ -16,7 +16,7 @@ from fault_variants import robot_word, span_of, table_from, thinned
 from planted_faults import Maker, Table
 from sound_logs import LOGS
 
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.arrays import Array, Mask
 
 MIDDLE = 0.4

@@ -112,7 +112,7 @@ def test_an_offset_is_told_with_its_size() -> None:
 
 def test_a_long_push_is_no_tilt_and_no_offset() -> None:
     """A steady 40 N sideways for three quarters of the log: the rest of it refutes a tilt."""
-    from vftcli.robots.kinematics import flange_jacobian
+    from vftcli.robots.chain import flange_jacobian
 
     log = moving("panda")
     pushed = log.t > 3.0

@@ -8,9 +8,8 @@ import pytest
 from vftcli.doctor.signals import clock_findings
 from vftcli.doctor.velocity import velocity_fit
 from vftcli.signals.arrays import Array
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark
-from vftcli.signals.source import Source
 
 STEP = 0.01
 """Sample time of the logs. A binary fraction's worth of rounding is far below every limit. [s]"""

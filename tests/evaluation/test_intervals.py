@@ -16,7 +16,7 @@ from vftcli.evaluation.intervals import (
     resample,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import ExternalTorque
 
 STEP = 0.008
 

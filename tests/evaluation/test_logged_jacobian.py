@@ -12,7 +12,7 @@ from vftcli.readers.jacobian import JacobianLog, jacobian_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import JacobianError
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.errors import (
     ClockError,
     LogError,

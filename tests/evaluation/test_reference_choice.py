@@ -13,7 +13,7 @@ from vftcli.evaluation.references import REFERENCES, make_reference
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording

@@ -14,8 +14,8 @@ from vftcli.evaluation.selection import (
 from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.recording import Recording
-from vftcli.signals.terms import DynamicsTerms
 
 STEP = 0.002
 

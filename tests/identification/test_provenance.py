@@ -18,9 +18,8 @@ from vftcli.identification.result import (
 )
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.writing import robot_toml
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
-from vftcli.signals.source import Source
 
 UR5 = load_robot("ur5")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.remarks import Remark
-from vftcli.signals.terms import DynamicsTerms
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ from scipy.linalg import expm, solve_discrete_are
 from vftcli.observers import KalmanObserver
 from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Covariance, Densities, zero_order_hold
 from vftcli.observers.uneven import gain_sequence
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.steady_filter import PIECE
-from vftcli.signals.terms import DynamicsTerms
 
 R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])  # the paper's UR5 values, Sec. IV-A
 Q_P = np.array([0.01, 0.01, 0.01, 0.02, 0.02, 0.02])

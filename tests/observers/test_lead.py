@@ -7,7 +7,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import LEAD, LONGEST, estimate_from_rest, lead_samples, settling_samples
 from vftcli.observers.paper import MomentumObserver
 from vftcli.robots import load_robot
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.robots.terms import DynamicsTerms
 
 PANDA = load_robot("panda")
 

@@ -9,8 +9,8 @@ from made_runs import samples_of
 
 from vftcli.observers.spectra import Spectra, around_impacts, looks_free, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.terms import DynamicsTerms
 
 STEP = 0.008
 

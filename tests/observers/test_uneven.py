@@ -6,7 +6,7 @@ import pytest
 from vftcli.observers import KalmanObserver
 from vftcli.observers.kalman_model import Covariance, Gains, update
 from vftcli.observers.uneven import gain_sequence
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.robots.terms import DynamicsTerms
 
 SAMPLES = 3000
 

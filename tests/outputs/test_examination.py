@@ -15,9 +15,8 @@ from vftcli.outputs.examination import (
 )
 from vftcli.outputs.log.run_record import to_json
 from vftcli.outputs.page.shell import part
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, fact, warning
-from vftcli.signals.source import Source
 
 LOG = Recording(t=np.arange(4.0), q=np.zeros((4, 6)), source=Source(label="a.csv"))
 SLOW = warning("slow-rate", rate_Hz=10.0)

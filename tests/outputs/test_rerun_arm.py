@@ -21,7 +21,7 @@ from vftcli.outputs.rerun_arm import (
 )
 from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.robots import PROFILES, load_robot
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 
 UR5 = load_robot("ur5").chain
 POSES = motion(UR5, np.linspace(0.0, 4.0, 201), np.zeros((201, 6)))

@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from vftcli.readers import read
 from vftcli.readers.columns import parse_columns
 from vftcli.signals.errors import VftError
-from vftcli.signals.letters import HIDDEN, printable
+from vftcli.signals.parsing import HIDDEN, printable
 
 NUMBERS = st.floats(-6, 6, allow_subnormal=False)
 TABLES = st.integers(2, 40).flatmap(

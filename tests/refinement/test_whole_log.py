@@ -11,8 +11,8 @@ from known_errors import STEP, drawn_error, motion, shortened, ur10e, wrong_run
 from vftcli.refinement.model_error import smooth_motion, usual_friction
 from vftcli.refinement.whole_log import stride_of, whole_log_bias
 from vftcli.robots import load_robot
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import raw_disturbance
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 

@@ -13,10 +13,10 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_load import FreeLoad, columns, free_load, weigh
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
-from vftcli.robots.drive import gain_sd
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.regressor import load_regressor
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import gain_sd
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"

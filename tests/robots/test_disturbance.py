@@ -11,8 +11,8 @@ from vftcli.robots.disturbance import (
     disturbance_stretches,
     raw_disturbance,
 )
-from vftcli.signals.spectrum import welch
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.filters import welch
 
 STEP = 0.004
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.robots import PROFILES, load_robot
-from vftcli.robots.chain import unphysical
+from vftcli.robots.chain import link_poses, unphysical
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.kinematics import link_poses
 from vftcli.signals.errors import RobotError
 
 # Origin: Pinocchio 4.1 on the manufacturers' URDFs (UniversalRobots ROS 2 description for the UR

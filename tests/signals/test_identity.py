@@ -5,8 +5,7 @@ import pytest
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_logs, refuse_repeated_runs, same_run
-from vftcli.signals.recording import Recording
-from vftcli.signals.source import Source
+from vftcli.signals.recording import Recording, Source
 
 
 def recording(sha256="", label="", rows=3, t0=0.0):

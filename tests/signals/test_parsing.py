@@ -1,10 +1,20 @@
 """Words of the command line: spans, lists of numbers, assignments."""
 
+import json
+
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from vftcli.signals.arrays import spread
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import (
+    NUMBER,
+    PER_JOINT,
+    SWITCH,
+    TEXT,
+    WHOLE,
     assignment,
     check_kind,
     check_known,
@@ -12,7 +22,12 @@ from vftcli.signals.parsing import (
     interval,
     interval_text,
     numbers,
+    printable,
+    printable_lines,
+    set_value,
     toml_tables,
+    vector,
+    whole,
 )
 
 
@@ -77,3 +92,71 @@ def test_a_thing_of_another_kind_is_refused_with_what_gives_one() -> None:
         check_kind("a", int, "the count", "len(x)")
     with pytest.raises(ParameterError, match=r"^the count is ndarray; expected int"):
         check_kind(np.zeros(3), int, "the count", "len(x)")
+
+
+ANY_TEXT = st.text(st.characters(codec=None, exclude_categories=[]))
+"""All that a Python text can hold, halves of letters too."""
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"),
+    [
+        ("log.csv", "log.csv"),
+        ("ログ é 10 N·m – «x»", "ログ é 10 N·m – «x»"),
+        ("bad\udcff.csv", r"bad\xff.csv"),
+        ("half\ud800", r"half\ud800"),
+        ("red\x1b[31m", r"red\x1b[31m"),
+        ("two\nlines\r\t", r"two\nlines\r\t"),
+        ("turned\u202etxt", r"turned\u202etxt"),
+        ("end\u2028", r"end\u2028"),
+    ],
+)
+def test_what_is_hidden_is_spelled(name: str, shown: str) -> None:
+    assert printable(name) == shown
+
+
+@given(ANY_TEXT)
+def test_every_text_is_printable_and_fits_utf_8(text: str) -> None:
+    shown = printable(text)
+    shown.encode("utf-8")
+    assert len(shown.splitlines()) <= 1
+    assert printable(shown) == shown
+    assert json.loads(json.dumps(whole(text), ensure_ascii=False).encode()) == whole(text)
+
+
+@given(ANY_TEXT)
+def test_lines_stay_lines(text: str) -> None:
+    assert printable_lines(text).count("\n") == text.count("\n")
+
+
+FLOATS = st.floats(allow_nan=False, allow_infinity=False)
+VALUES = st.one_of(
+    st.booleans(), st.integers(), st.floats(), st.text(), st.lists(FLOATS, max_size=3)
+)
+
+
+@given(value=VALUES)
+def test_a_plain_value_is_of_its_own_kind_alone(value: object) -> None:
+    """Of these kinds only whole numbers are of two, and true is no number."""
+    kinds = {NUMBER: (int, float), WHOLE: (int,), SWITCH: (bool,), TEXT: (str,)}
+    for kind, types in kinds.items():
+        fits = type(value) in types and (not isinstance(value, float) or bool(np.isfinite(value)))
+        assert (kind.broken("key", value) == "") == fits
+
+
+@given(numbers=st.lists(FLOATS, min_size=1, max_size=4), count=st.integers(1, 4))
+def test_a_list_is_spread_where_it_has_one_or_one_for_each(
+    numbers: list[float], count: int
+) -> None:
+    assert PER_JOINT.broken("key", numbers) == ""
+    assert (vector(count).broken("key", numbers) == "") == (len(numbers) == count)
+    text = ",".join(map(repr, numbers))
+    assert spread(set_value(text, text), len(numbers), "joints", "key").tolist() == numbers
+    if len(numbers) not in {1, count}:
+        with pytest.raises(ParameterError, match=f"give one, or one for each of {count} joints"):
+            spread(numbers, count, "joints", "key")
+
+
+def test_an_integer_beyond_every_float_is_no_number() -> None:
+    assert NUMBER.broken("mass", 10**400).endswith("it must be a finite number")
+    assert PER_JOINT.broken("gain", []) == "gain is []; it must be a number or one a joint"

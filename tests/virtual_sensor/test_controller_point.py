@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.pose import Pose
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame

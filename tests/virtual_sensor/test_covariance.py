@@ -5,8 +5,8 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
-from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 STEP = 0.008

@@ -11,7 +11,7 @@ from rosbags.highlevel import AnyReader
 from vftcli.evaluation.references import sensor_reference
 from vftcli.readers import read
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording

@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
     PRIOR,

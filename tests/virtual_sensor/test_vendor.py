@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.vendor import AxesFit, check_vendor, fit_axes

@@ -10,7 +10,7 @@ from vftcli.admittance.law import Controller
 from vftcli.admittance.motion import AxisMotion, Phases
 from vftcli.admittance.parameters import AXES
 from vftcli.signals.arrays import Array
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import runs_of
 
 PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
 #: Return time → share of the deviation at release inside which the axis has to stay.

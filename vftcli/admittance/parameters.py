@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.arrays import Array, frozen, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, numbers
-from vftcli.signals.schema import NUMBER, set_value, spread
+from vftcli.signals.parsing import NUMBER, assignment, check_known, numbers, set_value
 
 #: The six axes: translation of the flange point along the base axes, rotation about them.
 AXES = ("x", "y", "z", "rx", "ry", "rz")

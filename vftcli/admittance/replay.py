@@ -11,7 +11,7 @@ from vftcli.admittance.law import Controller, Verdict, check_stable, energy, pri
 from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
 from vftcli.admittance.motion import AxisMotion, Phases, phases, release, run
 from vftcli.admittance.parameters import AXES, Admittance
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError

@@ -23,8 +23,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice

@@ -19,7 +19,7 @@ from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import VftError
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 
 
 def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:

@@ -16,8 +16,8 @@ import typer
 from vftcli.cli.config import effective, typed
 from vftcli.cli.progress import STAGES, echo, is_watched
 from vftcli.signals.errors import VftError
-from vftcli.signals.letters import printable, printable_lines
 from vftcli.signals.packages import check_installed
+from vftcli.signals.parsing import printable, printable_lines
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis

@@ -43,8 +43,8 @@ def estimate(
     from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
-    from vftcli.signals.names import EXAMINED
     from vftcli.signals.packages import check_installed
+    from vftcli.signals.recording import EXAMINED
     from vftcli.streaming import analysed_in_blocks, comes_in_blocks
 
     output = opt.folder_of(output, [log], analysis.log.reading)

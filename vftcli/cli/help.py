@@ -17,9 +17,8 @@ from vftcli.cli.commands import COMMANDS, former, renewed, with_command
 from vftcli.cli.config import begin, config_option, forget, is_configured, settle
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.letters import printable
 from vftcli.signals.option import GROUPS, LOG, OUTPUT, Option
-from vftcli.signals.parsing import did_you_mean, nearest
+from vftcli.signals.parsing import did_you_mean, nearest, printable
 
 OWN = "This command"  #: Heading of the options that only one command has.
 NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left half at most.

@@ -21,8 +21,8 @@ import numpy as np
 from vftcli.contacts.model_error import ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.series import covered, intervals
 from vftcli.virtual_sensor.smoother.noise import steps
 
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]

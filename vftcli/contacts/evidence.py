@@ -23,8 +23,8 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.intervals import covered
 from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.series import covered
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 #: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free motion one

@@ -31,15 +31,15 @@ from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import disturbance_blocks
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.intervals import covered
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
+from vftcli.signals.series import covered
 from vftcli.virtual_sensor.smoother.noise import UNSEEN_SHARE
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]

@@ -15,9 +15,9 @@ import numpy as np
 from vftcli.robots.disturbance import TIE, Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import near, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.linear_model import SPIKE, LinearModel, filtered
+from vftcli.signals.series import near, runs_of
 from vftcli.virtual_sensor.smoother.noise import (
     LEAST_NOISE,
     SEEN,

@@ -7,8 +7,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import LinkPoses, link_poses
+from vftcli.robots.chain import Chain, LinkPoses, link_poses
 from vftcli.signals.arrays import Array
 
 ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.

@@ -25,10 +25,9 @@ from vftcli.contacts.untouched import SelfTest, Untouched, self_test
 from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import covered
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import median_step
+from vftcli.signals.series import covered, median_step
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
 

@@ -32,11 +32,10 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.intervals import covered, near, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
-from vftcli.signals.series import median_step
+from vftcli.signals.series import covered, median_step, near, runs_of
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 

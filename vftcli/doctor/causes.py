@@ -18,8 +18,8 @@ import numpy as np
 from vftcli.doctor.stuck import TRAVEL
 from vftcli.doctor.windows import Case, Windows, size_of, solve, spread, terms, up_axes, windows_of
 from vftcli.robots import Robot
-from vftcli.robots.drive import effort_name
 from vftcli.robots.friction import steady_torque
+from vftcli.robots.terms import effort_name
 from vftcli.signals.recording import Recording
 
 #: Least range of gravity's torque that shows the kind of an effort. [N·m]
@@ -68,7 +68,7 @@ RUBS, WITHOUT = 0.1, 3
 class Reading(NamedTuple):
     """An effort that differs from its name."""
 
-    kind: str  #: Its kind, of `vftcli.signals.names.EFFORTS`; "" for the named one.
+    kind: str  #: Its kind, of `vftcli.signals.recording.EFFORTS`; "" for the named one.
     factor: float = 1.0  #: Factor on its values.
 
 

@@ -12,16 +12,14 @@ import numpy as np
 
 from vftcli.doctor.signals import GAP_STEPS
 from vftcli.doctor.stuck import repeated_rows
-from vftcli.robots.drive import effort_name
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array, Indices, Mask, median
-from vftcli.signals.intervals import covered, runs_of
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Cut, Recording
 from vftcli.signals.remarks import Remark, Where, fact, warning
 from vftcli.signals.rest import REST
-from vftcli.signals.source import Cut
+from vftcli.signals.series import covered, runs_of
 
 #: Multiple of its largest torque that no drive gives: drive constants are uncertain. [1]
 BEYOND = 1.5

@@ -16,12 +16,11 @@ from vftcli.doctor.velocity import velocity_fit
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
-from vftcli.robots.drive import effort_name
 from vftcli.robots.pairing import paired, unwound
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import ExaminationError, RobotError
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.shown import Shown
 

@@ -22,8 +22,7 @@ from vftcli.doctor.windows import Case, Windows, size_of, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
 
 CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.

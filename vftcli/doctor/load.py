@@ -9,7 +9,7 @@ from vftcli.doctor.causes import RANGE
 from vftcli.doctor.findings import on_joints
 from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots import Robot
-from vftcli.robots.drive import gain_sd
+from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, warning

@@ -8,8 +8,7 @@ from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import repeated_rows, stuck_findings
 from vftcli.doctor.velocity import VelocityFit, common_cause, velocity_findings
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.names import EFFORTS, JOINT_SIGNALS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.rest import NONZERO
 from vftcli.signals.series import gaps_of

@@ -10,11 +10,10 @@ import numpy as np
 
 from vftcli.doctor.findings import on_joints
 from vftcli.signals.arrays import Array, Indices, Mask
-from vftcli.signals.intervals import runs_of
-from vftcli.signals.names import EFFORTS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import EFFORTS, Recording
 from vftcli.signals.remarks import Remark, fact, warning
 from vftcli.signals.rest import HELD
+from vftcli.signals.series import runs_of
 
 LONG = 0.5  #: Time for which a signal has to repeat itself. [s]
 MANY = 10  #: Steps for which it has to.

@@ -14,10 +14,10 @@ from vftcli.doctor.findings import on_joints
 from vftcli.doctor.stuck import TRAVEL, stuck_joints, travel_of
 from vftcli.doctor.windows import spread
 from vftcli.signals.arrays import Array, Mask, median
-from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, warning
 from vftcli.signals.rest import MOVES
+from vftcli.signals.series import runs_of
 
 #: Length of a window: short beside motion, long beside noise of single samples and an arm's
 #: vibration. [s]

@@ -15,13 +15,12 @@ from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
 from vftcli.refinement.limits import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import VftError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
 from vftcli.virtual_sensor.frames import NOTHING, from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference

@@ -11,19 +11,17 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.readers.references import read_reference
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.repetition.two_cycle import two_cycle_reference
-from vftcli.robots.drive import check_joints
-from vftcli.robots.kinematics import flange_jacobian
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
+from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import low_pass
-from vftcli.signals.intervals import runs_of
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, warning
-from vftcli.signals.series import resample_columns
-from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.signals.series import resample_columns, runs_of
+from vftcli.signals.wrench import ExternalTorque, Wrench, WrenchFrame
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 from vftcli.virtual_sensor.log_wrench import in_base_axes, logged_wrench
 

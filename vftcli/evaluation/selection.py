@@ -9,9 +9,9 @@ import polars as pl
 from vftcli.evaluation.errors import joint_means
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.run import Run
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.series import median_step
-from vftcli.signals.terms import DynamicsTerms
 
 STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
 REACHED = 0.9  #: Share of a step at which it counts as seen.

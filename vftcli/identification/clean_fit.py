@@ -16,11 +16,10 @@ from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.intervals import intervals, near
 from vftcli.signals.least_squares import NormalEquations, folds, normal_equations, robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.rest import SLIDES, slower
-from vftcli.signals.series import median_step
+from vftcli.signals.series import intervals, median_step, near
 
 TOUCH = 7.0  #: Residual of a contact, in robust standard deviations.
 TOUCH_TIME = 0.15  #: Time it must last. [s]

@@ -17,21 +17,20 @@ from vftcli.identification.processing import (
 from vftcli.readers.table import listed
 from vftcli.repetition.free_load import LEAST, PARTLY, SURE, columns, weighed
 from vftcli.robots.chain import Payload
-from vftcli.robots.drive import drive_torque, gain_sd
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import drive_torque, gain_sd
 from vftcli.signals.arrays import Array, Indices, handed_over
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
-from vftcli.signals.intervals import intervals
 from vftcli.signals.least_squares import folds, inverse_of, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.rest import faster, held
-from vftcli.signals.series import resample_columns
+from vftcli.signals.series import intervals, resample_columns
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
 STATIC = 4  #: Parameters that gravity shows: mass, three first moments.

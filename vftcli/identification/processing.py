@@ -6,18 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.robots.drive import drive_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature
+from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
-from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import NONZERO, faster
-from vftcli.signals.series import gaps_of
+from vftcli.signals.series import covered, gaps_of, intervals
 
 #: Samples kept per period of the cutoff when the filtered log is decimated.
 OVERSAMPLING = 6.0

@@ -17,10 +17,10 @@ from vftcli.identification.processing import (
     prepare,
     root_mean_square,
 )
-from vftcli.robots.drive import uses_current
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.regressor import LINK, torque_regressor
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import uses_current
 from vftcli.signals.arrays import Array
 from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording

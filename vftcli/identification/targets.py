@@ -40,11 +40,11 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.intervals import runs_of
 from vftcli.signals.least_squares import fit_column, solve
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import NONZERO, SLIDES, faster
+from vftcli.signals.series import runs_of
 
 #: Cutoff for targets: above it the measured motion does not follow them. [Hz]
 CUTOFF = 4.0

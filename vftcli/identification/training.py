@@ -14,8 +14,8 @@ from vftcli.identification.processing import (
     prepare,
     rigid_torque,
 )
-from vftcli.robots.drive import uses_current
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import uses_current
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording

@@ -26,9 +26,9 @@ from vftcli.observers.kalman_model import (
     Steady,
 )
 from vftcli.observers.uneven import recursion
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array
 from vftcli.signals.steady_filter import steady_filter
-from vftcli.signals.terms import DynamicsTerms, one_sample_earlier
 
 #: Relative change of a covariance in one sample from which on rounding moves it alone.
 SETTLED = 1e-14

@@ -6,10 +6,10 @@ import numpy as np
 
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.uneven import Fold, run_blocks, spans
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.steady_filter import steady_filter
-from vftcli.signals.terms import DynamicsTerms
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 

@@ -7,12 +7,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
 from vftcli.signals.errors import ShapeError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.shown import Shown
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.signals.wrench import ExternalTorque
 
 Complex = NDArray[np.complex128]
 

@@ -55,14 +55,14 @@ from vftcli.observers.observer import (
     per_joint,
 )
 from vftcli.observers.uneven import kalman_steps
+from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Where, warning
 from vftcli.signals.series import Clock
 from vftcli.signals.steady_filter import steady_filter
-from vftcli.signals.terms import DynamicsTerms, one_sample_earlier
+from vftcli.signals.wrench import ExternalTorque
 
 #: Weights of the external torque in a Kalman filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])

@@ -24,11 +24,11 @@ from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_lo
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.observers.uneven import gain_sequence, recursion
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series, handed_over
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import steady_filter
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.signals.wrench import ExternalTorque
 
 #: Share of the settled information that may still be missing.
 SETTLED = 1e-16

@@ -24,9 +24,8 @@ from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.intervals import grown, intervals
-from vftcli.signals.series import median_step
-from vftcli.signals.spectrum import welch
+from vftcli.signals.filters import welch
+from vftcli.signals.series import grown, intervals, median_step
 
 SEGMENT = 4.0  #: Length of a segment: what changes more slowly counts as constant. [s]
 LEAST_SEGMENT = 32  #: Fewest samples of a segment; a shorter free or loaded part has no spectrum.

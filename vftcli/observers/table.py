@@ -10,11 +10,17 @@ from vftcli.observers.observer import Observer, per_joint
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots.profile import checked_gains
 from vftcli.robots.robot_file import RobotFile
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, shown
+from vftcli.signals.parsing import (
+    PER_JOINT,
+    TEXT,
+    assignment,
+    check_known,
+    set_value,
+    shown,
+)
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.schema import PER_JOINT, TEXT, set_value, spread
 
 if TYPE_CHECKING:
     from vftcli.observers.spectra import Spectra

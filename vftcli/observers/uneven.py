@@ -37,9 +37,9 @@ from vftcli.observers.kalman_model import (
     error_filter,
     update,
 )
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Indices, empty_series
 from vftcli.signals.steady_filter import FORGOTTEN, PIECE
-from vftcli.signals.terms import DynamicsTerms
 
 #: Samples in a block at most: the Python loops have this length. From 32 to 64 all take as long.
 LENGTH = 36

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 

@@ -17,8 +17,8 @@ from typing import Self
 from vftcli.outputs.partial import PARTIAL, check_writable, held, partial_folder, to_disk
 from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
-from vftcli.signals.letters import whole
 from vftcli.signals.packages import installed, remedy
+from vftcli.signals.parsing import whole
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.outputs.quantity import DASH, minus, significant
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 
 #: A number or a bound, and its decimals with their point.
 NUMBER = re.compile(r"(?:< )?[-−]?\d+(\.\d+)?")

@@ -10,8 +10,7 @@ import numpy as np
 import rerun as rr
 
 from vftcli.outputs.palette import rgb
-from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import Chain, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
 

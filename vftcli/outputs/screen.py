@@ -26,7 +26,7 @@ from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks, contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
 MOST_LINES = 40  #: Lines of a screen.

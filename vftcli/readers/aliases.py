@@ -22,7 +22,7 @@ from vftcli.readers.table import (
     pick_of,
 )
 from vftcli.signals.errors import LogError
-from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
 #: Names of the clock; a unit may follow, as in time_ms.

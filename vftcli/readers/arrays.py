@@ -21,7 +21,7 @@ from vftcli.readers.reader import Episodes, LogFile, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.

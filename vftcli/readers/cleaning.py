@@ -18,10 +18,9 @@ from vftcli.signals.arrays import (
     pieces,
 )
 from vftcli.signals.errors import ClockError, LogError
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import gaps_of, median_step
-from vftcli.signals.source import Source
 
 
 def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:

@@ -14,7 +14,7 @@ from typing import Any
 
 from vftcli.readers.opening import HEAD_BYTES
 from vftcli.readers.reader import LogFile, RawLog, ReadChoice, episode_of
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,7 +8,7 @@ from vftcli.readers.columns import SIGNALS
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
-from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
 #: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical.

@@ -16,7 +16,7 @@ from vftcli.readers.opening import files_of
 from vftcli.readers.reader import LogFile, ReadChoice, open_log
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.identity import refuse_repeated_logs
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 
 TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.

@@ -241,7 +241,7 @@ class ReadChoice(Choice):
         Raises:
             MissingSignalError: If the log has no such effort.
         """
-        from vftcli.signals.derivation import is_fast, with_velocity
+        from vftcli.signals.repairs import is_fast, with_velocity
 
         kind = EFFORT[self.effort] if self.effort is not None else None
         if kind is not None:

@@ -25,9 +25,8 @@ from vftcli.signals.errors import (
     ShapeError,
     UnknownFormatError,
 )
-from vftcli.signals.names import JOINT_SIGNALS
 from vftcli.signals.parsing import did_you_mean
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import warning
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
 from vftcli.signals.errors import LogError, NoLogError
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import WrenchFrame
 

@@ -18,9 +18,9 @@ from vftcli.refinement.whole_log import stride_of
 from vftcli.robots.friction import HELD, dry_friction
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ClockError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resample_columns
+from vftcli.signals.wrench import ExternalTorque
 
 
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:

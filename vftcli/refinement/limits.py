@@ -16,8 +16,8 @@ from vftcli.refinement.band import with_band
 from vftcli.refinement.baseline import Baseline, FreeReading, free_reading
 from vftcli.robots.friction import ONE_STOP, dry_friction
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.wrench import ExternalTorque
 
 #: The cause that is not part of an error's sum: it says what a standing joint may hide.
 STICTION = "stiction at rest"

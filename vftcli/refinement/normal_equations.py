@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.refinement.model_error import column_numbers
-from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.least_squares import NormalEquations
 

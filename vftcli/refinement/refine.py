@@ -17,11 +17,11 @@ from vftcli.refinement.band import band_remarks, with_band
 from vftcli.refinement.baseline import Baseline, Baselines, free_reading
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.limits import Budget, budget, expected_gap, limits_remark
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.shown import Shown
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.signals.wrench import ExternalTorque
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

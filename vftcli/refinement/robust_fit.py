@@ -16,9 +16,9 @@ import numpy as np
 
 from vftcli.refinement.normal_equations import FittedError, Rows, solve
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
+from vftcli.signals.series import covered, runs_of
 
 CORRELATED = 0.3  #: Residuals so close in time are one. [s]
 LEAST_SCALE = 0.08  #: Least scale of the residual, by dry friction. [1]

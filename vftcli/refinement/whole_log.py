@@ -25,12 +25,12 @@ from vftcli.refinement.model_error import (
 from vftcli.refinement.normal_equations import Rows, slow_loads
 from vftcli.refinement.robust_fit import Guarded, WholeLogFit, faded, fit_robustly, guarded
 from vftcli.robots.run import Run
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.signals.terms import DynamicsTerms
 
 #: From its first to its last motion a log has to take this long: a shorter one tells inertia from a
 #: push no more, and friction alone is fitted. [s]

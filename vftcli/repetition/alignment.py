@@ -6,11 +6,10 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.intervals import covered, intervals
 from vftcli.signals.lag import lag_fit
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
-from vftcli.signals.series import resample_columns
+from vftcli.signals.series import covered, intervals, resample_columns
 
 LEAST_OVERLAP = 0.3  #: Least overlap, by the shorter log.
 #: A larger difference after alignment means another trajectory. [rad]

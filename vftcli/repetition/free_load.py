@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.drive import gain_sd
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.regressor import load_regressor, load_wrench
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Indices, handed_over, seal
 from vftcli.signals.errors import ClockError
 from vftcli.signals.filters import derivative, zero_phase

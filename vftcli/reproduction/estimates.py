@@ -24,11 +24,11 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.reproduction.control import deviation_chart
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Runs
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import fact
-from vftcli.signals.terms import DynamicsTerms
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.simulation import Simulation, load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice

@@ -4,16 +4,27 @@ Frame j has its origin *on* axis j, its z along the axis, and turns with link j,
 convention of the description was (standard DH, modified DH, xyz-rpy, URDF with any axis). Inertials
 are moved into these frames once, when a robot is loaded. The batched kernels, the kinematics and
 the Pinocchio model are all made from this one object.
+
+A robot file states its kinematics in one of three ways:
+
+- ``modified-dh``: T_j = Rx(α) Tx(a) Rz(q+θ) Tz(d); the table's frame j is the chain's frame j moved
+  along z by nothing (Tz commutes with Rz), so inertials stay where they are.
+- ``standard-dh``: T_j = Rz(q+θ) Tz(d) Tx(a) Rx(α); the table gives inertials in the *distal* frame
+  j, which sits at the far end of the link: they are moved by Tz(d) Tx(a) Rx(α).
+- ``xyz-rpy``: T_j = Trans(xyz) R(rpy) Rz(q), as in a URDF whose axes are all z.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_shape, seal
+from vftcli.signals.arrays import Array, check_series, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
+from vftcli.signals.parsing import check_kind
+from vftcli.signals.pose import IDENTITY, Pose, rotation_about, rpy_matrix
 from vftcli.signals.shown import Shown
 
 
@@ -188,3 +199,99 @@ def nearest_tensor(inertia: Array) -> Array:
     second: Array = (axes * np.maximum(moments, 0.0)) @ axes.T
     nearest: Array = np.trace(second) * np.eye(3) - second
     return nearest
+
+
+class Kinematics(NamedTuple):
+    """What a convention yields."""
+
+    placements: list[Pose]  #: Pose of chain frame j in chain frame j−1 at q = 0, one a joint.
+    #: Pose of the table's inertial frame in chain frame j, one a joint.
+    inertial_frames: list[Pose]
+    tip: Pose  #: Pose of the tip in chain frame n.
+
+
+DH = ("a", "d", "alpha", "theta")
+#: Convention → the keys that each joint must have: those of one number, and those of three.
+CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "standard-dh": (DH, ()),
+    "modified-dh": (DH, ()),
+    "xyz-rpy": ((), ("xyz", "rpy")),
+}
+
+
+def kinematics(
+    convention: str, joints: Sequence[Mapping[str, Any]], document: Mapping[str, Any]
+) -> Kinematics:
+    """Chain frames of a table; the tip is `flange_d` along z, then `ee_xyz` and `ee_rpy`."""
+    out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
+    turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
+    tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
+    placements, inertial_frames = [], [IDENTITY] * len(joints)
+    for k, joint in enumerate(joints):
+        if convention == "xyz-rpy":
+            placements.append(Pose(rpy_matrix(joint["rpy"]), np.asarray(joint["xyz"], dtype=float)))
+            continue
+        R, about = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
+        if convention == "modified-dh":
+            along = Pose(R, np.array([joint["a"], 0.0, 0.0]))
+            placements.append(along @ Pose(about, np.array([0.0, 0.0, joint["d"]])))
+        else:  # the table's frame is at the far end of its link
+            before = inertial_frames[k - 1] if k else IDENTITY
+            placements.append(before @ Pose(about, np.zeros(3)))
+            inertial_frames[k] = Pose(R, np.array([joint["a"], 0.0, joint["d"]]))
+    if convention == "standard-dh":
+        tip = inertial_frames[-1] @ tip
+    return Kinematics(placements, inertial_frames, tip)
+
+
+class LinkPoses(NamedTuple):
+    """Poses of the chain's frames in the base frame, the flange last."""
+
+    rotation: Array  #: Orientations. (T, n+1, 3, 3)
+    translation: Array  #: Origins. (T, n+1, 3) [m]
+
+
+def link_poses(chain: Chain, q: Array) -> LinkPoses:
+    """Poses of every joint's frame, and of the flange, in the base frame.
+
+    Args:
+        chain: The arm.
+        q: Joint positions. (T, n) [rad]
+
+    Raises:
+        ShapeError: If q is not one column a joint of the arm.
+    """
+    check_kind(chain, Chain, "the chain", "robot.chain")
+    check_series(q, chain.joints, "q", "the poses")
+    samples, n = np.shape(q)
+    rotation, translation = np.empty((samples, n + 1, 3, 3)), np.empty((samples, n + 1, 3))
+    R: Array = np.broadcast_to(np.eye(3), (samples, 3, 3))
+    o: Array = np.zeros((samples, 3))
+    cosine, sine = np.cos(q), np.sin(q)
+    for j in range(n):
+        o = o + R @ chain.translation[j]
+        R = R @ chain.rotation[j]
+        c, s = cosine[:, j, None], sine[:, j, None]
+        x, y = R[:, :, 0], R[:, :, 1]
+        R = np.stack([c * x + s * y, c * y - s * x, R[:, :, 2]], axis=2)
+        rotation[:, j], translation[:, j] = R, o
+    translation[:, n] = o + R @ chain.flange_translation
+    rotation[:, n] = R @ chain.flange_rotation
+    return LinkPoses(rotation, translation)
+
+
+def flange_jacobian(chain: Chain, q: Array) -> Array:
+    """Jacobian of the flange point in base axes (Pinocchio's LOCAL_WORLD_ALIGNED). (T, 6, n)
+
+    Its first three rows give the flange's velocity [m], the last three its angular velocity; its
+    transpose takes a force and moment ON the robot, in base axes at the flange point, to joint
+    torques.
+
+    Args:
+        chain: The arm.
+        q: Joint positions. (T, n) [rad]
+    """
+    poses = link_poses(chain, q)
+    axes = poses.rotation[:, :-1, :, 2]
+    arms = poses.translation[:, -1:, :] - poses.translation[:, :-1, :]
+    return np.concatenate([np.cross(axes, arms), axes], axis=2).transpose(0, 2, 1)

@@ -12,24 +12,28 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.arm import ArmSearch, shortened
-from vftcli.robots.bounds import TRAVEL, weightless
+from vftcli.robots.arm import BASE, ArmSearch, LumpedArm, shortened
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.lumping import BASE, LumpedArm
 from vftcli.robots.mjcf import mjcf_tree
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import DESCRIPTIONS, RobotFile, Section, robot_text
+from vftcli.robots.robot_file import (
+    DESCRIPTIONS,
+    TRAVEL,
+    RobotFile,
+    Section,
+    robot_text,
+    weightless,
+)
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
 from vftcli.robots.xml_text import NAMESPACE, urdf_of_xacro, xml_root
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.parsing import did_you_mean, shown
+from vftcli.signals.parsing import did_you_mean, is_finite, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.schema import is_finite
 
 #: First element of a description → who reads it.
 READERS: dict[str, Callable[[Path, ET.Element], BodyTree]] = {

@@ -4,11 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
-from vftcli.signals.intervals import runs_of
 from vftcli.signals.rest import REST, slower
-from vftcli.signals.series import gaps_of, median_step, resample_columns
-from vftcli.signals.terms import DynamicsTerms
+from vftcli.signals.series import gaps_of, median_step, resample_columns, runs_of
 
 #: What rounding changes at most, of a speed as a share or of a number of blocks, up to 1e6 s.
 TIE = 1e-6

@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.bounds import BOUNDS
+from vftcli.robots.robot_file import BOUNDS
 from vftcli.robots.tree import Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError

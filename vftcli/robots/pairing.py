@@ -10,7 +10,7 @@ import numpy as np
 from vftcli.readers.joints import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Where, fact
 

@@ -8,17 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.bounds import weightless
-from vftcli.robots.chain import Chain, Payload, symmetric, unphysical
-from vftcli.robots.conventions import CONVENTIONS, kinematics
+from vftcli.robots.chain import CONVENTIONS, Chain, Payload, kinematics, symmetric, unphysical
 from vftcli.robots.friction import PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section
+from vftcli.robots.robot_file import RobotFile, Section, weightless
 from vftcli.signals.arrays import Array
-from vftcli.signals.parsing import shown
-from vftcli.signals.pose import Pose, rpy_matrix
-from vftcli.signals.remarks import fact
-from vftcli.signals.schema import (
+from vftcli.signals.parsing import (
     NUMBER,
     PER_AXIS,
     PER_JOINT,
@@ -28,7 +23,10 @@ from vftcli.signals.schema import (
     TEXTS,
     ValueKind,
     several,
+    shown,
 )
+from vftcli.signals.pose import Pose, rpy_matrix
+from vftcli.signals.remarks import fact
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)

@@ -9,8 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import flange_jacobian, link_poses
+from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import cross, skew
 

@@ -6,18 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.drive import check_joints, drive_torque
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import dynamics_terms
+from vftcli.robots.terms import DynamicsTerms, check_joints, drive_torque, dynamics_terms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.filters import low_pass
-from vftcli.signals.isolated import without_isolated
 from vftcli.signals.recording import Recording
+from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step, white_noise
 from vftcli.signals.shown import Shown
-from vftcli.signals.terms import DynamicsTerms
 
 #: RunSamples from which on a recording's series do not stay in memory beside its results.
 LONG = 1 << 17

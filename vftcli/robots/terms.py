@@ -1,21 +1,185 @@
-"""The dynamics terms of a log, by a robot's model and its measured effort."""
+"""From what the drives measure to the dynamics terms: all an observer sees of robot and log."""
 
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import InitVar, dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.robots.drive import check_joints, drive_torque, uses_current
-from vftcli.robots.kernels import MomentumTerms, momentum_chunks
+from vftcli.robots.kernels import MomentumTerms, momentum_chunks, momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature
-from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.arrays import (
+    Array,
+    check_clock,
+    check_shape,
+    empty_series,
+    handed_over,
+    seal,
+)
+from vftcli.signals.errors import MissingSignalError, RobotError, ShapeError
 from vftcli.signals.packages import needed
-from vftcli.signals.recording import Recording
-from vftcli.signals.series import Clock
-from vftcli.signals.terms import DynamicsTerms, Instant
+from vftcli.signals.parsing import check_kind
+from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.series import Clock, clock_of
+from vftcli.signals.shown import Shown
 
+#: How well drive constants and torque sensors are known: a weighed 2.805 kg reads 2.88 kg through
+#: the constants of a UR10e's maker. [1]
+CONSTANT_SD, SENSOR_SD = 0.03, 0.01
 STEP = 1e-7  #: Δq of (10). [rad]
+
+
+class Instant(NamedTuple):
+    """The terms of one sample, from which those of the next block of a log go on."""
+
+    t: float  #: Time. [s]
+    p: Array  #: Generalised momentum. (n,) [kg·m²/s]
+    mu: Array  #: μ. (n,) [N·m]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DynamicsTerms(Shown):
+    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33)."""
+
+    t: Array  #: Time. (T,) [s]
+    p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
+    mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    #: The whole log's clock where these are a block of it; None for a whole log.
+    log_clock: Clock | None = None
+    #: The sample before the first, where these are a later block of a log.
+    before: Instant | None = None
+    room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
+    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model leaves
+    #: unexplained: the one input of every observer. Zero at a log's first sample. (T, n) [N·m·s]
+    d: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self, room: Array | None) -> None:
+        seal(self, "t", "p", "mu")
+        if self.p.ndim != 2:
+            raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
+        check_clock(self.t, "the dynamics terms")
+        check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
+        check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
+        d = momentum_change(self, empty_series(*self.p.shape) if room is None else room)
+        object.__setattr__(self, "d", handed_over(d))
+
+    @cached_property
+    def clock(self) -> Clock:
+        """How the log is sampled that these are the terms of."""
+        return clock_of(self.t) if self.log_clock is None else self.log_clock
+
+    @cached_property
+    def dt(self) -> Array:
+        """Time since the sample before: nominal at a log's first. (T, 1), (1, 1) if uniform [s]"""
+        if self.clock.uniform:
+            return np.array([[self.clock.step]])
+        first = self.t[0] - self.clock.step if self.before is None else self.before.t
+        return np.diff(self.t, prepend=first)[:, None]
+
+    @property
+    def last(self) -> Instant:
+        """The last sample, which is the one before the next block's first."""
+        return Instant(float(self.t[-1]), self.p[-1], self.mu[-1])
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.p.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.t)
+
+
+def momentum_change(terms: DynamicsTerms, out: Array) -> Array:
+    """Fill `out` with `DynamicsTerms.d`, joint by joint, so that the passes stay in the cache."""
+    half, before = 0.5 * terms.dt[:, 0], terms.before
+    explained = np.zeros(terms.samples)
+    for p, mu, d in zip(terms.p.T, terms.mu.T, out.T, strict=True):
+        np.subtract(p[1:], p[:-1], out=d[1:])
+        np.add(mu[1:], mu[:-1], out=explained[1:])
+        explained *= half
+        d[1:] -= explained[1:]
+    out[:1] = 0.0
+    if before is not None:
+        out[0] = terms.p[0] - before.p - half[0] * (terms.mu[0] + before.mu)
+    return out
+
+
+def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
+    """Series "p" or "mu" of each sample's predecessor; a log's first sample is its own. (T, n)"""
+    series: Array = getattr(terms, name)
+    first = series[:1] if terms.before is None else getattr(terms.before, name)[None]
+    return np.concatenate([first, series[:-1]])
+
+
+def check_joints(recording: Recording, robot: Robot) -> None:
+    """Raise a RobotError unless the log and the robot have the same number of joints."""
+    check_kind(recording, Recording, "the recording", "vftcli.read(LOG)")
+    check_kind(robot, Robot, "the robot", "vftcli.load_robot('ur5')")
+    if recording.joints != robot.joints:
+        raise RobotError(
+            f"{recording.name}: the log has {recording.joints} joints but robot {robot.name!r} has "
+            f"{robot.joints}; choose another with --robot (vftcli help robots lists them)"
+        )
+
+
+def uses_current(recording: Recording, robot: Robot) -> bool:
+    """Whether the drive torque comes from motor current rather than from a torque signal."""
+    if robot.torque_source == "current":
+        return recording.current is not None or not has_torque(recording)
+    return not has_torque(recording) and recording.current is not None
+
+
+def effort_name(recording: Recording, robot: Robot) -> str:
+    """The signal that the drive torque comes from, one of `vftcli.signals.recording.EFFORTS`."""
+    if uses_current(recording, robot):
+        return "current"
+    return "torque" if recording.torque is not None else "torque_without_gravity"
+
+
+def gain_sd(recording: Recording, robot: Robot) -> float:
+    """How well a log's torques are known as a whole: a standard deviation over the value. [1]"""
+    return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
+
+
+def has_torque(recording: Recording) -> bool:
+    """Whether the log has a torque signal, with gravity in it or without."""
+    return recording.torque is not None or recording.torque_without_gravity is not None
+
+
+def drive_torque(recording: Recording, robot: Robot) -> Array:
+    """Torque of the drives at the joints, friction not yet taken off. (T, n) [N·m]
+
+    τ = K i where the robot's torque source is current, else the measured torque. A robot described
+    by currents whose log has only torques uses the torques, and the other way round if its file
+    has torque constants. Torques without gravity get the gravity torque g(q) of the arm with its
+    payload: τ = e + g(q).
+    """
+    check_joints(recording, robot)
+    if all(getattr(recording, name) is None for name in EFFORTS):
+        raise MissingSignalError(
+            f"{recording.name}: the log has no joint torques and no motor currents, and "
+            f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
+            "them, or name their columns with --columns"
+        )
+    name = effort_name(recording, robot)
+    if name == "torque_without_gravity" and recording.torque_without_gravity is not None:
+        still = np.zeros_like(recording.q)
+        gravity = momentum_terms(robot.loaded_chain, recording.q, still).gravity
+        return np.asarray(recording.torque_without_gravity + gravity)
+    if name != "current":
+        return recording.require("torque")
+    current = recording.require("current")
+    if robot.torque_constant is None:
+        raise MissingSignalError(
+            f"{recording.name}: the log has motor currents but robot {robot.name!r} has no "
+            "torque_constant; give one per joint in its TOML file, or record torques"
+        )
+    return current * robot.torque_constant
 
 
 class RunningTerms:

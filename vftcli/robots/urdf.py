@@ -7,9 +7,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.bounds import BOUNDS
 from vftcli.robots.chain import symmetric
 from vftcli.robots.profile import UPRIGHT
+from vftcli.robots.robot_file import BOUNDS
 from vftcli.robots.tree import MOST, Body, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError

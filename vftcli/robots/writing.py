@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, Payload
-from vftcli.robots.conventions import CONVENTIONS, kinematics
+from vftcli.robots.chain import CONVENTIONS, Chain, Payload, kinematics
 from vftcli.robots.profile import SCHEMA
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError

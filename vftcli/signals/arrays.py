@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vftcli.signals.errors import ClockError, ShapeError
+from vftcli.signals.errors import ClockError, ParameterError, ShapeError
 
 #: A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``.
 Array = NDArray[np.float64]
@@ -178,3 +178,13 @@ def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
         return True  # wherever between them the median is
     usual = median(steps)
     return bool(max(most - usual, usual - least) <= tolerance * usual)
+
+
+def spread(value: Any, count: int, each: str, what: str) -> Array:  # noqa: ANN401 - TOML's
+    """One number each from one number or a list with one for each. (count,)"""
+    array = np.atleast_1d(np.asarray(value, dtype=np.float64))
+    if array.shape not in {(1,), (count,)}:
+        raise ParameterError(
+            f"{what} has {array.size} values; give one, or one for each of {count} {each}"
+        )
+    return np.array(np.broadcast_to(array, (count,)))

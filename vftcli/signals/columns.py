@@ -7,8 +7,8 @@ beside each column: ``pyarrow.parquet.read_schema(path).field("tau_ext/gmo/1").m
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vftcli.signals.names import MEANINGS
 from vftcli.signals.packages import installed, needed
+from vftcli.signals.recording import MEANINGS
 from vftcli.signals.wrench import AXES, unit_of
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ In every function t is a clock (T,) [s], and dq are joint velocities (T, n) [rad
 import numpy as np
 
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import grown, runs_of
-from vftcli.signals.series import median_step
+from vftcli.signals.series import grown, median_step, runs_of
 
 #: Speeds between rest and motion, by what each decides. Above the first, more than noise and last
 #: digits, a joint has a direction, and a log's motion begins. [rad/s]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.signals.arrays import Array
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
     import polars as pl

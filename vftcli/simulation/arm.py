@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.robots import Payload, Robot, load_robot
-from vftcli.robots.bounds import out_of_bounds
 from vftcli.robots.chain import Chain
 from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
 from vftcli.robots.robot import REFERENCE
+from vftcli.robots.robot_file import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.contacts import Touching

@@ -9,9 +9,8 @@ import numpy as np
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
-from vftcli.signals.source import Source
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.contacts import joint_jacobian

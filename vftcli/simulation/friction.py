@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from vftcli.robots import JointFriction, Robot
-from vftcli.robots.bounds import out_of_bounds
+from vftcli.robots.robot_file import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation.scenario import FrictionSpec

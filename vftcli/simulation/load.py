@@ -9,8 +9,18 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, toml_tables
-from vftcli.signals.schema import LIST, SWITCH, TABLE, TEXT, WHOLE, ValueKind, is_finite
+from vftcli.signals.parsing import (
+    LIST,
+    SWITCH,
+    TABLE,
+    TEXT,
+    WHOLE,
+    ValueKind,
+    assignment,
+    check_known,
+    is_finite,
+    toml_tables,
+)
 from vftcli.simulation.scenario import Scenario
 
 FOLDER = Path(__file__).parent / "scenarios"

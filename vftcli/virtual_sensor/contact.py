@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.intervals import intervals, runs_of
+from vftcli.signals.series import intervals, runs_of
 
 #: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
 LEAVE = 0.6

@@ -10,7 +10,7 @@ from vftcli.observers.observer import Observer
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.contact import (
     GAP,
     ContactInterval,

@@ -11,13 +11,12 @@ from vftcli.observers.observer import Observer
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.series import resample_columns
-from vftcli.signals.terms import DynamicsTerms
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.sensor import find_mounting
 from vftcli.virtual_sensor.sensor_reading import SensorReading, contact_elsewhere

@@ -7,10 +7,10 @@ import numpy as np
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import UNSTATED

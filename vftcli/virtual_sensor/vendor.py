@@ -5,8 +5,7 @@ from itertools import permutations
 
 import numpy as np
 
-from vftcli.robots.chain import Chain
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import Chain, link_poses
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.lag import Offset, time_offset
 from vftcli.signals.recording import Recording

@@ -8,10 +8,10 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, Where, fact, warning
+from vftcli.signals.series import covered, runs_of
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import ZeroChoice
 

@@ -7,8 +7,7 @@ from vftcli.identification import Task, identify
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
-from vftcli.signals.recording import Recording
-from vftcli.signals.source import Source
+from vftcli.signals.recording import Recording, Source
 
 
 @pytest.fixture(scope="session")

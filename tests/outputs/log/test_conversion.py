@@ -9,9 +9,7 @@ import pytest
 from vftcli.outputs.log.conversion import WRITERS, convert
 from vftcli.readers import read
 from vftcli.signals.errors import OutputError
-from vftcli.signals.names import JOINT_SIGNALS
-from vftcli.signals.recording import Recording
-from vftcli.signals.source import Source
+from vftcli.signals.recording import JOINT_SIGNALS, Recording, Source
 from vftcli.signals.wrench import WrenchFrame
 
 NANOSECOND = 1e-9

@@ -11,9 +11,8 @@ from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.log import mcap_output
 from vftcli.outputs.log.mcap_output import frame_id, ros_name, stamps_of, write_mcap
 from vftcli.outputs.log.run_record import jsonable
-from vftcli.robots.drive import drive_torque
-from vftcli.signals.recording import Recording
-from vftcli.signals.source import Source
+from vftcli.robots.terms import drive_torque
+from vftcli.signals.recording import Recording, Source
 
 
 @pytest.fixture(scope="module")

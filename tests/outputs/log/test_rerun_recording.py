@@ -20,8 +20,8 @@ from vftcli.outputs.log.rerun_recording import (
 )
 from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.kinematics import flange_jacobian, link_poses
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.frames import frame_pose

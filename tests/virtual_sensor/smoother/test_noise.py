@@ -11,8 +11,8 @@ from vftcli.robots import load_robot
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.run import RunSamples
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
-from vftcli.signals.terms import DynamicsTerms
 from vftcli.virtual_sensor.smoother.noise import (
     ASSUMED_SHARE,
     UNSEEN_SHARE,

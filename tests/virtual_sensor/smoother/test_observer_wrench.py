@@ -11,8 +11,8 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Runs, RunSamples
 from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice

@@ -10,13 +10,13 @@ from made_runs import run_of
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import Blocks
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
-from vftcli.signals.terms import DynamicsTerms
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 from vftcli.virtual_sensor.smoother.prior import WrenchPrior

@@ -10,7 +10,7 @@ from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.outputs.files import OutputFolder
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:

@@ -20,9 +20,8 @@ from vftcli.outputs.rerun_arm import ArmPoses, PaintedSpan, Stream, send_force
 from vftcli.outputs.rerun_file import BAR, CONTACTS, EDGES, LogLine
 from vftcli.robots.chain import Chain
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import COVERS
 from vftcli.signals.remarks import sentence
-from vftcli.signals.wrench import Wrench
+from vftcli.signals.wrench import COVERS, Wrench
 
 BELOW = 0.06  #: The spans of the contacts lie below zero by this share of the largest force.
 #: The band of |F|: the colour of `best`, paler.

@@ -16,8 +16,7 @@ from vftcli.outputs.log.mcap_output import (
 )
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
-from vftcli.signals.names import COLUMN_NAMES, JOINT_SIGNALS
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:

@@ -30,7 +30,7 @@ from vftcli.readers.bags.ros_messages import (
     serialised,
     stamped,
 )
-from vftcli.robots.drive import drive_torque
+from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench

@@ -44,10 +44,10 @@ from vftcli.outputs.rerun_arm import (
     send_force,
 )
 from vftcli.outputs.rerun_file import EDGES, Tab, rerun_file, thinned
-from vftcli.robots.drive import drive_torque
+from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.progress import steps
+from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 

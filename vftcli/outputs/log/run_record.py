@@ -20,7 +20,7 @@ from vftcli.outputs.examination import health_record, rate_of
 from vftcli.outputs.files import OutputFolder
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
-from vftcli.signals.letters import whole
+from vftcli.signals.parsing import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
 from vftcli.signals.version import VERSION

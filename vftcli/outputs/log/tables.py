@@ -31,7 +31,7 @@ from vftcli.outputs.log.rmse_tables import (
     rmse_grid,
 )
 from vftcli.outputs.quantity import significant
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -13,7 +13,7 @@ import numpy as np
 from vftcli.outputs.decimation import decimated
 from vftcli.outputs.palette import colours_of_names
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import ExternalTorque
 
 #: Bytes that the large charts of a page may take; a long log's may take more, up to this factor.
 ROOM, LONG = 350_000, 4.0

@@ -10,11 +10,10 @@ from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.page.svg import Box, Scales, Span, path_of, ribbon, thinned
 from vftcli.outputs.quantity import banded
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import VftError
-from vftcli.signals.intervals import runs_of
-from vftcli.signals.series import resample_columns
+from vftcli.signals.series import resample_columns, runs_of
 
 #: The chart for a screen, and for a telephone with larger letters; stretches of the line in
 #: each.

@@ -18,8 +18,7 @@ from vftcli.outputs.page.charts import (
     observer_lines,
 )
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.external_torque import COVERS
-from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.signals.wrench import AXES, COVERS, Wrench, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
 #: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest

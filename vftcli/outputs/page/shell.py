@@ -16,7 +16,7 @@ from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.page import svg
 from vftcli.outputs.page.charts import QUIET, Chart, LineStyle, packed_charts
 from vftcli.outputs.quantity import at_least_shown, counted, ranged
-from vftcli.signals.letters import printable
+from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, explanation
 
 if TYPE_CHECKING:

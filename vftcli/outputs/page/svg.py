@@ -10,7 +10,7 @@ from vftcli.outputs.decimation import decimated
 from vftcli.outputs.page.charts import Chart, ChartLine
 from vftcli.outputs.quantity import minus
 from vftcli.signals.arrays import Array
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import runs_of
 
 STEPS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
 ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.

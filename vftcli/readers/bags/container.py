@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vftcli.readers.opening import check_unpacked, natural
 from vftcli.readers.reader import LogFile
-from vftcli.signals import letters
+from vftcli.signals import parsing
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, caution, fact, warning
 
@@ -179,7 +179,7 @@ def storage_files(file: LogFile) -> list[str]:
 
 def printable(name: str) -> str:
     """A name of a bag for messages: one line, no control characters, not too long."""
-    return letters.printable(name[:120])
+    return parsing.printable(name[:120])
 
 
 def type_name(name: str) -> str:

@@ -15,7 +15,7 @@ from vftcli.readers.joints import effort_of, robot_of
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.signals.arrays import Array, pieces, release
 from vftcli.signals.errors import LogError
-from vftcli.signals.names import EFFORTS
+from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame

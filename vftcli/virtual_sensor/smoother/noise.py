@@ -21,8 +21,8 @@ from vftcli.robots.friction import PUSHED_SHARE, REST_SHARE, dry_torques
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array, Mask, median
-from vftcli.signals.intervals import grown, runs_of
 from vftcli.signals.rest import NEAR_REST
+from vftcli.signals.series import grown, runs_of
 from vftcli.virtual_sensor.solvers import TORQUE_SD
 
 REST_TIME = 2.0  #: Stiction keeps its state at least this long. [s]

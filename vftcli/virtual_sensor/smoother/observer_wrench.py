@@ -8,7 +8,7 @@ import numpy as np
 
 from vftcli.repetition.free_load import FreeLoad, without_load
 from vftcli.repetition.free_motion import FreeMotion
-from vftcli.robots.kinematics import link_poses
+from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError

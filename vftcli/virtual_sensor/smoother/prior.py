@@ -7,8 +7,8 @@ import numpy as np
 
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood
+from vftcli.signals.series import covered, runs_of
 from vftcli.virtual_sensor.smoother.noise import TorqueNoise, steps
 
 LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.repetition.free_load import FreeLoad
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
-from vftcli.robots.kinematics import flange_jacobian
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
