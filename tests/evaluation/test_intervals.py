@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from scipy.special import stdtrit
 
 from vftcli.evaluation import evaluate, paired_significance
 from vftcli.evaluation.intervals import (
@@ -14,6 +15,7 @@ from vftcli.evaluation.intervals import (
     correlation_time,
     interval,
     resample,
+    student_quantile,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.wrench import ExternalTorque
@@ -198,3 +200,10 @@ def test_a_correlation_time_by_blocks_is_that_of_the_whole(memory: float, count:
         expected.append(max(1.0, 2.0 * float(np.sum(rho[:end])) - 1.0))
     # rounding of two ways of summing up to 10 000 correlations
     np.testing.assert_allclose(correlation_time(x), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 9, 30, 299])
+@pytest.mark.parametrize("p", [0.6, 0.9, 0.975, 0.995])
+def test_students_quantile_is_scipys(p: float, freedom: int) -> None:
+    # 1e-10: Newton's steps end at the rounding of the quadrature, 1e-12 here.
+    assert student_quantile(p, freedom) == pytest.approx(stdtrit(freedom, p), rel=1e-10)

@@ -211,7 +211,7 @@ def rest_of(model: Array, effort: Array) -> Array:
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), dtype=bool)
     for _ in range(2):
-        solution = np.linalg.lstsq(columns[keep], effort[keep], rcond=1e-8)[0]
+        solution = np.linalg.pinv(columns[keep], rcond=1e-8) @ effort[keep]
         rest = (effort - columns @ solution) ** 2
         # Contact fits no lag; a sample that fits one lag shows it.
         least = rest.min(axis=1)
