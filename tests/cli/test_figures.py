@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
-from vftcli.outputs.seals import digests
+from vftcli.outputs.files import digests
 
 pytestmark = pytest.mark.slow
 

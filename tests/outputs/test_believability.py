@@ -10,12 +10,14 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import RobotMatch
-from vftcli.outputs.answer import headline, load_doubt, otherwise
+from vftcli.outputs.answer import otherwise
 from vftcli.outputs.believability import (
     Ground,
     grounds,
+    headline,
     health,
     joint_words,
+    load_doubt,
     resting,
 )
 from vftcli.outputs.screen import facts

@@ -7,8 +7,8 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
-from vftcli.outputs.canvas import Canvas
-from vftcli.outputs.force_bars import (
+from vftcli.outputs.canvas import (
+    Canvas,
     column_peaks,
     contact_numbers,
     force_bars,

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.remedies import (
+from vftcli.outputs.believability import (
     SUBJECTS,
     command,
     is_profile,

@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 from rerun_rows import rows_of
 
-from vftcli.outputs.palette import rgb
 from vftcli.outputs.rerun_arm import (
     LINK,
     LONGEST,
     MOST_POSES,
-    PaintedSpan,
-    arm_length,
     arrow_scale,
     capsules,
     motion,
+    rgba,
     send_arm,
     send_force,
 )
@@ -59,24 +57,21 @@ def test_the_hardest_force_fits(hardest: float, scale: float) -> None:
 
 def test_a_link_is_painted_while_it_is_touched(tmp_path: Path) -> None:
     """Its own colour, then that of the span, then its own again; other links keep theirs."""
-    painted = {2: [PaintedSpan(1.0, 2.0, "#dd6415")]}
+    painted = {2: [(1.0, 2.0, "#dd6415")]}
     with rerun_file(tmp_path / "r.rrd", "r", TABS, {"Summary": ""}, POSES, "Arm") as stream:
         send_arm(stream, UR5, POSES, painted)
 
     def colours(link: int) -> list[list[int]]:
         return rows_of(tmp_path / "r.rrd", f"/robot/link_{link}", "Capsules3D:colors")
 
-    def word(colour: str) -> int:
-        red, green, blue = rgb(colour)
-        return (red << 24) | (green << 16) | (blue << 8) | 255
-
     found = [row for row in colours(2) if row is not None]
     assert len(found) == 3
-    assert set(found[1]) == {word("#dd6415")}
+    assert set(found[1]) == {rgba("#dd6415")[0]}
     assert found[0] == found[2]
-    assert word(LINK) in found[0]
+    assert list(rgba("#0c9fff", "#9cf00a")) == [0x0C9FFFFF, 0x9CF00AFF]
+    assert rgba(LINK)[0] in found[0]
     (still,) = [row for row in colours(3) if row is not None]
-    assert word("#dd6415") not in still
+    assert rgba("#dd6415")[0] not in still
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -84,12 +79,13 @@ def test_capsules_join_the_joints(name: str) -> None:
     """In every link the capsule ends where the next frame begins, if they are apart at all."""
     chain = load_robot(name).chain
     offsets = np.vstack([chain.translation, chain.flange_translation])
+    length = np.linalg.norm(offsets, axis=1).sum()
     for shapes, offset in zip(capsules(chain), offsets, strict=True):
         for shape in shapes:
             if not shape.joint:
                 np.testing.assert_array_equal(shape.start + shape.direction, offset)
         links = [shape for shape in shapes if not shape.joint]
-        assert bool(links) == (np.linalg.norm(offset) > 0.02 * arm_length(chain))
+        assert bool(links) == (np.linalg.norm(offset) > 0.02 * length)
 
 
 def test_motion_follows_the_log_at_its_rate() -> None:

@@ -8,7 +8,7 @@ import pytest
 import rerun.chunk
 from rerun_rows import rows_of
 
-from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import (
     LogLine,
@@ -108,7 +108,7 @@ FULL = """
 import resource, sys
 from pathlib import Path
 import numpy as np
-from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.rerun_arm import ArmPoses
 from vftcli.outputs.rerun_file import Tab, rerun_file
 from vftcli.signals.errors import OutputError

@@ -6,9 +6,8 @@ from pathlib import Path
 import pytest
 from contact_rows import contact, contact_list
 
-from vftcli.outputs.contacts import contacts_record
+from vftcli.outputs.contacts import contacts_record, stored_list, stored_record
 from vftcli.outputs.log.run_record import to_json
-from vftcli.outputs.stored_contacts import stored_list, stored_record
 from vftcli.signals.errors import LogError
 
 

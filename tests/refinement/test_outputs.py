@@ -12,8 +12,12 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.estimates import estimates_table
 from vftcli.outputs.log.rerun_recording import plot_groups
 from vftcli.outputs.log.run_record import run_record, to_json
-from vftcli.outputs.page.charts import observer_lines
-from vftcli.outputs.page.log_charts import spectra_chart, torque_chart, tuning_chart
+from vftcli.outputs.page.log_charts import (
+    observer_styles,
+    spectra_chart,
+    torque_chart,
+    tuning_chart,
+)
 from vftcli.outputs.page.pages import render
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
@@ -38,7 +42,7 @@ def test_the_page_draws_ribbons_the_curve_and_the_spectra(worked_up: Analysis) -
     np.testing.assert_array_equal(halves["rts-auto"], 1.96 * band)
     found = worked_up.refinement
     assert found is not None
-    curve = tuning_chart(found.curves, observer_lines(worked_up.estimates))
+    curve = tuning_chart(found.curves, observer_styles(worked_up))
     assert [s.name for s in curve.series] == ["kfo-auto", "rts-auto"]
     assert found.baselines.plain.spectra is not None
     assert len(spectra_chart(found.baselines.plain.spectra).series) == 2

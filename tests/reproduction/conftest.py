@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.reproduction import jobs, paper
 from vftcli.reproduction.paper import (
     AS_PRINTED,

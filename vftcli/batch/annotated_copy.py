@@ -33,9 +33,8 @@ from vftcli.batch.datasets.copying import (
 from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.statistics import statistics_of
 from vftcli.batch.outcome import Outcome, begin
-from vftcli.outputs.files import put_text
+from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.log.run_record import to_json, versions
-from vftcli.outputs.seals import digest
 from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.

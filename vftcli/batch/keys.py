@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from vftcli.outputs.seals import digest
+from vftcli.outputs.files import digest
 from vftcli.readers.opening import files_of
 from vftcli.signals.version import VERSION
 

@@ -74,9 +74,8 @@ def list_contacts(
 def print_stored(estimates: Path, form: ListOptions) -> None:
     """Print the list that the folder of an ``estimates.parquet`` holds."""
     from vftcli.cli.console import canvas, say_json
-    from vftcli.outputs.contacts import contacts_csv
+    from vftcli.outputs.contacts import contacts_csv, stored_list, stored_record
     from vftcli.outputs.screen import list_screen
-    from vftcli.outputs.stored_contacts import stored_list, stored_record
 
     record = stored_record(estimates)
     if form.json:

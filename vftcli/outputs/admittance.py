@@ -24,17 +24,15 @@ from vftcli.outputs.admittance_tables import (
     parameter_grid,
     stability_grid,
 )
+from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
-from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.grid import Grid, json_rows
 from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
-from vftcli.outputs.page.charts import DASHES, Chart, ChartLine
 from vftcli.outputs.page.shell import page
-from vftcli.outputs.palette import SPARE
 from vftcli.outputs.quantity import counted
-from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import sentence
@@ -231,22 +229,22 @@ def painted(replay: Replay) -> list[tuple[Controller, str]]:
 
 def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
     """The charts, top to bottom; one panel an axis, three axes on one scale."""
-    p, dashes = replay.parameters, ("", *DASHES)
+    p = replay.parameters
 
     def lines(values: Array) -> tuple[ChartLine, ...]:
         """One line a controller, each with its own dashes. (T+1, N, 6)"""
         return tuple(
-            ChartLine(controller.name, values[:, n], colour, dashes[n % len(dashes)])
+            ChartLine(controller.name, values[:, n], colour, DASHES[n % len(DASHES)])
             for n, (controller, colour) in enumerate(painted(replay))
         )
 
     deviation = lines(replay.motion.x)
     force = [
-        ChartLine("force", padded(replay.wrench), "#8a929a", "1.5 2"),
+        ChartLine("force", padded(replay.wrench), GREY, "1.5 2"),
         ChartLine("force that enters the law", padded(replay.phases.force), SPARE[1]),
     ]
     if run is not None:
-        deviation += (ChartLine("closed loop", padded(run.moved), "#8a929a", "5 3"),)
+        deviation += (ChartLine("closed loop", padded(run.moved), GREY, "5 3"),)
         force.insert(0, ChartLine("true force", padded(run.truth), dash="2 2"))
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
     w, v = replay.lyapunov.corrected, replay.lyapunov.printed

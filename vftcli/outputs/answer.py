@@ -2,34 +2,13 @@
 
 import numpy as np
 
-from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import SURE_NATS, TIGHT, Contact, ContactList
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, ranged
-from vftcli.outputs.remedies import LOADS
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import sentence
 
 PART = 0.35  #: An axis that holds more than this share of a force is named in its direction.
 AXIS_WORDS = ("−x", "+x"), ("−y", "+y"), ("down", "up")  #: An axis' two directions, base axes.
-
-
-def headline(analysis: Analysis) -> str:
-    """The answer in one sentence."""
-    if analysis.contacts is not None:
-        return f"{answer(analysis.contacts)} {load_doubt(analysis)}".rstrip()
-    names = ", ".join(estimate.name for estimate in analysis.estimates)
-    return f"External torque of {analysis.robot.joints} joints by {names}; no contacts are listed."
-
-
-def load_doubt(analysis: Analysis) -> str:
-    """A sentence on rows that may be a found load's weight; else ""."""
-    contacts = analysis.contacts.contacts if analysis.contacts is not None else ()
-    found = {f.code for one in analysis.examinations[:1] for f in one.warnings}
-    if analysis.contacts is not None and analysis.contacts.load is not None:
-        return ""
-    if not contacts or any(c.is_load for c in contacts) or not found & LOADS:
-        return ""
-    return "But the arm carries an unknown load: they may be its weight."
 
 
 def otherwise(found: ContactList) -> str:
@@ -49,11 +28,11 @@ def otherwise(found: ContactList) -> str:
         return (
             f"Pushes below {at_least_shown(least)} do not show.{more if found.candidates else ''}"
         )
-    rest = "Nothing else" if found.contacts else "Nothing"
+    rest = f"{'Nothing else' if found.contacts else 'Nothing'} above {at_least_shown(least)}"
     if any(c.peak_force is not None and c.peak_force < least for c in found.contacts):
         # Along the axes that are felt best less shows than along all.
-        return f"{rest} above {at_least_shown(least)} (less at good poses)."
-    return f"{rest} above {at_least_shown(least)}. Weaker pushes would not show."
+        return f"{rest} (less at good poses)."
+    return f"{rest}. Weaker pushes would not show."
 
 
 def answer(found: ContactList) -> str:
@@ -184,7 +163,7 @@ def reason(contact: Contact) -> str:
 
 def free_words(found: ContactList) -> str:
     """Known free motion in words; "" without any."""
-    return "; ".join(sentence(remark) for remark in found.free)
+    return "; ".join(map(sentence, found.free))
 
 
 def beginning(contact: Contact) -> str:

@@ -10,10 +10,17 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vftcli.outputs.files import atomic, check_letters, put_text, table_file, unwritable
+from vftcli.outputs.files import (
+    SEAL,
+    atomic,
+    check_letters,
+    digest,
+    put_text,
+    table_file,
+    unwritable,
+)
 from vftcli.outputs.log.run_record import to_json
 from vftcli.outputs.partial import check_writable, held
-from vftcli.outputs.seals import SEAL, digest
 from vftcli.signals.errors import OutputError
 
 if TYPE_CHECKING:

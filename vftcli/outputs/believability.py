@@ -16,23 +16,50 @@ from vftcli.doctor.examination import REFUSING
 from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
-from vftcli.outputs.answer import free_words, hardest_words
+from vftcli.outputs.answer import answer, free_words, hardest_words
 from vftcli.outputs.quantity import DASH, counted, percent
-from vftcli.outputs.remedies import (
-    LOADS,
-    command,
-    is_profile,
-    path_of,
-    payload_command,
-    remedy_of,
-    robot_option,
-    subject_of,
-)
+from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.arrays import Mask
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import sentence
+from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.rest import slower
+
+#: Subject → the findings that are about it; any other is about the drives' effort.
+SUBJECTS = {
+    "load": ("unmodelled-load", "light-load", "payload-mismatch", "payload-mismatch-untold",
+             "payload-not-mounted", "payload-differs", "load-changes"),
+    "robot": ("other-robot", "no-robot-fits", "no-robot-fits-any", "no-robot-fits-at-rest",
+              "no-profile"),
+    "clock": ("time-unit", "clock-rate", "slow-rate", "gaps", "repeated-stamps", "clock-gaps",
+              "clock-gap", "repeats-differ", "absurd-clock", "absurd-steps"),
+    "base": ("upside-down", "tilted-base"),
+    "positions": ("degrees", "stuck-position", "coarse-positions", "absurd-values"),
+    "velocity": ("no-velocity", "velocity-unit", "velocity-mismatch", "velocity-sign",
+                 "velocity-order", "velocity-lag", "velocity-filtered", "velocity-held",
+                 "velocity-of-another-kind", "stuck-velocity", "zero-dq"),
+    "temperature": ("far-temperature", "far-temperature-assumed", "temperature-beyond-law",
+                    "no-temperature", "temperature-gaps"),
+    "wrench": ("zero-wrench", "zero-wrench-beside-tau-ext", "contact-elsewhere",
+               "zero-far-from-start", "zero-swings"),
+    "vendor's torque": ("vendor-sign", "zero-tau-ext"),
+}  # fmt: skip
+#: Findings that ``identify --method payload`` answers.
+LOADS = frozenset(SUBJECTS["load"]) - {"payload-not-mounted", "load-changes"} | {"contact-is-load"}
+
+
+#: What the remarks of a list of contacts are about.
+LIST_SUBJECTS = {
+    "contact-is-load": "load",
+    "arm-stopped-abruptly": "stop",
+    "free-part-rests": "free motion",
+    "free-part-misses-joints": "free motion",
+    "no-wrench-of-few-joints": "wrench",
+}
+#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
+#: the effort is another.
+MOST_UNEXPLAINED = 0.5
+FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
 
 #: How far an item lets the answer be believed.
 Standing = Literal["good", "caution", "bad", "unknown"]
@@ -80,6 +107,27 @@ class LogSummary(NamedTuple):
         return SEVERITY.index(self.standing), -self.force
 
 
+def headline(analysis: Analysis) -> str:
+    """The answer in one sentence."""
+    if analysis.contacts is not None:
+        return f"{answer(analysis.contacts)} {load_doubt(analysis)}".rstrip()
+    names = ", ".join(estimate.name for estimate in analysis.estimates)
+    return f"External torque of {analysis.robot.joints} joints by {names}; no contacts are listed."
+
+
+def load_doubt(analysis: Analysis) -> str:
+    """A sentence on rows that may be a found load's weight; else ""."""
+    found, codes = (
+        analysis.contacts,
+        {f.code for e in analysis.examinations[:1] for f in e.warnings},
+    )
+    if found is None or not found.contacts or found.load is not None or not codes & LOADS:
+        return ""
+    if any(contact.is_load for contact in found.contacts):
+        return ""
+    return "But the arm carries an unknown load: they may be its weight."
+
+
 def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:
     """One log's line, by its grounds; page and error are left to whoever shows them."""
     listed, recording, worst = analysis.contacts, analysis.recording, health(found)
@@ -123,11 +171,6 @@ def grounds(analysis: Analysis) -> tuple[Ground, ...]:
 def health(found: Sequence[Ground]) -> Ground:
     """The worst of what was found in a log itself, the first of several equally bad."""
     return min((g for g in found if g.of_log), key=lambda ground: SEVERITY.index(ground.standing))
-
-
-#: Share of a log's torques beyond which what the model leaves is no contact's: the arm, a sign or
-#: the effort is another.
-MOST_UNEXPLAINED = 0.5
 
 
 def robot_ground(analysis: Analysis) -> Ground:
@@ -223,16 +266,6 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
         )
 
 
-#: What the remarks of a list are about.
-LIST_SUBJECTS = {
-    "contact-is-load": "load",
-    "arm-stopped-abruptly": "stop",
-    "free-part-rests": "free motion",
-    "free-part-misses-joints": "free motion",
-    "no-wrench-of-few-joints": "wrench",
-}
-
-
 def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
     """Joints at rest, the friction model's source and its temperature."""
     robot, rests = analysis.robot, resting(analysis.recording)
@@ -256,9 +289,6 @@ def friction_grounds(analysis: Analysis) -> Iterator[Ground]:
     for examination in analysis.examinations[:1]:
         for finding in examination.assumptions:
             yield Ground("caution", "temperature", sentence(finding), of_log=False)
-
-
-FULL_OF_REST = 0.5  #: A joint that rests in more than this share of the log is said to rest.
 
 
 def resting(recording: Recording) -> Mask:
@@ -306,3 +336,51 @@ def reference_ground(analysis: Analysis) -> Ground:
             options = ("--reference", kind, "--robot", robot_option(analysis))
             remedy = command("compare", analysis.recording, *options)
     return Ground(standing, subject, words, remedy, of_log=False)
+
+
+def subject_of(code: str) -> str:
+    """Subject of a finding, in a word or two."""
+    return next((subject for subject, codes in SUBJECTS.items() if code in codes), "effort")
+
+
+def remedy_of(finding: Remark, log: Recording, analysis: Analysis) -> str:
+    """The command that mends what a finding tells, else the one that says more about it."""
+    robot = robot_option(analysis)
+    if finding.code in LOADS:
+        return payload_command(analysis)
+    if finding.code == "payload-not-mounted":
+        return command("contacts", log, "--robot", robot, "--payload", "log")
+    if finding.code == "other-robot":
+        return command("contacts", log, "--robot", str(finding.values["robot"]))
+    if finding.code.startswith("no-robot-fits"):
+        return f"vftcli identify free.csv --robot {robot} --method base -o my_robot.toml"
+    return command("inspect", log, "--robot", robot)
+
+
+def payload_command(analysis: Analysis) -> str:
+    """The command that finds what hangs on the flange."""
+    runs = [run.recording for run in analysis.motion.runs]
+    free = ["--free", path_of(runs[0])] if runs else []
+    found = ("--method", "payload", "--robot", robot_option(analysis), "-o", "loaded.toml")
+    return command("identify", analysis.recording, *free, *found)
+
+
+def command(name: str, log: Recording, *words: str) -> str:
+    """A command on a log, as it is typed."""
+    return shlex.join(["vftcli", name, path_of(log), *words])
+
+
+def path_of(log: Recording) -> str:
+    """A log's path as it was given, a stand-in for one made in memory."""
+    return str(log.source.path or "LOG")
+
+
+def robot_option(analysis: Analysis) -> str:
+    """Value of ``--robot`` for an analysis' arm: profile name, or file."""
+    robot = analysis.robot
+    return robot.name if is_profile(analysis) or robot.path is None else str(robot.path)
+
+
+def is_profile(analysis: Analysis) -> bool:
+    """Whether the arm is a built-in profile."""
+    return analysis.robot.path in PROFILES.values()

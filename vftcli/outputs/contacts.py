@@ -1,16 +1,50 @@
-"""The list of contacts as JSON, CSV and a table."""
+"""The list of contacts as JSON, CSV and a table; read again from a folder of estimates."""
 
-from collections.abc import Sequence
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
-from vftcli.contacts.contact_list import FIRST_COLUMNS, Contact, ContactList
+import numpy as np
+
+from vftcli.contacts.contact_list import (
+    FIRST_COLUMNS,
+    CarriedLoad,
+    Contact,
+    ContactList,
+    ContactModel,
+    Unexplained,
+)
 from vftcli.outputs.answer import direction, free_words, place_words
+from vftcli.outputs.files import SEAL
 from vftcli.outputs.grid import Column, Grid, csv_rows
 from vftcli.outputs.quantity import banded
+from vftcli.signals.arrays import Array
+from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, Where
+from vftcli.virtual_sensor.smoother.prior import WrenchPrior
 
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
 FRAME, SIGN = "base axes, moment about the flange point", "on the robot"
+
+#: Field of a list → its key in the record, where both hold one thing.
+LIST_KEYS = {
+    "recording": "recording", "duration": "duration_s", "basis": "basis", "free_seconds": "free_s",
+    "false_on_free": "false_on_free", "threshold": "evidence_threshold_nats",
+    "smallest_force": "smallest_force_N",
+}  # fmt: skip
+#: Field of a contact → its key in the record, in the same way; and of vectors.
+CONTACT_KEYS = {
+    "number": "number", "start": "start_s", "stop": "stop_s", "peak": "peak_s",
+    "peak_force": "peak_force_N", "peak_band": "peak_force_band_N", "place_band": "place_band_N",
+    "where": "where", "lead": "where_lead_nats", "evidence": "evidence_nats", "at_rest": "at_rest",
+    "vendor_force": "vendor_force_N", "sensor_force": "sensor_force_N",
+}  # fmt: skip
+VECTOR_KEYS = {
+    "mean_force": "mean_force_N", "impulse": "impulse_Ns", "joint_torque": "joint_torque_Nm",
+    "joint_torque_sd": "joint_torque_sd_Nm",
+}  # fmt: skip
 
 
 def contacts_record(found: ContactList) -> dict[str, Any]:
@@ -91,3 +125,77 @@ def contact_row(contact: Contact, force: bool) -> list[str]:
     else:
         row.append(" ".join(f"{torque:.1f}" for torque in contact.joint_torque))
     return [*row, place_words(contact), contact.trust]
+
+
+def stored_record(estimates: Path) -> dict[str, Any]:
+    """The contacts in the ``run.json`` beside an ``estimates.parquet``, as they were written."""
+    path = estimates.with_name(SEAL)
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+        found, log = record["contacts"], record["input"]["path"]
+    except (OSError, ValueError, KeyError, TypeError):
+        raise LogError(
+            f"{estimates} holds estimates, and no {SEAL} of theirs is beside it; give the log"
+        ) from None
+    if not isinstance(found, dict):
+        raise LogError(f"{estimates} was made without a list of contacts; give the log, {log}")
+    if "basis" not in found:
+        raise LogError(f"{estimates} was written by an older vftcli; give the log, {log}")
+    return found
+
+
+def stored_list(record: Mapping[str, Any]) -> ContactList:
+    """A list from its record; what its free motion was is not kept, but in words."""
+    model, torque, load = record["model"], record["largest_unexplained"], record["load"]
+    prior = (model["tau_w_s"], model["sigma_force_N"], model["sigma_moment_Nm"])
+    if load is not None:
+        start, stop = load["span_s"]
+        mass = load["mass_kg"], load["mass_sd_kg"]
+        load = CarriedLoad(*mass, load["robot"], load["payload"], (start, stop))
+    return ContactList(
+        **{field: record[key] for field, key in LIST_KEYS.items()},
+        contacts=tuple(map(stored_contact, record["contacts"])),
+        candidates=tuple(map(stored_contact, record["candidates"])),
+        free=(),
+        unexplained=None if torque is None else Unexplained(**torque),
+        load=load,
+        stops=tuple(record["stops_s"]),
+        model=ContactModel(
+            prior=None if None in prior else WrenchPrior(*prior),
+            noise_sd=numbers(model["noise_sd_Nm"]),
+            error_sd=numbers(model["friction_sd_Nm"]),
+            error_time=numbers(model["friction_time_s"]),
+            block=model["block_s"],
+        ),
+        remarks=tuple(map(stored_remark, record["remarks"])),
+    )
+
+
+def stored_contact(row: Mapping[str, Any]) -> Contact:
+    """One contact from its record."""
+    vectors = {field: row[key] for field, key in VECTOR_KEYS.items()}
+    for field, unit in (("wrench", ""), ("wrench_sd", "_sd")):
+        force = row[f"force{unit}_N"]
+        vectors[field] = None if force is None else [*force, *row[f"moment{unit}_Nm"]]
+    fields = {field: row[key] for field, key in CONTACT_KEYS.items()}
+    fields |= {field: None if v is None else numbers(v) for field, v in vectors.items()}
+    anywhere = row["anywhere_N"]
+    return Contact(
+        **fields,
+        is_load=row["kind"] == "load",
+        anywhere=None if anywhere is None else (anywhere[0], anywhere[1]),
+        places=tuple(0 if place == "flange" else place for place in row["places"]),
+        remarks=tuple(map(stored_remark, row["remarks"])),
+    )
+
+
+def stored_remark(record: Mapping[str, Any]) -> Remark:
+    """A remark from its record."""
+    span = record["span_s"]
+    where = Where(record["about"] or "", tuple(record["joints"]), tuple(span) if span else None)
+    return Remark(record["code"], record["level"], record["values"], where)
+
+
+def numbers(values: list[float | None]) -> Array:
+    """Numbers of a record, NaN for what is not known. (n,)"""
+    return np.array([np.nan if value is None else value for value in values])

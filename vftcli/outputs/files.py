@@ -6,6 +6,8 @@ the first of them changes and comes when the last is in its place, so that a fol
 known to be incomplete, whenever a run was killed.
 """
 
+import hashlib
+import json
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
@@ -15,10 +17,12 @@ from types import TracebackType
 from typing import Self
 
 from vftcli.outputs.partial import PARTIAL, check_writable, held, partial_folder, to_disk
-from vftcli.outputs.seals import SEAL, digests, is_seal, sealed_files
 from vftcli.signals.errors import OutputError
 from vftcli.signals.packages import installed, remedy
 from vftcli.signals.parsing import whole
+
+#: The last file of a run to come and the first to go; beside other files `NAME.run.json`.
+SEAL = "run.json"
 
 _inputs: ContextVar[tuple[Path, ...]] = ContextVar("inputs", default=())
 
@@ -125,8 +129,10 @@ class OutputFolder:
         put_text(self / name, text)
 
     def digests(self, place: str = "") -> dict[str, str]:
-        """The sha256 of every file written so far below `place`, by its name there."""
-        return digests(self.temporary / place)
+        """The sha256 of every file written so far below `place`, by its name there, in order."""
+        top = self.temporary / place
+        files = [path for path in sorted(top.rglob("*")) if path.is_file()]
+        return {path.relative_to(top).as_posix(): digest(path) for path in files}
 
     def check(self) -> None:
         """Refuse what must not be overwritten, before anything is computed or made."""
@@ -215,6 +221,39 @@ class OutputFolder:
         for folder in reversed(self.made):
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
+
+
+def is_seal(path: Path) -> bool:
+    """Whether a file is the seal of a run."""
+    return path.name == SEAL or path.name.endswith(f".{SEAL}")
+
+
+def digest(path: Path) -> str:
+    """The sha256 of a file's bytes, in hex."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:
+    """The files that an earlier run's seal lists, where they still are as that run left them.
+
+    A seal is a file like any other: what it lists outside its folder is not believed.
+    """
+    try:
+        files = json.loads(seal.read_text(encoding="utf-8"))["files"]
+        listed = {str(name): str(sha) for name, sha in files.items()}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return  # an earlier version's, or none of ours
+    top = seal.parent if at is None else at
+    folder = top.resolve()
+    for name, sha in listed.items():
+        path = top / name
+        try:
+            inside = path.resolve().is_relative_to(folder)
+            if inside and path.is_file() and digest(path) == sha:
+                yield path
+        except (OSError, ValueError):
+            continue
 
 
 def last_sealed(path: Path) -> tuple[bool, int, str]:

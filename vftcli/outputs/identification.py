@@ -11,10 +11,11 @@ import polars as pl
 
 from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification, Trace
+from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
@@ -25,13 +26,9 @@ from vftcli.outputs.log.run_record import (
     seal,
     versions,
 )
-from vftcli.outputs.page import svg
-from vftcli.outputs.page.charts import Chart, ChartLine, families_of
 from vftcli.outputs.page.log_charts import joint_panels
-from vftcli.outputs.page.shell import page
-from vftcli.outputs.palette import SPARE
+from vftcli.outputs.page.shell import Box, Scales, page, polyline
 from vftcli.outputs.quantity import DASH, counted, signed
-from vftcli.outputs.seals import SEAL
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
 
@@ -144,21 +141,21 @@ def render_identification(
 
 def velocity_plot(
     coloured: Sequence[tuple[Trace, str]], j: int
-) -> tuple[str, svg.Scales, list[tuple[str, str]]]:
+) -> tuple[str, Scales, list[tuple[str, str]]]:
     """A joint's residual over velocity: its name, scales, and each log's colour and dots."""
     # One scale for all logs of a joint, or their dots could not be compared.
     speed = max(float(np.max(np.abs(t.motion.dq[:, j]))) for t, _ in coloured) or 1.0
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
-    across, up = svg.Span(-speed, speed), svg.Span(-high, high)
-    scales, drawn = svg.Scales(svg.Box(height=180), across, up), []
+    across, up = Span(-speed, speed), Span(-high, high)
+    scales, drawn = Scales(Box(height=180), across, up), []
     for trace, colour in coloured:
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
         x = scales.across(trace.motion.dq[pick, j])
         y = scales.up(np.clip(trace.residual[pick, j], *up))
         # One path of strokes without length: 600 circles a log and joint would make a slow page.
-        dots = (svg.polyline(dot[None]) for dot in np.column_stack([x, y]))
+        dots = (polyline(dot[None]) for dot in np.column_stack([x, y]))
         drawn.append((colour, "".join(dots)))
     return f"J{j + 1}", scales, drawn
 

@@ -1,6 +1,7 @@
 """The arm and forces in a Rerun recording: shapes, poses and colours over time, arrows.
 
-The arm is made of capsules, from the chain's own geometry.
+The arm is made of capsules, from the chain's own geometry. A contact's arrow is there while it
+lasts, at its place, below `/contacts`, and the links that it touched have its colour.
 """
 
 from collections.abc import Mapping, Sequence
@@ -8,15 +9,19 @@ from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
-from vftcli.outputs.palette import rgb
+from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.charts import PLACES
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import matrix_quaternion, rotation_onto
 
 Stream = rr.RecordingStream  #: A recording that is being made.
+Packed = NDArray[np.uint32]  #: Colours as Rerun takes them.
+Painted = tuple[float, float, str]  #: Start and stop [s] of a link's other colour ``#rrggbb``.
 
-ROBOT = "/robot"  #: Root of the arm.
+ROBOT, CONTACTS = "/robot", "/contacts"  #: Roots of the arm and of the contacts, by number.
 #: Radius of the first and of the last link, as a share of the arm's length.
 THICKNESS = (0.048, 0.030)
 RATE = 50.0  #: Poses a second that are drawn. [Hz]
@@ -49,24 +54,23 @@ class ArmPoses(NamedTuple):
     q: Array  #: Joint positions. (S, n) [rad]
 
 
-def arm_length(chain: Chain) -> float:
-    """Length of the stretched arm, base to flange. [m]"""
-    offsets = np.vstack([chain.translation, chain.flange_translation])
-    return float(np.linalg.norm(offsets, axis=1).sum())
+def rgba(*colours: str) -> Packed:
+    """Colours ``#rrggbb`` as 0xRRGGBBAA: Rerun 0.30 takes three numbers for three colours."""
+    return np.array([int(f"{colour[1:]}ff", 16) for colour in colours], dtype=np.uint32)
 
 
 def capsules(chain: Chain) -> list[list[Capsule]]:
     """Parts on the base and on each link: n + 1 lists, base first."""
-    n, length = chain.joints, arm_length(chain)
+    n = chain.joints
     offsets = np.vstack([chain.translation, chain.flange_translation])
+    length = float(np.linalg.norm(offsets, axis=1).sum())  # of the stretched arm
     radii = length * np.linspace(*THICKNESS, n + 1)
     shapes: list[list[Capsule]] = []
     for j in range(n + 1):
         shapes.append([])
         # A joint is a short thick cylinder about its axis, which is z of the link that it moves.
         if j > 0:
-            half = 1.1 * radii[j]
-            axis = np.array([0.0, 0.0, 2.0 * half])
+            axis = np.array([0.0, 0.0, 2.2 * radii[j]])
             shapes[j].append(Capsule(-0.5 * axis, axis, 1.18 * radii[j], joint=True))
         if np.linalg.norm(offsets[j]) > SHORTEST * length:
             shapes[j].append(Capsule(np.zeros(3), offsets[j], radii[j], joint=False))
@@ -87,21 +91,13 @@ def xyzw(rotation: Array) -> Array:
     return np.roll(matrix_quaternion(rotation), -1, axis=-1)
 
 
-class PaintedSpan(NamedTuple):
-    """A span in which a link has another colour."""
-
-    start: float  #: [s]
-    stop: float  #: [s]
-    colour: str  #: ``#rrggbb``.
-
-
 def arrow_scale(hardest: float) -> float:
     """Newtons that are 1 m, so that the arrow of the hardest force can be seen. [N/m]"""
     return next((scale for scale in SCALES if hardest <= LONGEST * scale), SCALES[-1])
 
 
 def send_arm(
-    stream: Stream, chain: Chain, poses: ArmPoses, painted: Mapping[int, Sequence[PaintedSpan]]
+    stream: Stream, chain: Chain, poses: ArmPoses, painted: Mapping[int, Sequence[Painted]]
 ) -> None:
     """Send the arm's shape once, its poses over time, and when links have another colour."""
     time = rr.TimeColumn("t", duration=poses.t)
@@ -118,7 +114,7 @@ def send_arm(
                 fill_mode="solid",
             )
             stream.log(link, batch, static=True)
-            own = [rgb(JOINT if shape.joint else LINK) for shape in shapes]
+            own = rgba(*(JOINT if shape.joint else LINK for shape in shapes))
             send_colours(stream, link, own, float(poses.t[0]), painted.get(j, ()))
         if j:
             columns = rr.Transform3D.columns(
@@ -128,31 +124,29 @@ def send_arm(
 
 
 def send_colours(
-    stream: Stream,
-    link: str,
-    own: Sequence[tuple[int, ...]],
-    start: float,
-    painted: Sequence[PaintedSpan],
+    stream: Stream, link: str, own: Packed, start: float, painted: Sequence[Painted]
 ) -> None:
-    """Send the colours of a link's shapes: its own, and others in the painted spans.
-
-    Args:
-        stream: The recording.
-        link: Entity of the link.
-        own: Red, green and blue of each shape.
-        start: The first pose's time. [s]
-        painted: The spans in which all of them have another colour, in order.
-    """
+    """Send the colours of a link's shapes from the first pose on: its own, others in the spans."""
     if not painted:
         stream.log(link, rr.Capsules3D.from_fields(colors=own), static=True)
         return
-    changes: dict[float, Sequence[tuple[int, ...]]] = {start: own}
-    for span in painted:
-        changes[max(span.start, start)] = [rgb(span.colour)] * len(own)
-        changes[span.stop] = own
-    colours = np.array([colour for t in sorted(changes) for colour in changes[t]], dtype=np.uint8)
+    changes: dict[float, Packed] = {start: own}
+    for begin, stop, colour in painted:
+        changes[max(begin, start)] = rgba(*[colour] * len(own))
+        changes[stop] = own
+    colours = np.concatenate([changes[t] for t in sorted(changes)])
     columns = rr.Capsules3D.columns(colors=colours).partition([len(own)] * len(changes))
     stream.send_columns(link, [rr.TimeColumn("t", duration=sorted(changes))], columns)
+
+
+def painted_links(found: ContactList, joints: int) -> dict[int, list[Painted]]:
+    """Number of a link → when it is one of those that were touched, in the colour of the part."""
+    spans: dict[int, list[Painted]] = {}
+    for contact in found.contacts:
+        for link in sorted({place or joints for place in contact.places}):
+            painted = (contact.start, contact.stop, PLACES[contact.where])
+            spans.setdefault(link, []).append(painted)
+    return spans
 
 
 def send_force(
@@ -182,6 +176,42 @@ def send_force(
         origins=origin[known],
         vectors=force[known] / scale,
         radii=np.full(count, SHAFT),
-        colors=np.tile(np.array([*rgb(colour), 255], dtype=np.uint8), (count, 1)),
+        colors=np.repeat(rgba(colour), count),
     ).partition(known.astype(int))
     stream.send_columns(path, [rr.TimeColumn("t", duration=t)], columns)
+
+
+def send_contacts(
+    stream: Stream, found: ContactList, poses: ArmPoses, force: Array | None, scale: float
+) -> None:
+    """Send the arrow of each contact, while it lasts, at its place; `scale` newtons are 1 m.
+
+    On the wrist it is the force of `best` at these poses as it runs, in base axes [N], (S, 3);
+    elsewhere, where the flange's would be another, that of the contact's peak.
+    """
+    for contact in found.contacts:
+        if contact.wrench is None:
+            continue
+        first = int(np.searchsorted(poses.t, contact.start))
+        # One more: the last arrow goes with the first pose after the contact.
+        rows = slice(first, int(np.searchsorted(poses.t, contact.stop, side="right")) + 1)
+        t, origin = poses.t[rows], touched_point(contact, poses.translation[rows])
+        arrows = np.tile(contact.wrench[:3], (len(t), 1))
+        if force is not None and contact.where == "wrist":
+            arrows = np.where(np.isfinite(force[rows]), force[rows], arrows)
+        arrows[t > contact.stop] = np.nan
+        path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
+        send_force(stream, path, t, origin, arrows, scale=scale, colour=colour)
+
+
+def touched_point(contact: Contact, origins: Array) -> Array:
+    """The flange where it fits, else the middle of the last link that does. (S, 3) [m]
+
+    Given are the origins of the links and of the flange in the base frame. (S, n+1, 3) [m]
+    """
+    if 0 in contact.places or not contact.places:
+        flange: Array = origins[:, -1]
+        return flange
+    last = contact.places[-1]
+    middle: Array = 0.5 * (origins[:, last - 1] + origins[:, last])
+    return middle

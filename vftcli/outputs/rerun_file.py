@@ -5,6 +5,7 @@ timeline `t` in seconds from the log's first sample; words are Markdown document
 """
 
 import hashlib
+import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -16,15 +17,10 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from vftcli.outputs.decimation import level_rows
+from vftcli.outputs.charts import GREY, INK, REFERENCE, Chart, ChartLine, Span, level_rows
 from vftcli.outputs.files import unwritable
-from vftcli.outputs.page.charts import INK, REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.svg import Span, ends_of_family
-from vftcli.outputs.palette import REFERENCE as GREY
-from vftcli.outputs.palette import rgb
-from vftcli.outputs.rerun_arm import ROBOT, ArmPoses, Stream
+from vftcli.outputs.rerun_arm import CONTACTS, ROBOT, ArmPoses, Stream, rgba
 
-CONTACTS = "/contacts"  #: Below it stand the contacts: `/contacts/1` is that of number 1.
 #: How the names of lines begin that are drawn as bars, and how those end that are a band's edges.
 BAR, EDGES = "touched: ", ("95 % upper", "95 % lower")
 
@@ -49,7 +45,7 @@ class Tab(NamedTuple):
     def ends(self, plot: Chart) -> Span:
         """Both ends of a plot's vertical axis: those of its whole family."""
         alike = [p for p in self.plots if p.families and p.families == plot.families] or [plot]
-        low, high = zip(*(ends_of_family(one, 0) for one in alike), strict=True)
+        low, high = zip(*(one.ends(0) for one in alike), strict=True)
         return Span(min(low), max(high))
 
 
@@ -91,16 +87,17 @@ def rerun_file(
         space: Name of its space.
         marked: The span that the time panel marks, None if there is none. [s]
     """
-    # Equal data make equal recordings: no random id, no time of writing.
-    identity = recording_id(title, tabs, words)
-    # Nor rows put together by how much time has gone by.
-    untimed = rr.ChunkBatcherConfig.NEVER()
+    # Equal data make equal recordings: no random id, no time of writing, nor rows put together by
+    # how much time has gone by.
     stream = rr.RecordingStream(
-        "vftcli", recording_id=identity, send_properties=False, batcher_config=untimed
+        "vftcli",
+        recording_id=recording_id(title, tabs, words),
+        send_properties=False,
+        batcher_config=rr.ChunkBatcherConfig.NEVER(),
     )
     # Into memory: Rerun writes a file in a thread, which on a full disk stops and is waited for.
     made = stream.memory_recording()
-    shown = blueprint(tabs, list(words), arm_view(poses, space), marked)
+    shown = blueprint(tabs, words, arm_view(poses, space), marked)
     stream.send_blueprint(shown, make_active=False, make_default=True)
     stream.send_recording_name(drawable(title))
     for tab in tabs:
@@ -124,17 +121,16 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
     A viewer puts recordings of one identity into one; other gains on the log make another.
     """
     found = hashlib.sha256("\0".join([title, *words, *words.values()]).encode("utf-8", "replace"))
-    for tab in tabs:
-        for plot in tab.plots:
-            found.update("\0".join([plot.key, *(line.name for line in plot.series)]).encode())
-            for line in plot.series:
-                found.update(line.values.tobytes())
+    for plot in (plot for tab in tabs for plot in tab.plots):
+        found.update("\0".join([plot.key, *(line.name for line in plot.series)]).encode())
+        for line in plot.series:
+            found.update(line.values.tobytes())
     return UUID(bytes=found.digest()[:16])
 
 
 def blueprint(
     tabs: Sequence[Tab],
-    words: Sequence[str],
+    words: Mapping[str, str],
     space: rrb.Spatial3DView,
     marked: tuple[float, float] | None,
 ) -> rrb.Blueprint:
@@ -146,9 +142,8 @@ def blueprint(
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
     left = rrb.Vertical(space, said, row_shares=[3, 2])
-    plots = rrb.Tabs(*map(grid_of, tabs), active_tab=0)
     return rrb.Blueprint(
-        rrb.Horizontal(left, plots, column_shares=[2, 5]),
+        rrb.Horizontal(left, rrb.Tabs(*map(grid_of, tabs), active_tab=0), column_shares=[2, 5]),
         time_panel(marked),
         rrb.SelectionPanel(state="collapsed"),
         rrb.BlueprintPanel(state="collapsed"),
@@ -201,7 +196,14 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
     if not tab.log:
         return plots
-    return rrb.Vertical(plots, log_view(tab.log), row_shares=[2, 1], name=tab.name)
+    columns: dict[str, Any] = {}
+    # The path says nothing that the words do not; versions without the choice show it.
+    if hasattr(rrb, "TextLogColumns"):
+        shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
+        columns = {"columns": rrb.TextLogColumns(text_log_columns=shown)}
+    paths = list(dict.fromkeys(line.path for line in tab.log))
+    log = rrb.TextLogView(origin="/", contents=paths, name="Log", **columns)
+    return rrb.Vertical(plots, log, row_shares=[2, 1], name=tab.name)
 
 
 def title_of(tab: Tab, plot: Chart) -> str:
@@ -213,23 +215,12 @@ def title_of(tab: Tab, plot: Chart) -> str:
     return f"{title}, {low:.3g} to {high:.3g}"
 
 
-def log_view(log: Sequence[LogLine]) -> rrb.TextLogView:
-    """A text log: time and words."""
-    columns: dict[str, Any] = {}
-    # The path says nothing that the words do not; versions without the choice show it.
-    if hasattr(rrb, "TextLogColumns"):
-        shown = [rrb.components.TextLogColumn(kind) for kind in ("LogLevel", "Body")]
-        columns = {"columns": rrb.TextLogColumns(text_log_columns=shown)}
-    paths = list(dict.fromkeys(line.path for line in log))
-    return rrb.TextLogView(origin="/", contents=paths, name="Log", **columns)
-
-
 def send_plot(stream: Stream, plot: Chart) -> None:
     """Send one plot: names and colours once, then all samples in one batch; then its points."""
     lines = lines_of(plot)
     style = rr.SeriesLines(
         names=[drawable(line.name) for line in lines],
-        colors=[rgb(GREY if line.colour in {INK, REFERENCE} else line.colour) for line in lines],
+        colors=rgba(*(GREY if line.colour in {INK, REFERENCE} else line.colour for line in lines)),
         widths=[width_of(line) for line in lines],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,  # an average hides spikes
     )
@@ -239,12 +230,9 @@ def send_plot(stream: Stream, plot: Chart) -> None:
     stream.send_columns(plot.key, [rr.TimeColumn("t", duration=plot.x)], scalars)
     for points in plot.series:
         if points.x is not None:
-            path = f"{plot.key}/points"
+            path, name = f"{plot.key}/points", drawable(points.name)
             marks = rr.SeriesPoints(
-                names=drawable(points.name),
-                colors=rgb(points.colour),
-                markers="diamond",
-                marker_sizes=6.0,
+                names=name, colors=rgba(points.colour), markers="diamond", marker_sizes=6.0
             )
             stream.log(path, marks, static=True)
             single = rr.Scalars.columns(scalars=points.values.ravel())
@@ -267,33 +255,18 @@ def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
         rows = rr.TextLog.columns(
             text=[drawable(line.text) for line in own],
             level=[line.level for line in own],
-            # Packed as 0xRRGGBBAA: Rerun 0.30 takes three numbers for three colours.
-            color=np.array([int(f"{line.colour[1:]}ff", 16) for line in own], dtype=np.uint32),
+            color=rgba(*(line.colour for line in own)),
         )
         stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
 
 
 #: How to write what the viewer's font may lack.
-SPELLED = {
-    "ᵀ": "^T",
-    "⁻": "^-",
-    "√": "sqrt ",
-    "≤": "<=",
-    "≥": ">=",
-    "≈": "~",
-    "→": "->",
-    "−": "-",
-    "–": "-",
-    "—": "-",
-    "…": "...",
-    "‘": "'",
-    "’": "'",
-    "“": '"',
-    "”": '"',
-    "∂": "d",
-    "Σ": "sum ",
-    "ẋ": "dx",
-}
+SPELLED = str.maketrans({
+    "ᵀ": "^T", "⁻": "^-", "√": "sqrt ", "≤": "<=", "≥": ">=", "≈": "~", "→": "->", "−": "-",
+    "–": "-", "—": "-", "…": "...", "‘": "'", "’": "'", "“": '"', "”": '"', "∂": "d",
+    "Σ": "sum ", "ẋ": "dx",
+})  # fmt: skip
+LACKED = re.compile("[^\n -~\u00a0-\u00ff\u0391-\u03c9]")  #: Neither Latin-1 nor Greek.
 
 
 def drawable(text: str) -> str:
@@ -301,20 +274,14 @@ def drawable(text: str) -> str:
 
     The viewer stops at the first letter that its font lacks.
     """
-    spelled = "".join(SPELLED.get(letter, letter) for letter in text)
-    return "".join(letter_drawn(letter) for letter in spelled)
+    return LACKED.sub(without_accents, text.translate(SPELLED))
 
 
-def letter_drawn(letter: str) -> str:
-    """One letter if the font has it; else what it is made of, or "?"."""
-    if letter == "\n" or has_glyph(letter) or "\u00a0" <= letter <= "\u00ff":
-        return letter
-    parts = [p for p in unicodedata.normalize("NFKD", letter) if not unicodedata.combining(p)]
-    if unicodedata.combining(letter):
-        return ""
-    return "".join(part if has_glyph(part) else "?" for part in parts)
-
-
-def has_glyph(letter: str) -> bool:
-    """Whether a letter is plain ASCII or Greek."""
-    return " " <= letter <= "~" or "\u0391" <= letter <= "\u03c9"
+def without_accents(found: re.Match[str]) -> str:
+    """What a letter is made of, as far as that is plain ASCII or Greek."""
+    parts = unicodedata.normalize("NFKD", found.group())
+    return "".join(
+        part if " " <= part <= "~" or "\u0391" <= part <= "\u03c9" else "?"
+        for part in parts
+        if not unicodedata.combining(part)
+    )

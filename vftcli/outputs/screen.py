@@ -9,20 +9,20 @@ from pathlib import Path
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
-from vftcli.outputs.answer import answer, headline, otherwise
+from vftcli.outputs.answer import answer, otherwise
 from vftcli.outputs.believability import (
     MARKS,
     Ground,
     LogSummary,
     grounds,
+    headline,
     health,
     log_line,
     own_match,
 )
-from vftcli.outputs.canvas import Canvas
+from vftcli.outputs.canvas import Canvas, force_bars, forces_of_list
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
 from vftcli.outputs.examination import rate_of
-from vftcli.outputs.force_bars import force_bars, forces_of_list
 from vftcli.outputs.grid import Column, Grid, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks, contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant

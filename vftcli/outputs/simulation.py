@@ -5,9 +5,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.log.run_record import seal, versions
-from vftcli.outputs.seals import SEAL
 from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.load import to_toml

@@ -16,7 +16,7 @@ from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.admittance import charts as replay_charts
-from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, RunResult
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact

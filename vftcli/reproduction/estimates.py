@@ -17,7 +17,7 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.selection import facts
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import PAPER
-from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
+from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.repetition.choice import FreeChoice

@@ -9,12 +9,11 @@ import numpy as np
 
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import line_figure, plots_of
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.log.run_record import seal, versions
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.quantity import DASH, minus, significant
-from vftcli.outputs.seals import SEAL
 from vftcli.reproduction.jobs import Job
 from vftcli.reproduction.paper import FLOOR, Paper, ShownItem
 

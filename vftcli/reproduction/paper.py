@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from vftcli.evaluation.print_table import TABLES
-from vftcli.outputs.page.charts import Chart
+from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
 
 #: Variants of a value: by the printed formulas; by the corrected ones; these with R and Q read as

@@ -9,15 +9,15 @@ from contact_rows import contact, contact_list
 from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.contact_recording import (
+from vftcli.outputs.charts import PLACES
+from vftcli.outputs.log.rerun_recording import (
     best_wrench,
     contact_log,
     force_plot,
-    painted_links,
-    touched_point,
+    newton_per_metre,
+    write_rrd,
 )
-from vftcli.outputs.log.rerun_recording import newton_per_metre, write_rrd
-from vftcli.outputs.palette import PLACES
+from vftcli.outputs.rerun_arm import painted_links, touched_point
 from vftcli.signals.remarks import Where, caution
 
 
@@ -74,8 +74,8 @@ def test_the_touched_links_are_painted(touched: Analysis) -> None:
     assert touched.contacts is not None
     found = painted_links(touched.contacts, 6)
     assert sorted(found) == [3, 5, 6]
-    assert [(s.start, s.stop, s.colour) for s in found[6]] == [(1.0, 1.5, PLACES["wrist"])]
-    assert [(s.start, s.stop, s.colour) for s in found[3]] == [(2.2, 2.6, PLACES["forearm"])]
+    assert found[6] == [(1.0, 1.5, PLACES["wrist"])]
+    assert found[3] == [(2.2, 2.6, PLACES["forearm"])]
 
 
 @pytest.mark.parametrize(("places", "point"), [((0, 6), 6.0), ((2, 3), 2.5), ((), 6.0)])

@@ -7,6 +7,7 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.files import digests
 from vftcli.outputs.log import report
 from vftcli.outputs.log.choice import NONE, OutputChoice
 from vftcli.outputs.log.estimates import write_estimate_folder
@@ -17,7 +18,6 @@ from vftcli.outputs.log.report import (
     write_report,
     write_reports,
 )
-from vftcli.outputs.seals import digests
 from vftcli.signals.errors import OutputError
 
 

@@ -3,22 +3,17 @@ import base64
 import numpy as np
 import pytest
 
-from vftcli.outputs.page.charts import (
+from vftcli.outputs.charts import QUIET, Chart, ChartLine, families_of
+from vftcli.outputs.page.shell import (
     FEWEST,
     LONG,
-    QUIET,
     ROOM,
     STEPS,
-    Chart,
-    ChartLine,
-    families_of,
-    known,
     packed,
     packed_charts,
+    part,
     quantised,
 )
-from vftcli.outputs.page.shell import part
-from vftcli.outputs.page.svg import ends_of_family
 
 
 def floats(text: str) -> np.ndarray:
@@ -68,9 +63,6 @@ def test_a_ribbon_is_grey_where_no_contact_is_listed() -> None:
     t, values = np.arange(6.0), np.zeros((6, 1))
     quiet = np.array([True, True, False, False, True, True])
     line = ChartLine("best", values, "#112233", half=np.full((6, 1), 2.0), quiet=quiet)
-    own, grey = line.ribbons(0) or ((), ())
-    assert np.isnan(own).tolist() == quiet.tolist()
-    np.testing.assert_array_equal(np.where(quiet, grey, own), 2.0)
     (lines,) = packed(chart(t, line), 100)["series"][0]["lines"]
     assert np.isnan(unpacked(lines["half"])).tolist() == quiet.tolist()
     assert np.isnan(unpacked(lines["quiet"])).tolist() == (~quiet).tolist()
@@ -109,16 +101,16 @@ def test_neighbours_of_one_drive_size_share_a_scale() -> None:
     assert families_of(np.array([nan, nan])) == (1, 1)
     values = np.array([[1.0, 40.0, 3.0], [-1.0, 0.0, 0.0]])
     shown = chart(np.arange(2.0), ChartLine("a", values), families=(1, 1, 2))
-    assert ends_of_family(shown, 0) == ends_of_family(shown, 1)
-    assert ends_of_family(shown, 0).high > 40.0
-    assert ends_of_family(shown, 2).high < 4.0
+    assert shown.ends(0) == shown.ends(1)
+    assert shown.ends(0).high > 40.0
+    assert shown.ends(2).high < 4.0
 
 
 def test_a_ribbon_and_a_band_are_within_their_scale() -> None:
     t, half = np.arange(2.0), np.full((2, 1), 5.0)
-    ends = ends_of_family(chart(t, ChartLine("a", np.ones((2, 1)), half=half)), 0)
+    ends = chart(t, ChartLine("a", np.ones((2, 1)), half=half)).ends(0)
     assert (ends.low < -4.0, ends.high > 6.0) == (True, True)
-    ends = ends_of_family(chart(t, ChartLine("a", np.ones((2, 1))), band=np.array([9.0])), 0)
+    ends = chart(t, ChartLine("a", np.ones((2, 1))), band=np.array([9.0])).ends(0)
     assert (ends.low < -9.0, ends.high > 9.0) == (True, True)
 
 
@@ -144,4 +136,6 @@ def test_only_what_is_shown_stands_in_the_small_pictures() -> None:
     [(None, None), ([np.nan, np.nan], None), ([1.0, np.nan], [1.0, None])],
 )
 def test_a_band_of_unknowns_is_none(values: list | None, shown: list | None) -> None:
-    assert known(None if values is None else np.array(values)) == shown
+    line = ChartLine("a", np.zeros((3, 2)))
+    band = None if values is None else np.array(values)
+    assert packed(chart(np.arange(3.0), line, band=band), 100)["band"] == shown

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.page.charts import REFERENCE
+from vftcli.outputs.charts import REFERENCE
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     condition_charts,

@@ -13,7 +13,7 @@ from vftcli.outputs.believability import Ground
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import pages
 from vftcli.outputs.page.pages import eyebrow, render
-from vftcli.outputs.page.shell import asset, script_json
+from vftcli.outputs.page.shell import HERE, script_json
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution, explanation
 
@@ -160,7 +160,7 @@ def test_values_at_the_floor_are_marked(analysis: Analysis) -> None:
 
 def test_no_mark_of_a_table_is_green() -> None:
     """A number at its floor may stand beside a joint that is not to be trusted."""
-    rule = re.search(r"td \.mark \{([^}]*)\}", asset("page.css"))
+    rule = re.search(r"td \.mark \{([^}]*)\}", (HERE / "page.css").read_text("utf-8"))
     assert rule is not None
     assert "var(--mute)" in rule[1]
     assert "--good" not in rule[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
-from vftcli.outputs.page.charts import Chart, ChartLine
+from vftcli.outputs.charts import Chart, ChartLine
 from vftcli.outputs.page.shell import page, part, script_json
 from vftcli.signals import remarks as remarks_module
 from vftcli.signals.remarks import fact, warning

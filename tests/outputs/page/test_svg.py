@@ -1,20 +1,16 @@
 import numpy as np
 import pytest
 
-from vftcli.outputs.page.shell import part
-from vftcli.outputs.page.svg import (
-    STRETCHES,
+from vftcli.outputs.charts import Span
+from vftcli.outputs.page.shell import (
     Box,
     Scales,
-    Span,
     decades,
-    ends_of,
     label,
+    part,
     path_of,
     ribbon,
     stripes,
-    thinned,
-    thinned_log,
     ticks,
 )
 
@@ -73,24 +69,6 @@ def test_a_stripe_stays_in_the_plot() -> None:
 def test_many_stripes_are_one_path() -> None:
     found = stripes(SCALES, [(0.0, 1.0), (5.0, 5.0)])
     assert found == "M0.0 0h10.0v100h-10.0zM50.0 0h0.5v100h-0.5z"
-
-
-def test_ends_hold_all_values() -> None:
-    found = ends_of([np.array([1.0, np.nan]), np.array([-3.0])])
-    assert found.low < -3.0
-    assert found.high > 1.0
-    assert ends_of([np.array([np.nan])]) == ends_of([np.zeros(3)]) == Span(-1.0, 1.0)
-    assert ends_of([np.full(3, 4.0)]) == Span(0.0, 8.0)
-
-
-def test_no_spike_is_lost() -> None:
-    t = np.linspace(1.0, 1000.0, 20_000)
-    y = np.zeros_like(t)
-    y[[777, 15_000]] = 9.0, -9.0
-    for found in (thinned(t, y, STRETCHES), thinned_log(t, y, STRETCHES)):
-        assert len(found[0]) < 1200
-        assert {9.0, -9.0} <= set(found[1])
-        assert found[0][np.argmax(found[1])] == t[777]
 
 
 def test_the_title_is_words() -> None:

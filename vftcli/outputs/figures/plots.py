@@ -5,10 +5,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from vftcli.outputs.charts import INK, QUIET, REFERENCE, Chart, ChartLine, drawn_line
 from vftcli.outputs.figures.paper import sheet, shortened
 from vftcli.outputs.log.rmse_tables import DAGGER
-from vftcli.outputs.page.charts import INK, QUIET, REFERENCE, Chart, ChartLine
-from vftcli.outputs.page.svg import drawn_line, ends_of_family
 from vftcli.signals.arrays import Array
 
 if TYPE_CHECKING:
@@ -29,6 +28,14 @@ SPREAD = 0.66  #: Share of a joint's room that its dots take.
 RANGE = 10.0  #: Numbers that differ by more than this factor stand on a logarithmic axis.
 PLOTTED = 0.75  #: About which share of a plot's room its axes take.
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
+
+Look = dict[str, Any]  #: What matplotlib draws with.
+BAND_LOOK: Look = {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
+CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0}
+#: Colours of the page that follow its theme → theirs on white paper.
+PAINTS = {INK: "black", REFERENCE: "0.65"}
+#: Dashes of the page → those on paper, where they are too much like others.
+PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
 
 
 class Plot(NamedTuple):
@@ -86,7 +93,7 @@ def line_figure(
         for n, (x, y) in enumerate((marks or {}).values()):
             axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
         if plot.over is not None:
-            draw_over(axes, plot, named=(k + 1) % columns == 0)
+            draw_over(axes, plot.over, plot.panel, named=(k + 1) % columns == 0)
     for k in range(len(plots), len(grid)):
         if k >= columns:
             hang_axis(grid[k], plots[k - columns], below or AXES[plots[k - columns].chart.unit])
@@ -100,25 +107,28 @@ def draw_plot(axes: "Axes", plot: Plot) -> None:
 
     chart, j = plot.chart, plot.panel
     for start, stop in chart.spans:
-        axes.axvspan(start, stop, facecolor="0.9", linewidth=0.0)
+        axes.axvspan(start, stop, **CONTACT_LOOK)
     if chart.band is not None and np.isfinite(chart.band[j]):
         for sign in (1.0, -1.0):
-            axes.axhline(sign * chart.band[j], **band_look())
+            axes.axhline(sign * chart.band[j], **BAND_LOOK)
     for series in chart.series:
         if series.shown:
-            draw_line(axes, chart, series, j)
+            t, y, halves = drawn_line(chart, series, j, STRETCHES)
+            for half, style in zip(halves, ribbon_looks(series), strict=False):
+                axes.fill_between(t, y - half, y + half, **style)
+            axes.plot(t, y, **look(series))
     set_scale(axes, chart)
-    axes.set_ylim(*ends_of_family(chart, j))
+    axes.set_ylim(*chart.ends(j))
     axes.yaxis.set_major_locator(MaxNLocator(4))
 
 
 def set_scale(axes: "Axes", chart: Chart) -> None:
     """The horizontal axis of a chart."""
-    from matplotlib.ticker import FuncFormatter, NullFormatter
+    from matplotlib.ticker import FormatStrFormatter, NullFormatter
 
     if chart.log:
         axes.set_xscale("log")
-        axes.xaxis.set_major_formatter(FuncFormatter(plain))
+        axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
 
@@ -132,80 +142,39 @@ def hang_axis(axes: "Axes", above: Plot, label: str) -> None:
     # Numbers inside of the empty place take no room of their own.
     axes.tick_params(which="both", bottom=False, labelbottom=False)
     axes.tick_params(labeltop=True, pad=-10.0)
-    axes.annotate(
-        label,
-        (0.5, 1.0),
-        xycoords="axes fraction",
-        xytext=(0, -12),
-        textcoords="offset points",
-        ha="center",
-        va="top",
-    )
+    place: Look = {"xytext": (0, -12), "textcoords": "offset points", "ha": "center", "va": "top"}
+    axes.annotate(label, (0.5, 1.0), xycoords="axes fraction", **place)
 
 
-def plain(value: float, _place: int) -> str:
-    """A number along a logarithmic axis, without a power where one can do without."""
-    return f"{value:g}"
+def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white") -> Look:
+    """Look of the marks of one name: distinct by shape."""
+    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": fill}
+    return {"color": paint, "linestyle": "none", "markeredgewidth": edge, **shape}
 
 
-def draw_over(axes: "Axes", plot: Plot, *, named: bool) -> None:
+def draw_over(axes: "Axes", over: Chart, panel: int, *, named: bool) -> None:
     """Another chart's panel with its axis to the right, named at a row's end."""
-    assert plot.over is not None
     right = axes.twinx()
-    draw_plot(right, Plot(plot.over, plot.panel))
+    draw_plot(right, Plot(over, panel))
     if named:
-        right.set_ylabel(f"{plot.over.title} ({plot.over.units[plot.panel]})")
+        right.set_ylabel(f"{over.title} ({over.units[panel]})")
     else:
         right.tick_params(labelright=False)
 
 
-def draw_line(axes: "Axes", chart: Chart, series: ChartLine, j: int) -> None:
-    """One line of a panel with its ribbon."""
-    t, y, halves = drawn_line(chart, series, j, STRETCHES)
-    for half, style in zip(halves, ribbon_looks(series), strict=False):
-        axes.fill_between(t, y - half, y + half, **style)
-    axes.plot(t, y, **look(series))
-
-
-def dot_look(k: int) -> dict[str, Any]:
-    """Look of the marks of one name: black, distinct by shape."""
-    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": "white"}
-    return {"color": "black", "linestyle": "none", "markeredgewidth": 0.7, **shape}
-
-
-def ribbon_looks(series: ChartLine) -> tuple[dict[str, Any], dict[str, Any]]:
+def ribbon_looks(series: ChartLine) -> tuple[Look, Look]:
     """Looks of the band about a line: itself, and where no contact is listed."""
-    common = {"alpha": 0.25, "linewidth": 0.0}
-    return {"facecolor": paint(series), **common}, {"facecolor": "0.4", **common}
+    own = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
+    return own, own | {"facecolor": "0.4"}
 
 
-def band_look() -> dict[str, Any]:
-    """Look of the ends of a band about zero."""
-    return {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
-
-
-#: Colours of the page that follow its theme → theirs on white paper.
-PAINTS = {INK: "black", REFERENCE: "0.65"}
-
-
-def paint(series: ChartLine) -> str:
-    """A line's colour on paper."""
-    return PAINTS.get(series.colour, series.colour)
-
-
-#: Dashes of the page → those on paper, where they are too much like others.
-PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
-
-
-def look(series: ChartLine) -> dict[str, Any]:
+def look(series: ChartLine) -> Look:
     """Look of a line: dashes or width distinguish it in grey too."""
-    dash = PAPER_DASHES.get(series.dash, series.dash)
-    dashes = tuple(float(part) for part in dash.split())
-    broad = series.colour == REFERENCE
+    dashes = PAPER_DASHES.get(series.dash, series.dash).split()
     return {
-        "color": paint(series),
-        "linestyle": (0, tuple(0.6 * part for part in dashes)) if dashes else "solid",
-        "linewidth": 1.8 if broad else 0.9,
+        "color": PAINTS.get(series.colour, series.colour),
+        "linestyle": (0, tuple(0.6 * float(part) for part in dashes)) if dashes else "solid",
+        "linewidth": 1.8 if series.colour == REFERENCE else 0.9,
         "solid_capstyle": "butt",
     }
 
@@ -219,8 +188,7 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
     charts = {id(c): c for plot in plots for c in (plot.chart, plot.over) if c is not None}
     for chart in charts.values():
         shown = [series for series in chart.series if series.shown]
-        for series in shown:
-            found[shortened(series.name)] = Line2D([], [], **look(series))
+        found |= {shortened(series.name): Line2D([], [], **look(series)) for series in shown}
         for series in shown:
             if series.half is not None:
                 own, grey = ribbon_looks(series)
@@ -228,9 +196,9 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
                 if series.quiet is not None:
                     found[QUIET] = Patch(**grey)
         if chart.band is not None:
-            found[chart.band_label] = Line2D([], [], **band_look())
+            found[chart.band_label] = Line2D([], [], **BAND_LOOK)
         if chart.spans:
-            found["contact"] = Patch(facecolor="0.9", linewidth=0.0)
+            found["contact"] = Patch(**CONTACT_LOOK)
     for k, name in enumerate(marks):
         found[f"{name}, chosen"] = Line2D([], [], **dot_look(k))
     return found if len(found) > 1 else {}
@@ -288,7 +256,11 @@ def dot_figure(
     from matplotlib.lines import Line2D
 
     columns = 1 if width <= NARROW or len(plots) == 1 else 2
-    looks = {name: dots_look(k, paint) for k, (name, paint) in enumerate(paints.items())}
+    # Every second name is hollow.
+    looks = {
+        name: dot_look(k, paint, 0.8, "white" if k % 2 else paint)
+        for k, (name, paint) in enumerate(paints.items())
+    }
     handles: dict[str, Any] = {shortened(n): Line2D([], [], **how) for n, how in looks.items()}
     if any(np.isfinite(plot.floor).any() for plot in plots):
         handles["floor of the reference"] = Line2D([], [], color="black", linewidth=1.2)
@@ -305,16 +277,9 @@ def dot_figure(
     return figure
 
 
-def dots_look(k: int, paint: str) -> dict[str, Any]:
-    """Look of a row's dots: every second one is hollow."""
-    hollow = {"markerfacecolor": "white"} if k % 2 else {}
-    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markeredgewidth": 0.8}
-    return {"color": paint, "linestyle": "none", **shape, **hollow}
-
-
-def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, dict[str, Any]]) -> None:
+def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, Look]) -> None:
     """The dots of one log, side by side at each joint, and the floor below them."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
     places = np.arange(len(plot.joints), dtype=np.float64)
     step = SPREAD / max(len(plot.rows), 1)
@@ -342,7 +307,7 @@ def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, dict[str, Any]]) 
     if shown.size and shown.min() > 0.0 and shown.max() > RANGE * shown.min():
         axes.set_yscale("log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-        axes.yaxis.set_major_formatter(FuncFormatter(plain))
+        axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
         axes.yaxis.set_minor_formatter(NullFormatter())
     else:
         axes.set_ylim(bottom=0.0)

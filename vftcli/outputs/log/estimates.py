@@ -14,10 +14,9 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.examination import overridden_lines
-from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.run_record import run_record, seal
-from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed, needed

@@ -12,6 +12,7 @@ from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Tuned, tuning_curves
+from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import (
     NARROW,
@@ -23,7 +24,6 @@ from vftcli.outputs.figures.plots import (
 )
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.log.rmse_tables import block, logs_of
-from vftcli.outputs.page.charts import INK, Chart, ChartLine, lines_of_names
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
@@ -34,7 +34,6 @@ from vftcli.outputs.page.log_charts import (
     tuning_chart,
     wrench_chart,
 )
-from vftcli.outputs.palette import colours_of_names
 from vftcli.robots.writing import lines_of
 
 if TYPE_CHECKING:

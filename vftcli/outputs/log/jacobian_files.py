@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.evaluation.logged_jacobian import JacobianJudgement
-from vftcli.outputs.files import OutputFolder, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.log.report import ERROR_TABLES, put_errors
 from vftcli.outputs.log.run_record import CONVENTIONS, seal, versions
-from vftcli.outputs.seals import SEAL
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.shown import per_joint

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
-from vftcli.outputs.files import OutputFolder, numbered
+from vftcli.outputs.files import SEAL, OutputFolder, numbered
 from vftcli.outputs.log import tables
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
@@ -18,7 +18,6 @@ from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures
 from vftcli.outputs.log.rmse_tables import PaperBounds, paper_bounds
 from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
 from vftcli.outputs.page.pages import render, render_index
-from vftcli.outputs.seals import SEAL
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
 

@@ -3,30 +3,27 @@
 Entities: `/tau_ext/J1` … (the reference, then every observer), `/residual/J1` … (every estimate
 minus the reference), `/drive_torque`, `/q` and `/dq` (one line a joint), `/wrench/fx` … where
 wrenches are known, as in the page's charts; `/robot` with the arm, and the force on it where no
-contacts are listed; those of `contact_recording` where they are.
+contacts are listed. Where they are: `/force` with |F|, its band and the spans of the contacts,
+`/force/points` with the peaks, `/contacts/1` … with the arrow and the words of each contact,
+`/remarks` with what limits the list.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.table import BEST
+from vftcli.outputs.answer import beginning
+from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.log.choice import FULL, LEVELS
-from vftcli.outputs.log.contact_recording import (
-    contact_log,
-    flange_force,
-    force_plot,
-    painted_links,
-    send_contacts,
-)
 from vftcli.outputs.log.rmse_tables import DAGGER, paper_bounds
 from vftcli.outputs.log.run_record import CONVENTIONS, all_remarks
 from vftcli.outputs.log.tables import to_markdown
-from vftcli.outputs.page.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import (
     condition_charts,
     estimate_lines,
@@ -34,20 +31,24 @@ from vftcli.outputs.page.log_charts import (
     torque_chart,
     wrench_chart,
 )
-from vftcli.outputs.palette import SPARE
+from vftcli.outputs.quantity import at_least_shown
 from vftcli.outputs.rerun_arm import (
+    CONTACTS,
     NEWTON_PER_METRE,
     ArmPoses,
     arrow_scale,
     motion,
+    painted_links,
     send_arm,
+    send_contacts,
     send_force,
 )
-from vftcli.outputs.rerun_file import EDGES, Tab, rerun_file, thinned
+from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thinned
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.progress import steps
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.remarks import sentence
+from vftcli.signals.wrench import COVERS, ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 
@@ -56,49 +57,47 @@ STRETCHES = 5000
 AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
 WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
 DOUBT = " (the joint rests: do not trust the reference)"  #: What a dagger says in a plot's title.
+BELOW = 0.06  #: The spans of the contacts lie below zero by this share of the largest force.
+BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 
 
 def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     """Write the recording with its blueprint, so that it opens arranged."""
     arm, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
     tabs = tabs_of(analysis, detail)
+    words, marked, arrow = {"Summary": summary(analysis)}, None, None
+    if errors is not None and (table := to_markdown(errors, paper_bounds([analysis]))):
+        words["Errors"] = table
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))
-    table = to_markdown(errors, paper_bounds([analysis])) if errors is not None else ""
-    words = {"Summary": summary(analysis)} | ({"Errors": table} if table else {})
+        marked = next(((c.start, c.stop) for c in found.contacts), None)
     poses = motion(arm, analysis.t, analysis.recording.q)
     sampled = np.searchsorted(analysis.t, poses.t)
-    scale = newton_per_metre(analysis)
+    if found is None or best_wrench(analysis) is not None:
+        arrow = force_arrow(analysis, poses, sampled)
+    scale, name = newton_per_metre(analysis), analysis.recording.name
     space = f"Arm (arrow: 1 m is {scale:g} N)"
-    first = found.contacts[0] if found is not None and found.contacts else None
-    marked = (first.start, first.stop) if first is not None else None
-    name = analysis.recording.name
     with rerun_file(path, name, tabs, words, poses, space, marked) as stream:
-        send_arm(stream, arm, poses, painted_links(found, arm.joints) if found is not None else {})
+        send_arm(stream, arm, poses, {} if found is None else painted_links(found, arm.joints))
         if found is not None:
-            force = flange_force(analysis, poses.q, sampled, arm)
+            force = None if arrow is None else arrow.force
             send_contacts(stream, found, poses, force, scale)
-        elif (arrow := force_arrow(analysis, poses, sampled)) is not None:
+        elif arrow is not None:
             send_force(stream, "/robot/flange_force", poses.t, arrow.origin, arrow.force)
 
 
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
-    whole, tabs = whole_spans(analysis), []
+    found = analysis.contacts.contacts if analysis.contacts is not None else ()
+    strongest = sorted(found, key=lambda c: -(c.peak_force or 0.0))[
+        : int(0.5 * WHOLE_TIME / AROUND)
+    ]
+    whole, tabs = [(c.start - AROUND, c.start + AROUND) for c in strongest], []
     for name, group in steps(list(plot_groups(analysis).items())):
         # One plot after the other: of a long log all of them have no room at once.
         shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
         tabs.append(Tab(name, list(shown)))
     return tabs
-
-
-def whole_spans(analysis: Analysis) -> list[tuple[float, float]]:
-    """Times with every sample: around the strongest contacts' starts. [s]"""
-    if analysis.contacts is None:
-        return []
-    strongest = sorted(analysis.contacts.contacts, key=lambda c: -(c.peak_force or 0.0))
-    most = int(WHOLE_TIME / (2.0 * AROUND))
-    return [(c.start - AROUND, c.start + AROUND) for c in strongest[:most]]
 
 
 def newton_per_metre(analysis: Analysis) -> float:
@@ -167,6 +166,70 @@ def wrench_plots(analysis: Analysis, wrench: Chart) -> Iterator[Chart]:
             yield plot._replace(series=(*plot.series, masked))
 
 
+def best_wrench(analysis: Analysis) -> Wrench | None:
+    """The wrench of `best`, None where there is none."""
+    return next((w for w in analysis.wrenches if w.name == BEST), None)
+
+
+def force_plot(analysis: Analysis) -> Chart | None:
+    """|F| with its 95 % band, the spans of the contacts below it, their peaks as points.
+
+    None where no wrench of `best` is known, as of an arm of less than six joints.
+    """
+    wrench, found, sensed = best_wrench(analysis), analysis.contacts, analysis.virtual_sensor
+    if wrench is None:
+        return None
+    size, sd = wrench.size[:, None], wrench.size_sd
+    lines = []
+    if sensed is not None and sensed.reference is not None:
+        lines.append(ChartLine("reference", sensed.reference.size[:, None], REFERENCE))
+    lines.append(ChartLine("|F|", size, COLOURS[BEST], leads=True))
+    if sd is not None:
+        half = COVERS * sd[:, None]
+        edges = zip(EDGES, (size + half, np.maximum(size - half, 0.0)), strict=True)
+        lines += [ChartLine(name, edge, BAND) for name, edge in edges]
+    title = "|F| on the robot"
+    if found is not None:
+        title += " as at the flange, 95 % band; bars: touched; diamonds: peaks by place"
+        if (least := found.detectable_force) is not None:
+            lines.append(ChartLine("smallest that is listed", np.full_like(size, least), SPARE[7]))
+            title += f"; green: {at_least_shown(least)}, the smallest that is listed"
+        # The peak of every contact with a force; a load has a mean and no peak.
+        felt = [c for c in found.contacts if c.peak_force is not None and not c.is_load]
+        force = np.array([c.peak_force for c in felt], dtype=float)
+        tallest = np.nanmax(np.concatenate([size[:, 0], [1.0], force]))
+        lines += span_lines(analysis.t, found, -BELOW * float(tallest))
+        if felt:
+            when = np.array([c.peak for c in felt])
+            lines.append(ChartLine("peaks", force[:, None], COLOURS[BEST], x=when))
+    return Chart("/force", title, ("N",), (title,), analysis.t, tuple(lines))
+
+
+def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine]:
+    """A bar a contact at one level, a line a part of the arm, so that the legend names them."""
+    for where, colour in PLACES.items():
+        bar = np.full((len(t), 1), np.nan)
+        for contact in found.contacts:
+            if contact.where == where:
+                bar[(t >= contact.start) & (t <= contact.stop)] = level
+        if np.isfinite(bar).any():
+            yield ChartLine(f"{BAR}{where}", bar, colour)
+
+
+def contact_log(found: ContactList) -> list[LogLine]:
+    """Start of each contact, its facts, and limits of the list."""
+    lines = []
+    for contact in found.contacts:
+        path, colour = f"{CONTACTS}/{contact.number}", PLACES[contact.where]
+        lines.append(LogLine(path, contact.start, beginning(contact), colour))
+    for remark in found.remarks:
+        begins = remark.where.span[0] if remark.where.span is not None else 0.0
+        lines.append(LogLine("/remarks", begins, sentence(remark), GREY, "WARN"))
+    if not found.contacts:
+        lines.append(LogLine("/remarks", 0.0, "nothing touched the arm, as far as known", GREY))
+    return lines
+
+
 def motion_plots(analysis: Analysis) -> Iterator[Chart]:
     """Positions, velocities and drive torques, one line a joint."""
     recording = analysis.recording
@@ -194,12 +257,12 @@ def summary(analysis: Analysis) -> str:
         f"format {source.format}.",
         "",
         *(f"- **{name}**: {escape_markdown(text)}" for name, text in CONVENTIONS.items()),
+        f"- **arrow**: {arrow_words(analysis)}",
+        *("", "## Notes"),
+        *(f"- {escape_markdown(str(n))}" for n in (*source.remarks, *all_remarks(analysis))),
+        *("", f"Log sha256 {source.sha256 or 'unknown'}", ""),
     ]
-    lines.append(f"- **arrow**: {arrow_words(analysis)}")
-    remarks = [*source.remarks, *all_remarks(analysis)]
-    lines += ["", "## Notes", *(f"- {escape_markdown(str(note))}" for note in remarks)]
-    lines += ["", f"Log sha256 {source.sha256 or 'unknown'}"]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines)
 
 
 def arrow_words(analysis: Analysis) -> str:
@@ -211,7 +274,7 @@ def arrow_words(analysis: Analysis) -> str:
             f"link that the list names, which has its colour then; {scale}. On the wrist it is the "
             "force as it runs, elsewhere that of the contact's peak"
         )
-    source = force_source(analysis.estimates)
+    source = force_source(analysis)
     name = source.name if source is not None else "no estimate"
     return (
         f"force on the robot from {name}, as in the tables of the wrench where one was asked for, "
@@ -219,14 +282,14 @@ def arrow_words(analysis: Analysis) -> str:
     )
 
 
-def force_source(estimates: Sequence[ExternalTorque]) -> ExternalTorque | None:
+def force_source(analysis: Analysis) -> ExternalTorque | None:
     """The estimate the force arrow is made from: `best`, else a Kalman filter's, else the first."""
-    ranks = [
-        [estimate for estimate in estimates if estimate.name == BEST],
-        [estimate for estimate in estimates if estimate.name.startswith("kfo")],
-        estimates,
-    ]
-    return next((estimate for rank in ranks for estimate in rank), None)
+
+    def rank(estimate: ExternalTorque) -> tuple[bool, bool]:
+        """The least comes first."""
+        return estimate.name != BEST, not estimate.name.startswith("kfo")
+
+    return min(analysis.estimates, key=rank, default=None)
 
 
 def force_arrow(
@@ -238,7 +301,7 @@ def force_arrow(
     was asked for, that of the estimate as it stands, at the flange. The drawn poses are those of
     the log's samples `sampled`. (S,)
     """
-    source, chain = force_source(analysis.estimates), analysis.robot.chain
+    source, chain = force_source(analysis), analysis.robot.chain
     if source is None or chain.joints < 6:
         return None
     if analysis.virtual_sensor is not None:

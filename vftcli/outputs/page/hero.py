@@ -7,8 +7,9 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.outputs.charts import Span, thinned
 from vftcli.outputs.contacts import by_force
-from vftcli.outputs.page.svg import Box, Scales, Span, path_of, ribbon, thinned
+from vftcli.outputs.page.shell import Box, Scales, path_of, ribbon
 from vftcli.outputs.quantity import banded
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array

@@ -8,17 +8,17 @@ from vftcli.analysis import Analysis
 from vftcli.observers.auto_tuning import Curve
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
-from vftcli.outputs.log.rmse_tables import blocks
-from vftcli.outputs.page.charts import (
+from vftcli.outputs.charts import (
     REFERENCE,
     Chart,
     ChartLine,
     LineStyle,
     families_of,
-    observer_lines,
+    lines_of_names,
 )
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.wrench import AXES, COVERS, Wrench, unit_of
+from vftcli.outputs.log.rmse_tables import blocks
+from vftcli.signals.arrays import Array
+from vftcli.signals.wrench import AXES, COVERS, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
 #: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest
@@ -48,6 +48,11 @@ def torque_chart(analysis: Analysis) -> Chart:
     )
 
 
+def observer_styles(analysis: Analysis) -> dict[str, LineStyle]:
+    """Colour and dash of every observer."""
+    return lines_of_names([estimate.name for estimate in analysis.estimates])
+
+
 def contact_spans(analysis: Analysis) -> tuple[tuple[float, float], ...]:
     """When something touched the arm. [s]"""
     found = analysis.contacts.contacts if analysis.contacts is not None else ()
@@ -59,14 +64,10 @@ def lines_of(
 ) -> list[ChartLine]:
     """A line an observer; one is drawn at once, `best` where it ran, with its 95 % band.
 
-    Beside `best` no other bears a band: five would hide one another.
-
-    Args:
-        analysis: What gives every observer its colour.
-        found: Name, values and their standard deviation of every observer. (T, n)
-        alike: Whether every line bears its band where `best` did not run.
+    Beside `best` no other bears a band: five would hide one another; where it did not run every
+    line does, if they are `alike`. Given are name, values and standard deviation. (T, n)
     """
-    styles = observer_lines(analysis.estimates)
+    styles = observer_styles(analysis)
     names = [name for name, *_ in found]
     first = BEST if BEST in names else next(iter(names), "")
     banded = set(names) if alike and first != BEST else {first}
@@ -118,8 +119,8 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     """
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
-    styles = observer_lines(analysis.estimates)
-    columns: dict[str, list[ChartLine]] = {"gain": [], "phase": [], "delay": []}
+    styles = observer_styles(analysis)
+    columns: tuple[list[ChartLine], ...] = ([], [], [])
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)[:, :1]
         # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
@@ -127,15 +128,14 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
         # A phase of −φ degrees at f is a delay of φ / (360 f).
         delay = -1e3 * phase / (360.0 * frequency[:, None])
-        for key, values in (("gain", decibel), ("phase", phase), ("delay", delay)):
-            columns[key].append(ChartLine(observer.name, values, *styles[observer.name]))
+        for column, values in zip(columns, (decibel, phase, delay), strict=True):
+            column.append(ChartLine(observer.name, values, *styles[observer.name]))
+    heads = (("Gain", "dB"), ("Phase", "°"), ("Delay", "ms"))
     gain, *others = (
         over_frequency(title.lower(), title, unit, frequency, lines)._replace(
             panels=(f"{title}, joint 1",)
         )
-        for title, unit, lines in zip(
-            ("Gain", "Phase", "Delay"), ("dB", "°", "ms"), columns.values(), strict=True
-        )
+        for (title, unit), lines in zip(heads, columns, strict=True)
     )
     return gain._replace(lowest=LOWEST), *others
 
@@ -158,10 +158,13 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     if not found:
         return None
     each = [(wrench.name, wrench.known, wrench.sd) for wrench in found]
-    lines = [
-        line._replace(quiet=quiet_samples(analysis, line.name))
-        for line in lines_of(analysis, each, alike=False)
-    ]
+    lines = lines_of(analysis, each, alike=False)
+    sensed = analysis.virtual_sensor
+    for k, line in enumerate(lines):
+        smoothed = None if sensed is None else sensed.smoothed.get(line.name)
+        if smoothed is not None and smoothed.gate:
+            # Samples outside of every listed contact.
+            lines[k] = line._replace(quiet=smoothed.unlisted(analysis.t))
     reference = [w for w in analysis.wrenches if w.name == "reference"]
     below = [ChartLine(legend_name(analysis, w.name), w.known, REFERENCE) for w in reference]
     return Chart(
@@ -176,13 +179,6 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
     )
 
 
-def quiet_samples(analysis: Analysis, name: str) -> Mask | None:
-    """Samples of a wrench outside of every listed contact, None where it asks no list. (T,)"""
-    sensed = analysis.virtual_sensor
-    found = None if sensed is None else sensed.smoothed.get(name)
-    return found.unlisted(analysis.t) if found is not None and found.gate else None
-
-
 def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     """σ_min with the masked zone, what the solver says there, and the null-space channel."""
     sensed = analysis.virtual_sensor
@@ -190,7 +186,7 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         return
     # σ_min and the mask follow from the pose: all observers share them.
     first, least = sensed.wrenches[0], sensed.sensor.least_sigma
-    styles = observer_lines(analysis.estimates)
+    styles = observer_styles(analysis)
 
     def chart(key: str, title: str, unit: str, lines: Sequence[ChartLine]) -> Chart:
         """A chart of one panel."""
@@ -203,8 +199,15 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         )
     if sensed.hides:
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
-        blown = [w for w in sensed.wrenches if w.hidden.any()]
-        lines = [ChartLine(w.name, masked_force(w), *styles[w.name]) for w in blown]
+        lines = [
+            ChartLine(
+                w.name,
+                np.where(w.hidden, np.linalg.norm(w.values[:, :3], axis=1), np.nan)[:, None],
+                *styles[w.name],
+            )
+            for w in sensed.wrenches
+            if w.hidden.any()
+        ]
         yield chart("blow-up", title, "N", lines)
     if first.null_space is not None:
         lines = [
@@ -219,19 +222,13 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
         )
 
 
-def masked_force(wrench: Wrench) -> Array:
-    """Norm of the force in masked samples, NaN elsewhere. (T, 1) [N]"""
-    norm = np.linalg.norm(wrench.values[:, :3], axis=1)
-    return np.where(wrench.hidden, norm, np.nan)[:, None]
-
-
 def refined_charts(analysis: Analysis) -> list[Chart]:
     """Spectra and tuning of a complete log, as far as there are any."""
     found, charts = analysis.refinement, list[Chart]()
     if found is not None and (spectra := found.baselines.plain.spectra) is not None:
         charts.append(spectra_chart(spectra))
     if found is not None and found.curves:
-        charts.append(tuning_chart(found.curves, observer_lines(analysis.estimates)))
+        charts.append(tuning_chart(found.curves, observer_styles(analysis)))
     return charts
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import JointMeans
-from vftcli.outputs.answer import hardest_words, headline, otherwise
-from vftcli.outputs.believability import MARKS, LogSummary, grounds, log_line
+from vftcli.outputs.answer import hardest_words, otherwise
+from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
+from vftcli.outputs.charts import Chart
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Column, Grid, GridCell
@@ -26,7 +27,6 @@ from vftcli.outputs.log.rmse_tables import (
 )
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import details, log_charts
-from vftcli.outputs.page.charts import Chart, observer_lines
 from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
 from vftcli.outputs.page.shell import page, part
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
@@ -74,7 +74,7 @@ def render(analysis: Analysis) -> str:
         "report.html",
         f"{answer} – {analysis.recording.name}",
         [chart for chart in (torque, wrench) if chart is not None],
-        observer_lines(analysis.estimates),
+        log_charts.observer_styles(analysis),
         analysis=analysis,
         found=found,
         headline=answer,

@@ -1,29 +1,44 @@
-"""The templates of every page, their parts as functions, and what the page's script is given."""
+"""The templates of every page, their parts as functions, and what page and script draw.
 
+Charts that stand still are SVG: here is where values lie, with ticks and the text of paths.
+"""
+
+import base64
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from vftcli.doctor import in_words
 from vftcli.outputs.answer import direction, force_size, place_words, reason
+from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line
 from vftcli.outputs.examination import overridden_lines, warnings_of
-from vftcli.outputs.page import svg
-from vftcli.outputs.page.charts import QUIET, Chart, LineStyle, packed_charts
-from vftcli.outputs.quantity import at_least_shown, counted, ranged
+from vftcli.outputs.quantity import at_least_shown, counted, minus, ranged
+from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, explanation
+from vftcli.signals.series import runs_of
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
 HERE = Path(__file__).parent
 LEVELS = ("warning", "caution", "fact")  #: Levels of a remark, the most serious first.
+TICKS = 1.0, 2.0, 5.0, 10.0  #: What a tick's distance may begin with.
+TICK_ROOM = 1.4  #: How much smaller than wanted a tick's distance may be.
+#: Bytes that the large charts of a page may take; a long log's may take more, up to this factor.
+ROOM, LONG = 350_000, 4.0
+#: Stretches a long log is cut into, two samples each, however many lines there are.
+FEWEST, MOST = 250, 2000
+#: Bytes of a stretch of a line: two samples of a float32 and an int16 as base64.
+POINT = 2 * (4 + 2) * 4 / 3
+#: Steps between a line's lowest and highest value, finer than any screen; the number for NaN.
+STEPS, UNKNOWN = 65534, -32768
 
 
 @cache
@@ -36,6 +51,15 @@ def templates() -> "Environment":
         """A value as HTML."""
         return value if hasattr(value, "__html__") else Markup(escape(printable(str(value))))
 
+    def asset(name: str) -> Markup:
+        """The text of a style sheet or script that comes with the package."""
+        return Markup((HERE / name).read_text(encoding="utf-8"))
+
+    def worst_first(remarks: Iterable[Remark]) -> list[str]:
+        """The words of every remark once, the most serious first."""
+        texts = {explanation(remark): LEVELS.index(remark.level) for remark in remarks}
+        return sorted(texts, key=lambda text: texts[text])
+
     made = Environment(
         loader=FileSystemLoader(HERE / "templates"),
         autoescape=True,
@@ -44,39 +68,18 @@ def templates() -> "Environment":
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.globals |= {
-        "asset": lambda name: Markup(asset(name)),
-        "is_plain": re.compile(r"[\w.,=× -]+").fullmatch,
-        "QUIET": QUIET,
-    }
-    functions = (
-        overridden_lines,
-        in_words,
-        direction,
-        force_size,
-        place_words,
-        ranged,
-        reason,
-        at_least_shown,
-    )
-    drawing = (svg.ticks, svg.decades, svg.label, svg.scales_of, svg.stripes, svg.strokes)
-    made.globals |= {each.__name__: each for each in (*functions, svg.polyline, *drawing)}
+    drawing = (ticks, decades, label, scales_of, stripes, strokes, polyline)
+    words = (overridden_lines, in_words, direction, force_size, place_words, ranged, reason)
+    functions = (*drawing, *words, at_least_shown, asset)
+    made.globals |= {each.__name__: each for each in functions}
+    made.globals |= {"is_plain": re.compile(r"[\w.,=× -]+").fullmatch, "QUIET": QUIET}
+    made.filters |= {each.__name__: each for each in (counted, polyline, warnings_of, worst_first)}
     made.filters |= {
-        "counted": counted,
         "f1": "{:.1f}".format,
         "known": np.isfinite,
-        "polyline": svg.polyline,
         "said": lambda line: explanation(line) if isinstance(line, Remark) else line,
-        "warnings_of": warnings_of,
-        "worst_first": worst_first,
     }
     return made
-
-
-def worst_first(remarks: Iterable[Remark]) -> list[str]:
-    """The words of every remark once, the most serious first."""
-    texts = {explanation(remark): LEVELS.index(remark.level) for remark in remarks}
-    return sorted(texts, key=lambda text: texts[text])
 
 
 def part(name: str, /, *values: object, **named: object) -> str:
@@ -100,13 +103,198 @@ def page(
     return templates().get_template(template).render(**frame, **view) + "\n"
 
 
-def asset(name: str) -> str:
-    """The text of a style sheet or script that comes with the package."""
-    return (HERE / name).read_text(encoding="utf-8")
-
-
 def script_json(data: object) -> str:
     """JSON for a ``<script type="application/json">``: nothing in it can end the element."""
     # "<" could begin "</script>"; the two separators end a line in JavaScript but not in JSON.
     text = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace("\u2028", " ").replace("\u2029", " ")
+
+
+def packed_charts(charts: Sequence[Chart]) -> list[dict[str, Any]]:
+    """Charts over time as the script takes them, all together within the page's room."""
+    lines = sum(
+        len(c.panels) * (1 + (s.half is not None) + (s.quiet is not None))
+        for c in charts
+        for s in c.series
+    )
+    duration = max((float(c.x[-1] - c.x[0]) for c in charts), default=0.0)
+    room = ROOM * float(np.clip(duration / 60.0, 1.0, LONG))
+    stretches = int(np.clip(room / (POINT * max(lines, 1)), FEWEST, MOST))
+    return [packed(chart, stretches) for chart in charts]
+
+
+def packed(chart: Chart, stretches: int) -> dict[str, Any]:
+    """A chart over time as JSON can hold it."""
+    band = None
+    # JSON has no NaN; a band of unknowns only is no band.
+    if chart.band is not None and np.isfinite(chart.band).any():
+        band = [float(value) if np.isfinite(value) else None for value in chart.band]
+    return {
+        "key": chart.key,
+        "title": chart.title,
+        "units": chart.units,
+        "panels": chart.panels,
+        "unit": chart.unit,
+        "band": band,
+        "bandLabel": chart.band_label,
+        "spans": chart.spans,
+        "series": [
+            {
+                "name": line.name,
+                "colour": line.colour,
+                "dash": [float(part) for part in line.dash.split()],
+                "leads": line.leads,
+                "shown": line.shown,
+                "lines": [packed_line(chart, line, j, stretches) for j in range(len(chart.panels))],
+            }
+            for line in chart.series
+        ],
+    }
+
+
+def packed_line(chart: Chart, line: ChartLine, panel: int, stretches: int) -> dict[str, Any]:
+    """A line's points in a panel: of every stretch its lowest and its highest sample."""
+    t, y, halves = drawn_line(chart, line, panel, stretches)
+    names = ("half",) if line.quiet is None else ("half", "quiet")
+    ribbons = {name: quantised(half) for name, half in zip(names, halves, strict=False)}
+    return {"x": base64_of(t, "<f4"), "y": quantised(y), **ribbons}
+
+
+def quantised(values: Array) -> dict[str, Any]:
+    """Values in `STEPS` steps between the lowest and the highest, as base64 int16."""
+    finite = values[np.isfinite(values)]
+    low = float(finite.min()) if finite.size else 0.0
+    step = (float(finite.max()) - low) / STEPS if finite.size else 0.0
+    # A constant line has no steps; any will do.
+    step = step or 1.0
+    numbers = np.where(np.isfinite(values), np.round((values - low) / step) - STEPS // 2, UNKNOWN)
+    return {"low": low, "step": step, "points": base64_of(numbers, "<i2")}
+
+
+def base64_of(values: Array, kind: str) -> str:
+    """Numbers of a kind as base64: as text they would be three times as long."""
+    return base64.b64encode(np.asarray(values).astype(kind).tobytes()).decode("ascii")
+
+
+class Box(NamedTuple):
+    """A chart's size and the room around its plot, in the units of the drawing."""
+
+    width: float = 300.0  #: Whole width.
+    height: float = 130.0  #: Whole height.
+    left: float = 38.0  #: Room for the numbers beside the vertical axis.
+    bottom: float = 18.0  #: Room for the numbers below.
+    top: float = 8.0  #: Room above.
+    right: float = 8.0  #: Room to the right.
+
+
+class Scales(NamedTuple):
+    """From values to places in the drawing."""
+
+    box: Box  #: The chart.
+    x: Span  #: Ends of the horizontal axis.
+    y: Span  #: Ends of the vertical axis.
+    log: bool = False  #: Whether the horizontal axis is logarithmic.
+
+    def across(self, x: Array | float) -> Array:
+        """Horizontal places."""
+        low, high = np.log(self.x) if self.log else self.x
+        share = ((np.log(x) if self.log else np.asarray(x)) - low) / ((high - low) or 1.0)
+        places: Array = self.box.left + share * (self.side - self.box.left)
+        return places
+
+    def up(self, y: Array | float) -> Array:
+        """Vertical places, which count downwards."""
+        share = (np.asarray(y) - self.y.low) / ((self.y.high - self.y.low) or 1.0)
+        places: Array = self.floor - share * (self.floor - self.box.top)
+        return places
+
+    def near(self, y: Array) -> Array:
+        """Vertical places; what lies far outside of the chart is drawn just outside of it."""
+        height = self.y.high - self.y.low
+        return self.up(np.clip(y, self.y.low - height, self.y.high + height))
+
+    def inside(self, span: Sequence[float]) -> Array:
+        """Horizontal places of times, those outside of the chart at its edge."""
+        return self.across(np.clip(span, *self.x))
+
+    @property
+    def floor(self) -> float:
+        """Lower end of the plot."""
+        return self.box.height - self.box.bottom
+
+    @property
+    def side(self) -> float:
+        """Right end of the plot."""
+        return self.box.width - self.box.right
+
+
+def ticks(span: Span, count: int) -> list[float]:
+    """Round numbers along an axis, about as many as wanted."""
+    width = (span.high - span.low) / max(count, 1)
+    if not np.isfinite(width) or width <= 0.0:
+        return [span.low]
+    power = 10.0 ** np.floor(np.log10(width))
+    # A few more numbers than wanted are better than too few.
+    step = next(s for s in TICKS if width <= TICK_ROOM * s * power) * power
+    first, last = np.ceil(span.low / step - 1e-9), np.floor(span.high / step + 1e-9)
+    found = [float(k * step) for k in np.arange(first, last + 1)]
+    # One number or two leave the scale unsaid.
+    return found if len(found) >= min(count, 3) else ticks(span, count + 2)
+
+
+def decades(span: Span) -> list[float]:
+    """Powers of ten along a logarithmic axis."""
+    first, last = np.ceil(np.log10(span.low) - 1e-9), np.floor(np.log10(span.high) + 1e-9)
+    return [float(10.0**k) for k in np.arange(first, last + 1)]
+
+
+def label(value: float) -> str:
+    """A tick's number without an exponent where one can do without."""
+    return minus(f"{value + 0.0:.6g}")
+
+
+def scales_of(chart: Chart) -> Iterator[Scales]:
+    """The scales of every panel's small picture."""
+    families = chart.families or (0,) * len(chart.panels)
+    ends = {family: chart.ends(families.index(family)) for family in set(families)}
+    x = Span(float(chart.x[0]), float(chart.x[-1]))
+    return (Scales(Box(), x, ends[family], chart.log) for family in families)
+
+
+def strokes(scales: Scales, chart: Chart, line: ChartLine, panel: int) -> tuple[str, str, str]:
+    """A line's paths in a panel: its ribbon, the ribbon's grey part, and itself; "" for none."""
+    t, y, halves = drawn_line(chart, line, panel)
+    own, quiet = (ribbon(scales, t, y - half, y + half) for half in halves) if halves else ("", "")
+    return own, quiet, path_of(scales, t, y)
+
+
+def path_of(scales: Scales, t: Array, y: Array) -> str:
+    """A line as the text of an SVG path, broken where a value is not known."""
+    x, z = scales.across(t), scales.near(y)
+    runs, points = runs_of(np.isfinite(z) & np.isfinite(x)), np.column_stack([x, z])
+    return "".join(polyline(points[start:stop]) for start, stop in runs)
+
+
+def polyline(points: Array) -> str:
+    """Points as the text of an SVG path; a single one is a dot. (K, 2)"""
+    text = "M" + " ".join(f"{x:.1f} {y:.1f}" for x, y in points)
+    return text + ("h.01" if len(points) == 1 else "")
+
+
+def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
+    """What lies between two lines as a path, broken where either is not known."""
+    x, path = scales.across(t), ""
+    above, below = (np.column_stack([x, scales.near(edge)]) for edge in (high, low))
+    for start, stop in runs_of(np.isfinite(low) & np.isfinite(high)):
+        outline = np.vstack([above[start:stop], below[start:stop][::-1]])
+        path += f"{polyline(outline)}Z"
+    return path
+
+
+def stripes(scales: Scales, spans: Sequence[tuple[float, float]]) -> str:
+    """Many stretches of time from top to floor as one path."""
+    height, path = scales.floor - scales.box.top, ""
+    for left, right in (scales.across(np.asarray(span)) for span in spans):
+        width = max(right - left, 0.5)
+        path += f"M{left:.1f} {scales.box.top:g}h{width:.1f}v{height:g}h{-width:.1f}z"
+    return path

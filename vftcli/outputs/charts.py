@@ -1,0 +1,238 @@
+"""Charts: what page, recording and figures for papers draw, in which colours, at which samples.
+
+Every chart is drawn as SVG (`page/shell.py`), one small picture a joint or axis, for print and for
+readers without a script; with a script the plotting library draws the chosen one large beside them.
+Of a long log the lowest and the highest sample of every stretch stay.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.series import gaps_of
+
+#: Okabe and Ito's hues, in tones that stand out from white and from black paper alike.
+COLOURS = {
+    "best": "#d3224b",
+    "fdo": "#2f86d0",
+    "gmo": "#dd6415",
+    "kfo-fe": "#0c9f76",
+    "kfo-zoh": "#c95fa4",
+    "kfo-rts": "#b98900",
+    "kfo-auto": "#7a6fd6",
+    "rts-auto": "#a0522d",
+}
+#: For estimates that have no colour of their own, in turn.
+SPARE = ("#2f86d0", "#dd6415", "#0c9f76", "#c95fa4", "#b98900", "#7a6fd6", "#a0522d", "#5b8c00")
+#: Colours that follow the page: its text's, and the reference's.
+INK, REFERENCE = "ink", "reference"
+GREY = "#8a929a"  #: Both on an unknown background.
+#: The part of the arm that was touched, in words → its colour.
+PLACES = {
+    "wrist": "#dd6415",
+    "forearm": "#2f86d0",
+    "upper arm": "#c95fa4",
+    "cannot tell": "#c8a200",
+}
+#: Dashes of lines, the first without gaps: colour alone distinguishes none.
+DASHES = ("", "7 3", "2 2.5", "9 3 2 3", "4 2", "1.5 3.5", "12 3")
+QUIET = "95 % band, no contact listed"  #: What a grey ribbon is called.
+GAP_STEPS = 10.0  #: A step this many times the median is drawn as a break in the line.
+STRETCHES = 250  #: Stretches of a line in a small chart: two samples a stretch, about one a pixel.
+
+LineStyle = tuple[str, str]  #: Colour and dash of a line.
+Index = NDArray[np.intp]
+
+
+class ChartLine(NamedTuple):
+    """One line of a chart, for every panel."""
+
+    name: str  #: What the legend calls it.
+    values: Array  #: One column a panel. (T, n)
+    colour: str = INK  #: ``#rrggbb``, `INK` or `REFERENCE`.
+    dash: str = ""  #: How it is broken, as SVG says it; "" for a line without gaps.
+    #: Half the width of a ribbon about the line, NaN where it is not known. (T, n)
+    half: Array | None = None
+    leads: bool = False  #: Whether it is the line to look at: drawn thicker.
+    shown: bool = True  #: Whether it is drawn at once, rather than when asked for.
+    x: Array | None = None  #: Its own horizontal places, None for the chart's. (T,)
+    #: Where the ribbon is grey: no contact is listed there, so that it says what would show. None
+    #: for nowhere. (T,)
+    quiet: Mask | None = None
+
+
+class Span(NamedTuple):
+    """Both ends of an axis."""
+
+    low: float
+    high: float
+
+
+class Chart(NamedTuple):
+    """A picture for every joint or axis."""
+
+    key: str  #: Its name on the page.
+    title: str  #: What it shows, in words.
+    units: tuple[str, ...]  #: Unit of each panel's vertical axis. (n,)
+    panels: tuple[str, ...]  #: Their names. (n,)
+    x: Array  #: Horizontal places. (T,)
+    series: tuple[ChartLine, ...]  #: Its lines, the last on top.
+    families: tuple[int, ...] = ()  #: Which panels share a scale: those of one number. (n,)
+    band: Array | None = None  #: Half the width of a band about zero, one a panel, or None. (n,)
+    band_label: str = ""  #: What the band is.
+    spans: Sequence[tuple[float, float]] = ()  #: Stretches that are marked, as contacts. [s]
+    unit: str = "s"  #: Unit of the horizontal axis.
+    log: bool = False  #: Whether the horizontal axis is logarithmic.
+    lowest: float | None = None  #: Least end of the vertical axis, None for what the lines need.
+
+    def ends(self, panel: int) -> Span:
+        """Ends of a panel's vertical axis, with some room: those of all panels of its family.
+
+        About ±1 where no value is known.
+        """
+        low, high = np.inf, -np.inf
+        for j in range(len(self.panels)):
+            if not self.families or self.families[j] == self.families[panel]:
+                for values in self._drawn_values(j):
+                    known = np.isfinite(values)
+                    low = min(low, float(np.min(values, where=known, initial=np.inf)))
+                    high = max(high, float(np.max(values, where=known, initial=-np.inf)))
+        # A line that does not change has no scale of its own.
+        room = 0.05 * (high - low) if high > low else abs(high) or 1.0
+        low, high = (low - room, high + room) if low <= high else (-1.0, 1.0)
+        return Span(low if self.lowest is None else max(low, self.lowest), high)
+
+    def _drawn_values(self, panel: int) -> Iterator[Array]:
+        """What is drawn at once in a panel, line by line: of a long log all have no room."""
+        for line in self.series:
+            if line.shown:
+                half = 0.0 if line.half is None else np.nan_to_num(line.half[:, panel])
+                yield line.values[:, panel] - half
+                yield line.values[:, panel] + half
+        if self.band is not None:
+            yield np.array([self.band[panel], -self.band[panel]])
+
+
+def colours_of_names(names: Sequence[str]) -> dict[str, str]:
+    """One colour for each estimate's name; two share one only if none is left."""
+    # An estimate without a colour of its own does not get one that another has.
+    own = {COLOURS[name] for name in names if name in COLOURS}
+    free = [colour for colour in SPARE if colour not in own] or list(SPARE)
+    others = [name for name in names if name not in COLOURS]
+    spare = {name: free[k % len(free)] for k, name in enumerate(others)}
+    return {name: COLOURS.get(name) or spare[name] for name in names}
+
+
+def lines_of_names(names: Sequence[str]) -> dict[str, LineStyle]:
+    """Colour and dash of every name: the first has a line without gaps."""
+    colours = colours_of_names(names).items()
+    return {name: (colour, DASHES[k % len(DASHES)]) for k, (name, colour) in enumerate(colours)}
+
+
+def families_of(limits: Array) -> tuple[int, ...]:
+    """Joints of one drive size, by their torque limits: neighbours of one limit are a family."""
+    numbers, last = [], 0
+    for j, limit in enumerate(limits):
+        same = j > 0 and (limit == limits[j - 1] or not np.isfinite([limit, limits[j - 1]]).any())
+        last += not same
+        numbers.append(last)
+    return tuple(numbers)
+
+
+def drawn_line(
+    chart: Chart, line: ChartLine, panel: int, stretches: int = STRETCHES
+) -> tuple[Array, Array, list[Array]]:
+    """A line's points in a panel, and there the half widths of its ribbon and its grey part.
+
+    Each of these two is NaN where the ribbon is the other; none without a ribbon.
+    """
+    x = chart.x if line.x is None else line.x
+    thin = thinned_log if chart.log else thinned
+    t, y = thin(x, line.values[:, panel], stretches)
+    if line.half is None:
+        return t, y, []
+    half = line.half[:, panel]
+    quiet = np.zeros(len(half), dtype=bool) if line.quiet is None else line.quiet
+    halves = np.where(quiet, np.nan, half), np.where(quiet, half, np.nan)
+    return t, y, [np.interp(t, x, each) for each in halves]
+
+
+def thinned(t: Array, values: Array, stretches: int) -> tuple[Array, Array]:
+    """A series with at most two samples a stretch, and the first and last of the log.
+
+    The lowest and highest sample of every stretch keep their own time and value, so that no spike
+    is lost and none is made. A log of at most twice as many samples is kept whole. The line breaks,
+    by a NaN, where a stretch holds no known value and where the clock has a gap.
+    """
+    gaps, index = gaps_of(t, GAP_STEPS), np.arange(len(t))
+    if len(t) > 2 * stretches:
+        extreme = [each.ravel() for each in extremes(values[:, None], stretches)]
+        # Samples beside a gap stay, or a line would be drawn up to the wrong place.
+        index = np.unique(np.concatenate([index[[0, -1]], *extreme, gaps, gaps + 1]))
+    x, y = t[index], values[index]
+    if gaps.size:
+        after = np.searchsorted(index, gaps, side="right")
+        x = np.insert(x, after, 0.5 * (t[gaps] + t[gaps + 1]))
+        y = np.insert(y, after, np.nan)
+    return x, y
+
+
+def thinned_log(x: Array, values: Array, stretches: int) -> tuple[Array, Array]:
+    """One series as drawn over a logarithmic axis: stretches of equal width there."""
+    if len(x) <= 2 * stretches:
+        return x, values
+    starts = np.unique(np.searchsorted(x, np.geomspace(x[0], x[-1], stretches)))
+    index = [0, len(x) - 1]
+    for start, stop in pairwise(starts):
+        part = values[start:stop]
+        index += [start + int(np.argmin(part)), start + int(np.argmax(part))]
+    chosen = np.unique(index)
+    return x[chosen], values[chosen]
+
+
+def level_rows(
+    t: Array, values: Array, stretches: int, whole: Sequence[tuple[float, float]] = ()
+) -> Index | None:
+    """Sample numbers of a plot with one clock for all lines, None for all. (P,)
+
+    Of every stretch the lowest and highest sample of every line stay, and the first unknown one,
+    so that no spike is lost and no gap closed; and every sample of the spans `whole` [s]. A log of
+    which that would leave out nothing is kept whole.
+    """
+    if len(t) <= 2 * values.shape[1] * stretches:
+        return None
+    kept = np.zeros(len(t), dtype=bool)
+    gaps = gaps_of(t, GAP_STEPS)
+    for rows in ([0, -1], gaps, gaps + 1, *extremes(values, stretches)):
+        kept[rows] = True
+    for column in values.T:
+        unknown = np.flatnonzero(np.isnan(column))
+        stretch = unknown // -(-len(t) // stretches)
+        kept[unknown[np.unique(stretch, return_index=True)[1]]] = True
+    for begin, end in whole:
+        kept[(t >= begin) & (t <= end)] = True
+    return np.flatnonzero(kept)
+
+
+def extremes(values: Array, stretches: int) -> tuple[Index, Index]:
+    """Sample numbers of the lowest and highest known value of every stretch. (stretches, n)"""
+    samples, n = values.shape
+    # Samples a stretch, rounded up, so that no sample is left over.
+    width = -(-samples // stretches)
+    count = -(-samples // width)
+    start = np.arange(count) * width
+    low, high = np.zeros((2, count, n), dtype=np.intp)
+    # The last stretch is filled with unknowns. One column at once: of a long log all have no room.
+    padded = np.full(count * width, np.nan)
+    for j, column in enumerate(values.T):
+        padded[:samples] = column
+        cut = padded.reshape(count, width)
+        unknown = np.isnan(cut)
+        # argmin of a stretch without a known value is its first sample, which is NaN: a break.
+        low[:, j] = np.where(unknown, np.inf, cut).argmin(axis=1) + start
+        high[:, j] = np.where(unknown, -np.inf, cut).argmax(axis=1) + start
+    return low, high
