@@ -7,13 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.outputs.files import OutputFolder, atomic, digest, numbered, write_text
+from vftcli.outputs.files import OutputFolder, atomic, digest, digests, numbered, write_text
 from vftcli.signals.errors import OutputError
-
-
-def digests(folder: Path) -> dict[str, str]:
-    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
-    return {path.relative_to(folder).as_posix(): digest(path) for path in files}
 
 
 def names(folder: Path) -> list[str]:

@@ -63,7 +63,7 @@ def write_by_jacobian(
     json: bool,
 ) -> None:
     """Write what there is of such a log, where a wrench or a reference is asked for."""
-    from vftcli.outputs.log.jacobian_files import write_jacobian_folder
+    from vftcli.outputs.log.report import write_jacobian_folder
     from vftcli.outputs.log.tables import to_terminal
 
     if choice.wrench is None and choice.reference is None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
+from vftcli.outputs.quantity import counted
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
@@ -84,12 +85,8 @@ def examination_text(examination: Examination) -> str:
     lines += [f"  repair    {repair}" for repair in source.repairs]
     lines += [f"  suspect   {warning}" for warning in source.warnings]
     for finding in map(in_words, examination.findings):
-        lines += [
-            "",
-            f"{finding.severity}: {finding.name}: {finding.evidence}.",
-            f"  {finding.consequence}.",
-            f"  {finding.remedy}.",
-        ]
+        lines += ["", f"{finding.severity}: {finding.name}: {finding.evidence}."]
+        lines += [f"  {finding.consequence}.", f"  {finding.remedy}."]
     if len(examination.findings) == len(examination.assumptions):
         lines += ["", "nothing suspicious found"]
     return "\n".join(printable(line) for line in lines)
@@ -107,14 +104,11 @@ def health_line(examination: Examination, *, named: bool = False) -> str:
     head = f"{recording.name}: log health" if named else "log health"
     if not found:
         return f"{head}: sound"
-    count = f"{len(found)} warning{'s' if len(found) > 1 else ''}"
     first, *others = found
     names = list(dict.fromkeys(in_words(other).name for other in others))
     more = f"; also {', '.join(names)}" if names else ""
-    path = recording.source.path or "LOG"
-    return printable(
-        f"{head}: {count}: {in_words(first).name}: {first}{more}; vftcli inspect {path} says more"
-    )
+    text = f"{head}: {counted(len(found), 'warning')}: {in_words(first).name}: {first}{more}"
+    return printable(f"{text}; vftcli inspect {recording.source.path or 'LOG'} says more")
 
 
 def health_record(
@@ -135,6 +129,12 @@ def health_record(
         }
         for one in examinations
     ]
+
+
+def refused_codes(examinations: Iterable[Examination]) -> list[str]:
+    """Codes of findings with which results mean little, each once."""
+    codes = (finding.code for one in examinations for finding in one.refusals())
+    return list(dict.fromkeys(codes))
 
 
 def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = True) -> list[str]:

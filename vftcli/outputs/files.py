@@ -129,10 +129,8 @@ class OutputFolder:
         put_text(self / name, text)
 
     def digests(self, place: str = "") -> dict[str, str]:
-        """The sha256 of every file written so far below `place`, by its name there, in order."""
-        top = self.temporary / place
-        files = [path for path in sorted(top.rglob("*")) if path.is_file()]
-        return {path.relative_to(top).as_posix(): digest(path) for path in files}
+        """The sha256 of every file written so far below `place`, by its name there."""
+        return digests(self.temporary / place)
 
     def check(self) -> None:
         """Refuse what must not be overwritten, before anything is computed or made."""
@@ -232,6 +230,12 @@ def digest(path: Path) -> str:
     """The sha256 of a file's bytes, in hex."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def digests(folder: Path) -> dict[str, str]:
+    """The sha256 of every file in a folder and below it, by its name there, in order."""
+    files = [path for path in sorted(folder.rglob("*")) if path.is_file()]
+    return {path.relative_to(folder).as_posix(): digest(path) for path in files}
 
 
 def sealed_files(seal: Path, at: Path | None = None) -> Iterator[Path]:

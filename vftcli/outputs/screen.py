@@ -22,7 +22,7 @@ from vftcli.outputs.believability import (
 )
 from vftcli.outputs.canvas import Canvas, force_bars, forces_of_list
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
-from vftcli.outputs.examination import rate_of
+from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import Column, Grid, terminal
 from vftcli.outputs.log.rmse_tables import Block, blocks, contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
@@ -100,10 +100,8 @@ def facts(analysis: Analysis) -> str:
 
 def doubt_lines(analysis: Analysis) -> list[str]:
     """Warning on meaningless results that are made anyway."""
-    codes = [f.code for one in analysis.examinations for f in one.refusals()]
-    if not codes:
-        return []
-    return [f"MEANINGLESS unless this is wrong (--anyway): {', '.join(dict.fromkeys(codes))}"]
+    codes = ", ".join(refused_codes(analysis.examinations))
+    return [f"MEANINGLESS unless this is wrong (--anyway): {codes}"] if codes else []
 
 
 def written_lines(
@@ -300,7 +298,7 @@ def log_row(analysis: Analysis, line: LogSummary) -> list[str]:
     found, rest, error = analysis.contacts, DASH, DASH
     if found is not None and found.detectable_force is not None and found.tells_untouched:
         rest = at_least_shown(found.detectable_force)
-    for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
+    for block in blocks(analysis.errors)[:1]:
         for value in [*block.means.errors.values()][:1]:
             error = f"{significant(value, 2)} N·m"
     return [line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error]

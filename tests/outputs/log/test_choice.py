@@ -8,8 +8,8 @@ from vftcli.signals.errors import ParameterError
 
 def test_a_report_has_its_recording_unless_none_is_asked_for() -> None:
     assert OutputChoice.parsed() == OutputChoice(extras=(), detail=LEVELS)
-    assert OutputChoice(extras=("rrd",), detail=FULL).writes_recording
-    assert not OutputChoice.parsed(settings={"recording.detail": NONE}).writes_recording
+    assert OutputChoice(extras=("rrd",), detail=FULL).detail == FULL
+    assert OutputChoice.parsed(settings={"recording.detail": NONE}).detail == NONE
 
 
 def test_words_that_mean_nothing_are_refused() -> None:

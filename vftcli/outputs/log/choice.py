@@ -41,10 +41,5 @@ class OutputChoice(Choice):
                 "recording.detail=none writes no recording; leave it or --rrd away"
             )
 
-    @property
-    def writes_recording(self) -> bool:
-        """Whether a report has its recording."""
-        return self.detail != NONE
-
 
 PLAIN = OutputChoice()  #: What is written where nothing is asked for.

@@ -1,36 +1,39 @@
-"""Files of `vftcli report`: page, recording, estimates, errors, run.json."""
+"""Files of `vftcli report`: page, recording, estimates, errors, run.json.
+
+Of a log of torques and a Jacobian: estimates, errors and run.json.
+"""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
+from vftcli.evaluation.logged_jacobian import JacobianJudgement
 from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.figures.paper import figure_files, write_figures
-from vftcli.outputs.files import SEAL, OutputFolder, numbered
+from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text, table_file
 from vftcli.outputs.log import tables
-from vftcli.outputs.log.choice import PLAIN, OutputChoice
+from vftcli.outputs.log.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.log.rmse_tables import PaperBounds, paper_bounds
-from vftcli.outputs.log.run_record import jsonable, run_record, seal, versions
+from vftcli.outputs.log.rmse_tables import paper_bounds
+from vftcli.outputs.log.run_record import CONVENTIONS, jsonable, run_record, seal, versions
 from vftcli.outputs.page.pages import render, render_index
+from vftcli.signals.arrays import Array
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
+from vftcli.signals.shown import per_joint
+from vftcli.signals.wrench import per_axis
 
 if TYPE_CHECKING:
     import polars as pl
 
-#: File name → how its text is made from the errors table.
-ERROR_TABLES: dict[str, Callable[["pl.DataFrame", PaperBounds], str]] = {
-    "errors.csv": tables.to_csv,
-    "errors.json": tables.to_json,
-    "errors.md": tables.to_markdown,
-    "errors.tex": tables.to_latex,
-}
+#: Files of the errors table, in the order of `tables.FORMS`.
+ERROR_TABLES = ("errors.csv", "errors.json", "errors.md", "errors.tex")
 CONTACTS = ("contacts.json", "contacts.csv")  #: The list of contacts, where it is made.
 #: What a report of one log may hold; the error tables only where there is a reference.
 FILES = ("index.html", "recording.rrd", "estimates.parquet", SEAL, *CONTACTS, *ERROR_TABLES)
@@ -101,12 +104,13 @@ def write_reports(
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
     names = report_files(labels, choice.extras, form, several=True)
+    pages = list(zip(places, analyses, strict=True))
+    logs = dict(zip(places, labels, strict=True))
     with OutputFolder(path, force, names) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, choice, form)
-            for place, analysis in steps(list(zip(places, analyses, strict=True)))
+            for place, analysis in steps(pages)
         ]
-        pages = list(zip(places, analyses, strict=True))
         folder.write("index.html", render_index(pages, failed))
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
@@ -114,12 +118,13 @@ def write_reports(
         put_contacts(folder, "", analyses, several=True)
         if form is not None and together is not None:
             write_figures(folder, error_figures(together), form)
-        logs = dict(zip(places, labels, strict=True))
-        seal(
-            folder,
-            SEAL,
-            {"command": command, "versions": versions(), "logs": logs, "left_out": dict(failed)},
-        )
+        record = {
+            "command": command,
+            "versions": versions(),
+            "logs": logs,
+            "left_out": dict(failed),
+        }
+        seal(folder, SEAL, record)
         return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
 
 
@@ -135,17 +140,18 @@ def fill(
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
-    writers: list[Callable[[], None]] = [
-        lambda: folder.write(f"{place}index.html", render(analysis)),
-        lambda: write_estimates(folder / f"{place}estimates.parquet", analysis),
-    ]
-    if choice.writes_recording and installed("rerun"):  # else `left_out` says how to get it
-        from vftcli.outputs.log.rerun_recording import write_rrd
+    # Without the package `left_out` says how to get it.
+    recorded = choice.detail != NONE and installed("rerun")
+    for name in steps(["index.html", *["recording.rrd"] * recorded, "estimates.parquet"]):
+        path = folder / f"{place}{name}"
+        if name == "index.html":
+            put_text(path, render(analysis))
+        elif name == "recording.rrd":
+            from vftcli.outputs.log.rerun_recording import write_rrd
 
-        path = folder / f"{place}recording.rrd"
-        writers.insert(1, lambda: write_rrd(path, analysis, choice.detail))
-    for write in steps(writers):
-        write()
+            write_rrd(path, analysis, choice.detail)
+        else:
+            write_estimates(path, analysis)
     put_errors(folder, place, analysis.errors, [analysis])
     put_contacts(folder, place, [analysis])
     write_extras(folder, place, analysis, choice)
@@ -178,5 +184,68 @@ def put_errors(
     if errors is None:
         return
     errors, bounds = tables.marked(errors, analyses), paper_bounds(analyses)
-    for name, text_of in ERROR_TABLES.items():
+    for name, text_of in zip(ERROR_TABLES, tables.FORMS.values(), strict=True):
         folder.write(f"{place}{name}", text_of(errors, bounds))
+
+
+#: Frame of what a log of a Jacobian holds.
+JACOBIAN_FRAME = StatedFrame("axes and point of the log's own Jacobian, as force on the robot")
+
+
+def jacobian_columns(made: JacobianJudgement) -> Iterator[tuple[str, Array]]:
+    """Name and values of every column of `estimates.parquet`, in order."""
+    both = [made.vendor, *([made.sensor] if made.sensor is not None else [])]
+    yield "t", made.log.t
+    for name, one in zip(("vendor", "reference"), both, strict=False):
+        yield from per_joint(f"tau_ext/{name}", one.torque.tau)
+    for name, one in zip(("vendor", "reference"), both, strict=False):
+        yield from per_axis(f"wrench/{name}", one.wrench.values)
+    if made.vendor.wrench.null_space is not None:
+        yield "null_space/vendor", made.vendor.wrench.null_space
+    if made.vendor.wrench.sigma_min is not None:
+        yield "sigma_min", made.vendor.wrench.sigma_min
+
+
+def write_jacobian_folder(
+    path: Path, made: JacobianJudgement, command: str, *, force: bool = False
+) -> str:
+    """Write `estimates.parquet`, the errors if there are any, and `run.json`, all or nothing.
+
+    Returns:
+        The text of `run.json`.
+    """
+    import polars as pl
+
+    table = pl.DataFrame(dict(jacobian_columns(made)))
+    schema = described_schema(
+        table, {"wrench/vendor": JACOBIAN_FRAME, "wrench/reference": JACOBIAN_FRAME}
+    )
+    names = ("estimates.parquet", SEAL, *ERROR_TABLES)
+    with OutputFolder(path, force, names) as folder:
+        with table_file(folder / "estimates.parquet") as file:
+            table.write_parquet(file, compression="zstd", arrow_schema=schema)
+        put_errors(folder, "", made.errors, [])
+        return seal(folder, SEAL, jacobian_record(made, command))
+
+
+def jacobian_record(made: JacobianJudgement, command: str) -> dict[str, Any]:
+    """What `run.json` holds."""
+    log = made.log
+    return {
+        "command": command,
+        "versions": versions(),
+        "input": {
+            "path": str(log.path),
+            "sha256": log.sha256,
+            "samples": len(log.t),
+            "joints": log.tau_ext.shape[1],
+            "start_s": float(log.t[0]),
+            "end_s": float(log.t[-1]),
+        },
+        "robot": None,
+        "observers": [],
+        "reference": None if made.sensor is None else {"name": made.sensor.torque.name},
+        "conventions": CONVENTIONS,
+        "repairs": list(log.remarks),
+        "notes": list(made.remarks),
+    }

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import JointMeans, joint_means
-from vftcli.outputs.grid import Column, Grid, GridCell, joint_columns
+from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.wrench import AXES, unit_of
@@ -83,9 +83,9 @@ class Block(NamedTuple):
         return [f"J{j}{DAGGER if j in self.untrusted else ''}" for j in self.joints]
 
 
-def blocks(errors: pl.DataFrame) -> tuple[Block, ...]:
-    """One block for each recording and reference, in the table's order."""
-    return tuple(block(group) for group in logs_of(errors, "joint"))
+def blocks(errors: pl.DataFrame | None) -> tuple[Block, ...]:
+    """One block for each recording and reference, in the table's order; none without errors."""
+    return () if errors is None else tuple(map(block, logs_of(errors, "joint")))
 
 
 def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
@@ -104,10 +104,9 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
 
 def block(rows: pl.DataFrame) -> Block:
     """The rows of one recording as a matrix."""
-    joints = tuple(int(j) for j in rows["joint"].unique().sort())
-    observers = tuple(str(name) for name in rows["observer"].unique(maintain_order=True))
-    rmse = np.full((len(observers), len(joints)), np.nan)
-    floor = np.full(len(joints), np.nan)
+    joints = rows["joint"].unique().sort().to_list()
+    observers = tuple(map(str, rows["observer"].unique(maintain_order=True)))
+    rmse, floor = np.full((len(observers), len(joints)), np.nan), np.full(len(joints), np.nan)
     # Null is what polars has for unknown.
     known = rows.with_columns(pl.col("rmse_Nm", "reference_floor_Nm").fill_null(float("nan")))
     for row in known.iter_rows(named=True):
@@ -117,38 +116,33 @@ def block(rows: pl.DataFrame) -> Block:
     # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
+    missing = rows.group_by("observer", maintain_order=True).agg(pl.col("missing").max())
     return Block(
         recording=str(rows["recording"][0]),
         reference=str(rows["reference"][0]),
-        joints=joints,
+        joints=tuple(joints),
         observers=observers,
         rmse=rmse,
         floor=floor,
         samples=(int(min(counts)), int(max(counts))),
         means=joint_means(rows),
-        missing={
-            str(name): float(share)
-            for name, share in rows.group_by("observer", maintain_order=True)
-            .agg(pl.col("missing").max())
-            .iter_rows()
-            if share
-        },
-        untrusted=tuple(int(j) for j in doubtful),
+        missing={str(name): float(share) for name, share in missing.iter_rows() if share},
+        untrusted=tuple(doubtful),
     )
 
 
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
-    rows: list[tuple[GridCell | str | float, ...]] = []
+    rows: list[tuple[Entry, ...]] = []
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
-        cells = []
-        for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True):
-            # A star where the reference can tell no more.
-            mark, page = ("*", text + ON_PAGE) if at_floor else ("", "")
-            cells.append(GridCell(text, bool(best), mark, page))
-        rows.append((name, *cells, table.means.errors.get(name, float("nan"))))
+        # A star where the reference can tell no more.
+        cells = [
+            GridCell(text, bool(best), *(("*", text + ON_PAGE) if at_floor else ()))
+            for text, best, at_floor in zip(map(significant, values), bests, floors, strict=True)
+        ]
+        rows.append((name, *cells, table.means.errors.get(name)))
     if table.has_floor:
         rows.append(("floor", *map(float, table.floor), table.means.floor))
     joints = tuple(
@@ -171,25 +165,27 @@ def rmse_grid(table: Block) -> Grid:
 def details(row: dict[str, Any]) -> dict[str, str]:
     """Text below the RMSE table for one row, by the table's title."""
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
-    share = row.get("coverage_95")
-    interval = DASH if low is None or high is None else f"{significant(low)}–{significant(high)}"
-    chance = DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}"
+    share, unknown = row.get("coverage_95"), low is None or high is None
     return {
-        "95 % interval of the RMSE, moving-block bootstrap [N·m]": interval,
-        "lag of the estimate behind the reference, best fit [ms]": DASH
-        if lag is None
-        else minus(f"{round(1e3 * lag)}"),
-        "samples within the estimate's 95 % band, while the joint moves": DASH
-        if share is None
-        else f"{100 * share:.0f} %",
-        "p of being no worse than the best, paired bootstrap": chance,
+        "95 % interval of the RMSE, moving-block bootstrap [N·m]": (
+            DASH if unknown else f"{significant(low)}–{significant(high)}"
+        ),
+        "lag of the estimate behind the reference, best fit [ms]": (
+            DASH if lag is None else minus(f"{round(1e3 * lag)}")
+        ),
+        "samples within the estimate's 95 % band, while the joint moves": (
+            DASH if share is None else f"{100 * share:.0f} %"
+        ),
+        "p of being no worse than the best, paired bootstrap": (
+            DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}"
+        ),
     }
 
 
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
-        joints = joint_columns([int(j) for j in group["joint"].unique().sort()])
+        joints = joint_columns(group["joint"].unique().sort().to_list())
         found: dict[str, dict[str, list[str]]] = {}
         for row in group.iter_rows(named=True):
             for title, text in details(row).items():
@@ -215,7 +211,7 @@ def marks_in_words(found: Sequence[Block]) -> str:
         lines.append(f"{DAGGER}: {RESTS}")
     lines += dict.fromkeys(f"mean:{t.means.left_out}" for t in found if t.means.without)
     lines += without_answer(found)
-    if any(not np.all(np.isfinite(table.rmse)) for table in found):
+    if not all(np.all(np.isfinite(table.rmse)) for table in found):
         lines.append("–: no sample where the reference is known")
     return "".join(f"{text}\n" for text in lines)
 
@@ -252,33 +248,30 @@ PaperBounds = Mapping[str, tuple[float, float]]
 
 def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
     """What the paper reports of the arms of these logs, from the arms' own profiles."""
-    found = {a.recording.name: a.robot.published for a in analyses}
     return {
-        label: (published["wrench_rmse_N"], published["wrench_rmse_Nm"])
-        for label, published in found.items()
-        if published
+        a.recording.name: (published["wrench_rmse_N"], published["wrench_rmse_Nm"])
+        for a in analyses
+        if (published := a.robot.published)
     }
 
 
 def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Iterator[Grid]:
     """RMSE of the wrenches, one table for each recording and reference that has any."""
     for group in logs_of(errors, "axis"):
-        recording, reference = str(group["recording"][0]), str(group["reference"][0])
+        samples = compared_samples(group)
+        if not samples:
+            continue
+        recording, reference = group["recording"][0], group["reference"][0]
+        # A force axis has its number in newtons, a moment axis in newton-metres; never both.
+        values = group.select("observer", "axis", rmse=pl.coalesce("rmse_N", "rmse_Nm"))
         found: dict[str, dict[str, float | None]] = {}
-        for row in group.iter_rows(named=True):
-            # A force axis has its number in newtons, a moment axis in newton-metres; never both.
-            value = row["rmse_N"] if row["rmse_N"] is not None else row["rmse_Nm"]
-            found.setdefault(str(row["observer"]), {})[str(row["axis"])] = value
-        rows: list[tuple[str | float | None, ...]] = [
-            (name, *(values.get(axis) for axis in AXES)) for name, values in found.items()
-        ]
+        for name, axis, value in values.iter_rows():
+            found.setdefault(name, {})[axis] = value
+        rows: list[tuple[Entry, ...]] = [(name, *map(own.get, AXES)) for name, own in found.items()]
         # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
         if reference == "sensor" and (limits := (bounds or {}).get(recording)):
             force, moment = limits
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
-        samples = compared_samples(group)
-        if not samples:
-            continue
         yield Grid(
             title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
             quantity="RMSE",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from vftcli.evaluation.errors import POOLED
+from vftcli.outputs.examination import refused_codes
 from vftcli.outputs.grid import (
     Column,
     Grid,
@@ -49,11 +50,8 @@ def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame
     It holds the codes of the findings, of all logs together in pooled rows; without any such
     finding the table is as it was.
     """
-    codes: dict[str, str] = {}
-    for analysis in analyses:
-        found = [f.code for one in analysis.examinations for f in one.refusals()]
-        if found:
-            codes[analysis.recording.name] = ", ".join(dict.fromkeys(found))
+    found = {a.recording.name: refused_codes(a.examinations) for a in analyses}
+    codes = {name: ", ".join(each) for name, each in found.items() if each}
     if not codes:
         return errors
     every = {POOLED: "; ".join(f"{name}: {text}" for name, text in codes.items()), **codes}
@@ -80,12 +78,14 @@ def to_terminal(
     found = blocks(errors)
     if not found:
         return "no errors to show: the estimates and the reference have no sample in common\n"
+    above, below = (
+        "".join(f"{printable(line)}\n" for line in lines)
+        for lines in (doubts_of(errors), nothing_to_compare(errors))
+    )
     joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
-    joints += "".join(f"{printable(line)}\n" for line in nothing_to_compare(errors))
-    below = [*axis_grids(errors, bounds), *contact_grids(errors)]
-    below = [*(detail_grids(errors) if every else ()), *below]
-    above = "".join(f"{printable(line)}\n" for line in doubts_of(errors))
-    return above + "\n".join([joints, *map(terminal, below)])
+    details = detail_grids(errors) if every else ()
+    grids = (*details, *axis_grids(errors, bounds), *contact_grids(errors))
+    return above + "\n".join([joints + below, *map(terminal, grids)])
 
 
 def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
@@ -94,9 +94,10 @@ def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     lines = [*marks_in_words(found).splitlines(), *nothing_to_compare(errors)]
     marks = [f"{escape_markdown(line)}\n" for line in lines]
     below = [*detail_grids(errors), *axis_grids(errors, bounds)]
-    above = [markdown(rmse_grid(table)) for table in found]
     doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
-    return "\n".join([*doubts, *above, *marks, *map(markdown, below)])
+    return "\n".join(
+        [*doubts, *map(markdown, map(rmse_grid, found)), *marks, *map(markdown, below)]
+    )
 
 
 def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
@@ -107,7 +108,7 @@ def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     lines = [*doubts_of(errors), *nothing_to_compare(errors)]
     doubts = "".join(f"% {printable(line)}\n" for line in lines)
     arms = groupby(blocks(errors), key=lambda table: table.joints)
-    found = [alike([rmse_grid(table) for table in tables]) for _, tables in arms]
+    found = [alike(list(map(rmse_grid, tables))) for _, tables in arms]
     if axes := list(axis_grids(errors, bounds)):
         found.append(axes)
     return doubts + "\n".join(latex(*grids) for grids in found)
@@ -140,7 +141,7 @@ def to_csv(errors: pl.DataFrame, _bounds: PaperBounds | None = None) -> str:
 
 
 #: Name of a form → the text of the errors table in it.
-FORMS = {"json": to_json, "csv": to_csv, "markdown": to_markdown, "latex": to_latex}
+FORMS = {"csv": to_csv, "json": to_json, "markdown": to_markdown, "latex": to_latex}
 
 
 def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
@@ -154,18 +155,16 @@ def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
         low, high = -high, -low
     interval = f"{significant(low)} to {significant(high)}"
     # A blank keeps the digits of those without a star below the others.
-    star = "*" if p < SURE else " "
-    by = abs(float(difference))
+    star, by = "*" if p < SURE else " ", abs(float(difference))
     return (row["recording"], f"J{row['joint']}", *names, by, interval, f"{p:.3f}{star}")
 
 
 def pairs_text(rows: pl.DataFrame) -> str:
     """The paired differences of all logs, as a terminal table."""
-    heads = ("recording", "joint", "better", "than", "by [N·m]", "95 % interval", "p")
-    first, *others = heads
+    heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")
     grid = Grid(
-        columns=(Column(first, words=True), *map(Column, others)),
-        rows=tuple(pair_row(row) for row in rows.iter_rows(named=True)),
+        columns=(Column("recording", words=True), *map(Column, heads)),
+        rows=tuple(map(pair_row, rows.iter_rows(named=True))),
     )
     return f"{terminal(grid)}*: p below {SURE:g}\n"
 

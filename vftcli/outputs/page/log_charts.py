@@ -31,7 +31,7 @@ FREE, LOADED = "#3b7ea1", "#c2410c"
 def torque_chart(analysis: Analysis) -> Chart:
     """External torque joint by joint: the best estimate with its band, the reference below it."""
     n, reference = analysis.recording.joints, analysis.reference
-    found = blocks(analysis.errors) if analysis.errors is not None else ()
+    found = blocks(analysis.errors)
     lines = estimate_lines(analysis)
     return Chart(
         "tau",

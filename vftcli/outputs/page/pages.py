@@ -121,7 +121,7 @@ def scale_words(chart: Chart) -> str:
 def errors_view(analysis: Analysis) -> dict[str, Any]:
     """The tables of errors and what they come to, without tables where there is no reference."""
     table = analysis.errors
-    found = blocks(table) if table is not None else ()
+    found = blocks(table)
     if table is None or not found:
         return {"state": "none given", "first": ()}
     means, state = found[0].means, "no sample in common with the estimates"
@@ -167,7 +167,7 @@ def render_index(
 def index_line(folder: str, analysis: Analysis) -> LogSummary:
     """One log's line, with its page in a sub-folder and its least error."""
     line = log_line(analysis, grounds(analysis))._replace(page=f"{folder}/index.html")
-    for block in blocks(analysis.errors)[:1] if analysis.errors is not None else ():
+    for block in blocks(analysis.errors)[:1]:
         line = line._replace(error=least_error(block.means))
     return line
 
