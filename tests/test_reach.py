@@ -249,7 +249,7 @@ def test_an_effort_is_told_from_four_others_on_real_logs(logs: Path, name: str) 
             tried = replace(plain, **{called: effort})
             told = [
                 reading
-                for reading in readings(tried, robot, windows)
+                for reading in readings(replace(windows, recording=tried), robot)
                 # Currents without gravity are none of the five.
                 if reading.code != "current-without-gravity"
             ]

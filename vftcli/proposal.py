@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.doctor.causes import CORRECTIONS
-from vftcli.doctor.examination import examine
-from vftcli.doctor.findings import in_words
+from vftcli.doctor.examination import examine, in_words
 from vftcli.doctor.fit import guess_robot
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice

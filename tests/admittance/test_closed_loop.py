@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.admittance.closed_loop import ClosedLoop, latencies, run_closed_loop
+from vftcli.admittance.closed_loop import ClosedLoop, OnlineKalman, latencies, run_closed_loop
 from vftcli.admittance.law import controllers, variable
-from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.parameters import from_table, parse_settings
 from vftcli.admittance.replay import replay
 from vftcli.observers import KalmanObserver

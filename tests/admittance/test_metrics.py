@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.metrics import Drag, drags_of, overshoot, releases_of, return_time
-from vftcli.admittance.motion import Phases
+from vftcli.admittance.motion import Drag, Phases, drags_of, overshoot, releases_of, return_time
 
 PERIOD = 0.1
 T = np.arange(101) * PERIOD

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.online import OnlineKalman
+from vftcli.admittance.closed_loop import OnlineKalman
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
 from vftcli.signals.wrench import ExternalTorque

@@ -7,8 +7,7 @@ import pytest
 
 from vftcli.admittance.joints import JointPath
 from vftcli.admittance.law import controllers
-from vftcli.admittance.metrics import Drag
-from vftcli.admittance.motion import AxisMotion, Phases
+from vftcli.admittance.motion import AxisMotion, Drag, Phases
 from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.admittance.replay import Lyapunov, Replay, drag_remarks, replay, trouble
 from vftcli.robots import load_robot

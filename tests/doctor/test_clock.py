@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.doctor.signals import clock_findings
-from vftcli.doctor.velocity import velocity_fit
+from vftcli.doctor.velocity import clock_findings, velocity_fit
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark

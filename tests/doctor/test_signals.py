@@ -8,10 +8,11 @@ import pytest
 from vftcli.doctor.signals import (
     inverted_effort,
     signal_findings,
+    stuck_findings,
     unusable_findings,
     work_shares,
 )
-from vftcli.doctor.velocity import velocity_fit
+from vftcli.doctor.velocity import velocity_findings, velocity_fit
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
@@ -33,7 +34,8 @@ def log_of(**changes: Array | None) -> Recording:
 
 def found(**changes: Array | None) -> dict[str, Remark]:
     log = log_of(**changes)
-    both = (*signal_findings(log, velocity_fit(log)), *inverted_effort(log))
+    found = (*signal_findings(log), *stuck_findings(log), *inverted_effort(log))
+    both = (*found, *velocity_findings(log, velocity_fit(log)))
     return {finding.code: finding for finding in both}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.doctor.stuck import is_clipped, stuck_findings
+from vftcli.doctor.signals import is_clipped, stuck_findings
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

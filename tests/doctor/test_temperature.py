@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.doctor.findings import in_words
-from vftcli.doctor.temperature import temperature_findings
+from vftcli.doctor import in_words
+from vftcli.doctor.load import temperature_findings
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from vftcli.doctor.signals import clock_findings
-from vftcli.doctor.velocity import VelocityFit, velocity_findings, velocity_fit
+from vftcli.doctor.velocity import VelocityFit, clock_findings, velocity_findings, velocity_fit
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

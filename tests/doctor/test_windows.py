@@ -28,7 +28,7 @@ UR10E, PANDA = load_robot("ur10e"), load_robot("panda")
 def test_inertia_gravity_and_friction_make_the_torque() -> None:
     log = moving("panda")
     windows = windows_of(log, PANDA)
-    needed = windows.inertial + windows.gravity[:, :, 2] + FRICTION * windows.motion[0]
+    needed = windows.inertial + windows.gravity[:, :, 2] + FRICTION * windows.motion[:, 0]
     # seven instants of a window and Simpson's rule: .02 N·m at 1.2 rad/s² and 87 N·m
     np.testing.assert_allclose(windows.mean(log.require("torque")), needed, atol=0.1)
 

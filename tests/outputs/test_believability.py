@@ -8,7 +8,7 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
-from vftcli.doctor.findings import in_words
+from vftcli.doctor.examination import in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.outputs.answer import otherwise
 from vftcli.outputs.believability import (

@@ -14,10 +14,11 @@ import numpy as np
 from vftcli.admittance.joints import FlangeSolver
 from vftcli.admittance.law import Controller, check_stable
 from vftcli.admittance.motion import Recursion, entering_force
-from vftcli.admittance.online import OnlineKalman
 from vftcli.admittance.replay import deviation_of
 from vftcli.observers.paper import KalmanObserver
 from vftcli.robots import load_robot
+from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_matrix
@@ -29,6 +30,7 @@ from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
 from vftcli.simulation.trajectories import plan
+from vftcli.virtual_sensor.solvers import wrench_of
 
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
 STARTED = 5e-3  #: Displacement of the flange at which it is said to have moved. [m]
@@ -66,6 +68,69 @@ class ClosedLoop:
         return Wrench(name="controller", t=self.t, values=self.estimate, frame="base")
 
 
+class OnlineKalman:
+    """A disturbance Kalman filter run sample by sample at a constant rate, from x̂⁰ = [p⁰; 0].
+
+    A mean torque over the sampling interval enters as it is: the trapezoid over two is half a
+    sample late, which turns every jerk of the arm into a false force. An instantaneous one enters
+    by the trapezoid, as the rest of μ: the numbers are those of `KalmanObserver.estimate`.
+
+    Attributes:
+        tau: The estimate now. (n,) [N·m]
+    """
+
+    def __init__(
+        self,
+        observer: KalmanObserver,
+        robot: Robot,
+        step: float,
+        *,
+        averaged: bool,
+    ) -> None:
+        """Prepare for samples every `step` [s] whose torque is `averaged` over it, or not."""
+        import pinocchio as pin
+
+        n = robot.joints
+        self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
+        self.averaged, self.friction = averaged, RunningFriction(robot.friction)
+        self.data: Any = self.model.createData()
+        self.system, self.gains = observer.model(step, n), observer.steady(step, n).gains
+        self.p: Array | None = None
+        self.mu, self.tau = np.zeros(n), np.zeros(n)
+
+    def sample(self, q: Array, dq: Array, torque: Array) -> Array:
+        """The external torque after one more sample [rad, rad/s, N·m]. (n,) [N·m]"""
+        pin, model, data = self.pin, self.model, self.data
+        C = pin.computeCoriolisMatrix(model, data, q, dq)
+        p = pin.crba(model, data, q) @ dq
+        gravity = pin.computeGeneralizedGravity(model, data, q)
+        mu = C.T @ dq - gravity
+        if self.robot.friction:  # presliding friction goes on from the sample before
+            mu = mu - self.friction.torque(q[None], dq[None], gravity[None])[0]
+        if not self.averaged:
+            mu = mu + torque
+        if self.p is None:
+            self.p, self.mu = p, mu
+            return self.tau
+        gained = 0.5 * (mu + self.mu) + (torque if self.averaged else 0.0)
+        ahead = self.p + self.system.a12 * self.tau + self.step * gained
+        innovation = p - ahead
+        self.p, self.mu = ahead + self.gains.l1 * innovation, mu
+        self.tau = self.system.a22 * self.tau + self.gains.l2 * innovation
+        return self.tau
+
+    def wrench(self, q: Array) -> Array:
+        """F = pinv(J_Fᵀ) τ̂ (46) at the flange, base axes; zero where the pose cannot tell it. (6,)
+
+        A controller that knows no force must not move by it.
+        """
+        pin, model, data = self.pin, self.model, self.data
+        frame = model.getFrameId("flange")
+        J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
+        found = wrench_of(self.tau[None], J[None])
+        return found.values[0] if found.known[0] else np.zeros(6)
+
+
 class Loop:
     """The controller's side of the loop: sensors, observer, phases, law, inverse kinematics.
 
@@ -74,15 +139,10 @@ class Loop:
     """
 
     def __init__(
-        self,
-        arm: Arm,
-        controller: Controller,
-        observer: KalmanObserver,
-        torque: str,
+        self, arm: Arm, controller: Controller, observer: KalmanObserver, *, averaged: bool
     ) -> None:
         self.arm, self.controller = arm, controller
         nominal, self.interval = arm.true.nominal, 1.0 / log_rate(arm.scenario.sensing, arm.robot)
-        averaged = torque == "average"
         self.span = self.interval if averaged else arm.scenario.step
         self.rng = np.random.default_rng(arm.seeds["sensing"])
         q_noise, dq_noise, effort_noise = noise_sizes(arm)
@@ -112,12 +172,12 @@ class Loop:
         """What happens in a control period: Algorithm 1, or rest until the zero's span is over."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
         # A controller that followed its own drift would never find the zero of a still arm.
-        waits = zero is not None and t <= zero[1]
-        if zero is not None and waits and t >= zero[0]:
+        first, last = zero or (np.inf, -np.inf)
+        if first <= t <= last:
             self.zeros.append(wrench)
             self.zero = np.mean(self.zeros, axis=0)
         wrench = wrench - self.zero
-        if not waits:
+        if t > last:
             self.control(wrench)
         return {
             "t": t,
@@ -131,8 +191,7 @@ class Loop:
     def control(self, wrench: Array) -> None:
         """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
         p, size = self.controller.parameters, np.abs(wrench)
-        release = p.threshold * (1.0 - np.asarray(p.hysteresis))
-        self.dragged = (size > p.threshold) | (self.dragged & (size > release))
+        self.dragged = (size > p.threshold) | (self.dragged & (size > p.release_threshold))
         x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
         self.law.step(entering_force(wrench, self.dragged, p), self.dragged)
         q, self.reached = self.solve(self.law.x[0])
@@ -193,7 +252,8 @@ def run_closed_loop(
     check_stable([controller], anyway=anyway)
     period = controller.parameters.period
     arm = still_arm(scenario, period, seed)
-    loop, log = Loop(arm, controller, observer, torque), list[dict[str, Any]]()
+    loop = Loop(arm, controller, observer, averaged=torque == "average")
+    log = list[dict[str, Any]]()
     every_sample = steps_in(loop.interval, arm.scenario.step, "sampling interval")
     every_control = steps_in(period, arm.scenario.step, "control period")
     for k in range(arm.steps):
@@ -240,12 +300,11 @@ def closed_loop_of(
     loop: Loop, log: Sequence[dict[str, Any]], zero: tuple[float, float] | None
 ) -> ClosedLoop:
     """Put the run together; the truth is the simulator's."""
-    arm = loop.arm
     columns = {name: np.array([row[name] for row in log]) for name in log[0]}
     t = columns["t"]
     simulation, truth = None, np.full((len(t), 6), np.nan)
-    if arm.made == arm.steps:
-        simulation = observe(arm)
+    if loop.arm.made == loop.arm.steps:
+        simulation = observe(loop.arm)
         truth = resample_columns(t, simulation.truth.t, simulation.truth.wrench)
     if zero is not None:
         columns["estimate"][t < zero[0]] = np.nan
@@ -281,15 +340,10 @@ class Latency:
 def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
     """One entry for each application of a force above a threshold."""
     threshold = run.controller.parameters.threshold
-    above = np.any(np.abs(run.truth) > threshold, axis=1)
-    period = run.controller.parameters.period
-    quiet = max(round(REST / period), 1)
-    found, last = [], -quiet
-    for k in np.flatnonzero(above).tolist():
-        if k - last >= quiet:
-            found.append(latency_of(run, k, threshold))
-        last = k
-    return tuple(found)
+    rows = np.flatnonzero(np.any(np.abs(run.truth) > threshold, axis=1))
+    quiet = max(round(REST / run.controller.parameters.period), 1)
+    first = rows[np.diff(rows, prepend=-quiet) >= quiet]
+    return tuple(latency_of(run, k, threshold) for k in first.tolist())
 
 
 def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
@@ -297,28 +351,32 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     axis = int(np.argmax(np.abs(run.truth[k]) / threshold))
     limit, t = threshold[axis], run.t
     felt, there = np.abs(run.estimate[:, axis]) > limit, np.abs(run.truth[:, axis]) > limit
-    part = slice(0, 3) if axis < 3 else slice(3, 6)
-    start = STARTED if axis < 3 else TURNED
+    rotates = axis >= 3
+    moved = run.moved[:, 3:] if rotates else run.moved[:, :3]
+    start = TURNED if rotates else STARTED
 
     def far(since: int) -> Mask:
-        way = np.linalg.norm(run.moved[:, part] - run.moved[since, part], axis=1)
-        return np.asarray(way > start)
+        return np.asarray(np.linalg.norm(moved - moved[since], axis=1) > start)
 
-    before = run.moved[max(k - 3, 0) : k + 1, part]
-    speed = np.linalg.norm(before[-1] - before[0]) / max(t[k] - t[max(k - 3, 0)], 1e-9)
+    def until(flags: Mask, row: int | None) -> float | None:
+        """Time from a row to the first from there on that is set, None without any. [s]"""
+        found = None if row is None else first_true(flags, row)
+        return None if row is None or found is None else float(t[found] - t[row])
+
+    before = max(k - 3, 0)
+    speed = np.linalg.norm(moved[k] - moved[before]) / max(t[k] - t[before], 1e-9)
     seen, ends = first_true(felt, k), first_true(~there, k)
     lost = None if ends is None else first_true(~felt, ends)
-    out = np.linalg.norm(run.moved[:, part], axis=1)
-    turned = np.append(np.diff(out) <= 0.0, False)
+    turned = np.append(np.diff(np.linalg.norm(moved, axis=1)) <= 0.0, False)
     return Latency(
         axis=axis,
         force=float(t[k]),
-        detection=time_until(felt, k, t),
-        motion=time_until(far(k), k, t),
-        withdrawal=None if ends is None else time_until(~felt, ends, t),
-        reaction=None if seen is None else time_until(far(seen), seen, t),
-        turn=None if lost is None else time_until(turned, lost, t),
-        rested=bool(speed < STILL[0 if axis < 3 else 1]),
+        detection=until(felt, k),
+        motion=until(far(k), k),
+        withdrawal=until(~felt, ends),
+        reaction=None if seen is None else until(far(seen), seen),
+        turn=until(turned, lost),
+        rested=bool(speed < STILL[rotates]),
     )
 
 
@@ -326,9 +384,3 @@ def first_true(flags: Mask, start: int) -> int | None:
     """First row from `start` on that is set, or None."""
     found = np.flatnonzero(flags[start:])
     return start + int(found[0]) if found.size else None
-
-
-def time_until(flags: Mask, start: int, t: Array) -> float | None:
-    """Time from row `start` to the first row from there on that is set, or None. [s]"""
-    row = first_true(flags, start)
-    return None if row is None else float(t[row] - t[start])

@@ -73,7 +73,6 @@ class FlangeSolver:
         """
         pin, model, data, frame = self.pin, self.model, self.data, self.frame
         q, error, sizes = guess, np.empty(6), [np.inf, np.inf, np.inf]
-        diagonal = slice(None, None, 7)
         for _ in range(ITERATIONS):
             J = pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)
             place = pin.updateFramePlacement(model, data, frame)
@@ -83,15 +82,13 @@ class FlangeSolver:
             if size < REACHED:
                 return q, True
             if size > STALLED * sizes[-3]:
-                return q, False
+                break
             sizes.append(size)
             normal = J @ J.T
-            normal.flat[diagonal] += DAMPING * min(size, 1.0) ** 2
+            normal.flat[::7] += DAMPING * min(size, 1.0) ** 2
             _, weights, _ = self.solve(normal, error)
             step = J.T @ weights
-            longest = float(np.abs(step).max())
-            if longest > LARGEST_STEP:
-                step *= LARGEST_STEP / longest
+            step *= LARGEST_STEP / max(float(np.abs(step).max()), LARGEST_STEP)
             q = np.minimum(np.maximum(q + step, self.lower), self.upper)
         return q, False
 
@@ -122,9 +119,8 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
                 before = last
             else:
                 # Straight on from the two poses before: the arm moves evenly between periods.
-                found, good = try_pose(
-                    solver, goal, point, 2.0 * last - before if good else last, last
-                )
+                guess = 2.0 * last - before if good else last
+                found, good = try_pose(solver, goal, point, guess, last)
                 last, before = found, last if good else found
                 shown = found if good else shown
             q[k, i], reached[k, i] = shown, good
@@ -132,13 +128,9 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
 
 
 def try_pose(
-    solver: FlangeSolver,
-    rotation: Array,
-    point: Array,
-    guess: Array,
-    last: Array,
+    solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
 ) -> tuple[Array, bool]:
-    """Reach a pose from a guess, and if that fails or leaps, from the joints before it."""
+    """Joints at a pose from a guess, and if that fails or leaps, from the joints before it."""
     if not np.all(np.isfinite(point)):
         return last, False
     found, good = solver.reach(rotation, point, guess)

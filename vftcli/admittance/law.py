@@ -26,7 +26,7 @@ DISCRETE_BOUND = 4.0
 UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Controller:
     """One controller of a comparison: what its recovery phase is made of. Arrays are (6,)."""
 
@@ -58,31 +58,20 @@ class Controller:
 
 def traditional(parameters: Admittance) -> Controller:
     """Constant parameters (45) in both phases."""
-    return Controller(
-        kind="traditional",
-        alpha=np.ones(6),
-        rate=np.zeros(6),
-        damping=parameters.damping,
-        parameters=parameters,
-    )
+    one, damping = np.ones(6), parameters.damping
+    return Controller("traditional", one, 0.0 * one, damping, parameters)
 
 
 def variable(parameters: Admittance) -> Controller:
     """The variable law (47) in the recovery phase."""
-    return Controller(
-        kind="variable",
-        alpha=parameters.alpha,
-        rate=1.0 / np.asarray(parameters.speed_scale),
-        # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
-        damping=2.0 * parameters.damping_ratio * np.sqrt(parameters.mass * parameters.stiffness),
-        parameters=parameters,
-    )
+    # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
+    damping = 2.0 * parameters.damping_ratio * np.sqrt(parameters.mass * parameters.stiffness)
+    rate = 1.0 / np.asarray(parameters.speed_scale)
+    return Controller("variable", parameters.alpha, rate, damping, parameters)
 
 
 def controllers(
-    parameters: Admittance,
-    kinds: Sequence[str] = (),
-    alphas: Sequence[float] = (),
+    parameters: Admittance, kinds: Sequence[str] = (), alphas: Sequence[float] = ()
 ) -> tuple[Controller, ...]:
     """The controllers of a comparison, the traditional one first."""
     check_kinds(kinds)
@@ -115,13 +104,11 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     controller ½K_d x² + ½M_d v². For rotation the sum over three axes of equal K_d falls, since x
     is the rotation vector log(R R_dᵀ) and v the angular velocity.
     """
-    p = controller.parameters
-    potential = 0.5 * p.stiffness * x**2
+    p, varies = controller.parameters, controller.rate > 0.0
     # The traditional controller has no speed scale; its branch below does not use the quotient.
-    moving = np.where(controller.rate > 0.0, controller.rate, 1.0)
-    varied = kinetic_shape(np.abs(v) * moving) / moving**2
-    kinetic = p.mass * np.where(controller.rate > 0.0, varied, 0.5 * v**2) / controller.alpha**2
-    return np.asarray(potential + kinetic)
+    rate = np.where(varies, controller.rate, 1.0)
+    shape = np.where(varies, kinetic_shape(np.abs(v) * rate) / rate**2, 0.5 * v**2)
+    return np.asarray(0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2)
 
 
 def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
@@ -153,23 +140,18 @@ class Verdict(NamedTuple):
             size: Deviations of a release from rest; an axis without a speed limit that starts
                 inside the escape bound is left out. (6,) [m, rad]
         """
-        where = Where(self.controller.name)
+        where, found = Where(self.controller.name), list[Remark]()
         limited = np.isfinite(self.controller.parameters.speed_limit)
         # Without a speed limit the number is infinite, and the escape says what that means.
-        at_limit = (self.recovery >= DISCRETE_BOUND) & limited
-        found = [
-            warning(code, where, axis=AXES[k], number=float(number[k]))
-            for code, wrong, number in (
-                ("law-unstable-in-drag", self.drag >= DISCRETE_BOUND, self.drag),
-                ("law-unstable-at-limit", at_limit, self.recovery),
-            )
-            for k in np.flatnonzero(wrong)
-        ]
+        at_limit = np.where(limited, self.recovery, 0.0)
+        numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
+        for code, number in numbers.items():
+            for k in np.flatnonzero(number >= DISCRETE_BOUND):
+                found.append(warning(code, where, axis=AXES[k], number=float(number[k])))
         risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
-        found += [
-            warning("law-escapes", where, axis=AXES[k], bound=float(self.escape[k]), unit=UNITS[k])
-            for k in np.flatnonzero(risky)
-        ]
+        for k in np.flatnonzero(risky):
+            bound, unit = float(self.escape[k]), UNITS[k]
+            found.append(warning("law-escapes", where, axis=AXES[k], bound=bound, unit=unit))
         return tuple(found)
 
 
@@ -208,8 +190,8 @@ def escape_factor(xi: float) -> float:
 def judge(controller: Controller) -> Verdict:
     """Everything that can be said of a controller before it runs."""
     p = controller.parameters
-    factors = {xi: escape_factor(xi) for xi in set(controller.xi.tolist())}
-    factor = np.array([factors[xi] for xi in controller.xi.tolist()])
+    distinct, each = np.unique(controller.xi, return_inverse=True)
+    factor = np.array([escape_factor(xi) for xi in distinct.tolist()])[each]
     scale = np.sqrt(p.mass / p.stiffness) / controller.alpha
     limit, rate = np.asarray(p.speed_limit), controller.rate
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
@@ -221,10 +203,7 @@ def judge(controller: Controller) -> Verdict:
 
 
 def check_stable(
-    controllers: Sequence[Controller],
-    *,
-    anyway: bool = False,
-    release: Array | None = None,
+    controllers: Sequence[Controller], *, anyway: bool = False, release: Array | None = None
 ) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
     """Judge controllers before they run, and refuse what would be unstable.
 

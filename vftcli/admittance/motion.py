@@ -1,16 +1,24 @@
-"""Algorithm 1: an axis is dragged or recovers, what force enters, and the recursion (48)–(51)."""
+"""Algorithm 1: an axis is dragged or recovers, what force enters, and the recursion (48)–(51).
+
+A motion is judged by axis and drag: peak, its time, overshoot, return, idle time, work.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.admittance.law import Controller
-from vftcli.admittance.parameters import Admittance
+from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product
+from vftcli.signals.series import runs_of
+
+PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
+#: Return time → share of the deviation at release inside which the axis has to stay.
+SHARES = {"return_10_s": 0.10, "return_2_s": 0.02}
 
 
 class Phases(NamedTuple):
@@ -28,8 +36,11 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
     size = np.abs(wrench)
-    release = parameters.threshold * (1.0 - np.asarray(parameters.hysteresis))
-    dragged = held(size > parameters.threshold, size <= release)
+    on, off = size > parameters.threshold, size <= parameters.release_threshold
+    # The last row at which anything was switched tells the state: no loop over samples.
+    rows = np.arange(len(on))[:, None]
+    last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
+    dragged = (last >= 0) & np.take_along_axis(on, np.maximum(last, 0), axis=0)
     return Phases(dragged, entering_force(wrench, dragged, parameters))
 
 
@@ -44,15 +55,6 @@ def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Arra
     soft = parameters.threshold_mode == "soft"
     over = np.abs(wrench) - (parameters.threshold if soft else 0.0)
     return np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0)
-
-
-def held(on: Mask, off: Mask) -> Mask:
-    """True from where `on` is until `off` is, False before the first of them. (T, 6)"""
-    # The last row at which anything was switched tells the state: no loop over samples.
-    rows = np.arange(len(on))[:, None]
-    last = np.maximum.accumulate(np.where(on | off, rows, -1), axis=0)
-    state = np.take_along_axis(on, np.maximum(last, 0), axis=0)
-    return np.where(last >= 0, state, False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +86,7 @@ class Recursion:
     """
 
     def __init__(
-        self,
-        controllers: Sequence[Controller],
-        x: Array | None = None,
-        v: Array | None = None,
+        self, controllers: Sequence[Controller], x: Array | None = None, v: Array | None = None
     ) -> None:
         """Start at deviations `x` with velocities `v`, (N, 6) or (6,), zero if not given."""
         if not controllers:
@@ -122,15 +121,13 @@ class Recursion:
         wanted = v + acceleration * period
         self.v = np.minimum(np.maximum(wanted, -self.limit), self.limit)
         self.clipped = self.v != wanted
-        moved = x[:, :3] + self.v[:, :3] * period
+        self.x = x.copy()
+        self.x[:, :3] += self.v[:, :3] * period
         self.turns = self.turns or bool(self.v[:, 3:].any())
-        turned = self._turned() if self.turns else x[:, 3:]
-        self.x = np.concatenate([moved, turned], axis=1)
-
-    def _turned(self) -> Array:
-        turn = quaternion_product(exp_quaternion(self.v[:, 3:] * self.period), self.turn)
-        self.turn = turn / np.sqrt(np.sum(turn**2, axis=1, keepdims=True))
-        return log_quaternion(self.turn)
+        if self.turns:
+            turn = quaternion_product(exp_quaternion(self.v[:, 3:] * period), self.turn)
+            self.turn = turn / np.sqrt(np.sum(turn**2, axis=1, keepdims=True))
+            self.x[:, 3:] = log_quaternion(self.turn)
 
 
 def run(
@@ -140,7 +137,7 @@ def run(
     x: Array | None = None,
     v: Array | None = None,
 ) -> AxisMotion:
-    """Run controllers over one force record, each axis in the phase the record puts it in.
+    """The motion under one force record, each axis in the phase the record puts it in.
 
     A law that escapes in finite time ends in infinities, which `AxisMotion.escaped` tells.
 
@@ -159,17 +156,131 @@ def run(
         for k in range(len(force)):
             state.step(force[k], dragged[k])
             xs[k + 1], vs[k + 1], clips[k + 1] = state.x, state.v, state.clipped
-    return AxisMotion(
-        t=np.arange(len(force) + 1, dtype=np.float64) * state.period, x=xs, v=vs, clipped=clips
-    )
+    t = np.arange(len(xs), dtype=np.float64) * state.period
+    return AxisMotion(t=t, x=xs, v=vs, clipped=clips)
 
 
 def release(
-    controllers: Sequence[Controller],
-    x: Array,
-    duration: float,
-    v: Array | None = None,
+    controllers: Sequence[Controller], x: Array, duration: float, v: Array | None = None
 ) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))
     return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), dtype=bool), x, v)
+
+
+class Drag(NamedTuple):
+    """One drag of one axis, from where its force passes the threshold to the next drag."""
+
+    axis: int  #: Index of the axis.
+    number: int  #: Count of the drags of that axis, from 1.
+    begin: int  #: Row of the motion at which the drag phase begins.
+    release: int  #: Row from which on the axis recovers.
+    end: int  #: Row after the last that belongs to it.
+
+
+def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
+    """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
+    found: list[Drag] = []
+    for axis in range(6):
+        spans: list[list[int]] = []
+        for begin, release in runs_of(phases.dragged[:, axis]):
+            if spans and (begin - spans[-1][1]) * period < PAUSE:
+                spans[-1][1] = release
+            else:
+                spans.append([begin, release])
+        ends = [*(begin + 1 for begin, _ in spans[1:]), len(phases.dragged) + 1]
+        numbered = enumerate(zip(spans, ends, strict=False), start=1)
+        found += [Drag(axis, number, a, b, end) for number, ((a, b), end) in numbered]
+    return tuple(found)
+
+
+def releases_of(x: Array, rows: int) -> tuple[Drag, ...]:
+    """The released axes of a release from deviation `x` (6,), as drags that are over at row 0."""
+    return tuple(Drag(axis, 1, 0, 0, rows) for axis in np.flatnonzero(x).tolist())
+
+
+def rows_of(
+    controllers: Sequence[Controller], motion: AxisMotion, drags: Sequence[Drag], wrench: Array
+) -> list[dict[str, Any]]:
+    """The comparison as rows, one for each controller, axis and drag.
+
+    `start_s` and `release_s` are on the motion's clock, `time_to_peak_s` and `idle_s` from the
+    drag's start, return times from its release [s]; `work_J` is the hand's in the drag phase. What
+    does not happen before the record ends or the next drag begins is None.
+    """
+    numbered = list(enumerate(controllers))
+    rows = [row_of(one, motion, n, drag, wrench) for n, one in numbered for drag in drags]
+    peaks = {
+        (row["axis"], row["drag"]): row["time_to_peak_s"]
+        for row in rows
+        if row["controller"] == "traditional"
+    }
+    for row in rows:
+        other = peaks.get((row["axis"], row["drag"]))
+        ahead = other is not None and row["controller"] != "traditional"
+        row["peak_advance_s"] = other - row["time_to_peak_s"] if ahead else None
+    return rows
+
+
+def row_of(
+    controller: Controller, motion: AxisMotion, n: int, drag: Drag, wrench: Array
+) -> dict[str, Any]:
+    """One controller's figures for one drag of one axis."""
+    axis, t = drag.axis, motion.t
+    x, v = motion.x[:, n, axis], motion.v[:, n, axis]
+    sizes = np.nan_to_num(np.abs(x[drag.begin : drag.end]), nan=np.inf)
+    top = drag.begin + int(np.argmax(sizes))
+    returns = {name: return_time(t, x, drag, share) for name, share in SHARES.items()}
+    back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
+    # Row k + 1 is what the force of row k made of row k.
+    span = slice(drag.begin, drag.release)
+    work = np.nansum(wrench[span, axis] * v[1:][span]) * (t[1] - t[0]) if len(wrench) else 0.0
+    return {
+        "controller": controller.kind,
+        "alpha": None if controller.kind == "traditional" else float(controller.alpha[axis]),
+        "xi": float(controller.xi[axis]),
+        "axis": AXES[axis],
+        "unit": "m" if axis < 3 else "rad",
+        "drag": drag.number,
+        "start_s": start,
+        "release_s": released,
+        "peak": finite(x[top]),
+        "time_to_peak_s": float(t[top]) - start,
+        "at_release": finite(x[drag.release]),
+        "overshoot": overshoot(x, drag),
+        **returns,
+        "idle_s": None if back is None else released - start + back,
+        "work_J": finite(work),
+    }
+
+
+def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
+    """Time from the release to the last sample beyond `share` of the deviation then. [s]
+
+    None if the axis is still outside when the record ends or the next drag begins.
+    """
+    after = np.abs(recovery_of(x, drag))
+    if not len(after):
+        return None
+    outside = np.flatnonzero(after > share * after[0])
+    last = int(outside[-1]) if outside.size else 0
+    if last == len(after) - 1:
+        return None
+    return float(t[drag.release + last] - t[drag.release])
+
+
+def overshoot(x: Array, drag: Drag) -> float | None:
+    """Largest deviation to the other side after the release, as a share of that at the release."""
+    after = recovery_of(x, drag)
+    return max(float(np.max(-after / after[0])), 0.0) if len(after) else None
+
+
+def recovery_of(x: Array, drag: Drag) -> Array:
+    """Deviations from a drag's release on; none where they escape or the release is at zero."""
+    after = x[drag.release : drag.end]
+    return after if np.all(np.isfinite(after)) and after[0] != 0.0 else after[:0]
+
+
+def finite(value: float) -> float | None:
+    """A finite number, or None."""
+    return float(value) if np.isfinite(value) else None

@@ -104,6 +104,11 @@ class Admittance:
         return np.asarray(self.damping / (2.0 * np.sqrt(self.mass * self.stiffness)))
 
     @property
+    def release_threshold(self) -> Array:
+        """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
+        return np.asarray(self.threshold * (1.0 - np.asarray(self.hysteresis)))
+
+    @property
     def damping_ratio(self) -> Array:
         """ξ as it is used. (6,)"""
         return self.drag_ratio if self.xi is None else self.xi

@@ -8,8 +8,17 @@ import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
 from vftcli.admittance.law import Controller, Verdict, check_stable, energy, printed_energy
-from vftcli.admittance.metrics import Drag, drags_of, releases_of, rows_of
-from vftcli.admittance.motion import AxisMotion, Phases, phases, release, run
+from vftcli.admittance.motion import (
+    AxisMotion,
+    Drag,
+    Phases,
+    drags_of,
+    phases,
+    release,
+    releases_of,
+    rows_of,
+    run,
+)
 from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
@@ -97,11 +106,8 @@ def replay(
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
     motion = replace(motion, t=motion.t + clock[0])
-    drags = drags_of(split, parameters.period)
-    found = judge_motion(
-        solver, start, parameters, controllers, verdicts, motion, split, drags, force
-    )
-    logged = deviation_of(solver, start, q)
+    drags, logged = drags_of(split, parameters.period), deviation_of(solver, start, q)
+    found = judge_motion(solver, start, parameters, verdicts, motion, split, drags, force)
     found = replace(found, source=source, logged=logged)
     unknown = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
     missing = (caution("force-unknown", samples=unknown),) if unknown else ()
@@ -134,7 +140,7 @@ def replay_release(
     force = np.zeros((len(motion.t) - 1, 6))
     still = Phases(np.zeros_like(force, dtype=bool), force)
     drags = releases_of(x, len(motion.t))
-    found = judge_motion(solver, q, parameters, controllers, verdicts, motion, still, drags, force)
+    found = judge_motion(solver, q, parameters, verdicts, motion, still, drags, force)
     return replace(found, remarks=(*complaints, *trouble(found)))
 
 
@@ -142,7 +148,6 @@ def judge_motion(
     solver: FlangeSolver,
     start: Array,
     parameters: Admittance,
-    controllers: Sequence[Controller],
     verdicts: tuple[Verdict, ...],
     motion: AxisMotion,
     split: Phases,
@@ -153,10 +158,11 @@ def judge_motion(
 
     The force (T, 6) [N, N·m] is NaN where it is unknown.
     """
+    controllers = tuple(verdict.controller for verdict in verdicts)
     return Replay(
         robot=solver.robot,
         parameters=parameters,
-        controllers=tuple(controllers),
+        controllers=controllers,
         verdicts=verdicts,
         start=start,
         wrench=force,
@@ -180,11 +186,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
-def on_control_clock(
-    t: Array,
-    values: Sequence[Array],
-    period: float,
-) -> tuple[Array, list[Array]]:
+def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[Array, list[Array]]:
     """Times a period [s] apart (S,) [s] and the newest sample of columns (T, …) then. (S, …)"""
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
@@ -205,18 +207,17 @@ def lyapunov_along(
     controllers: Sequence[Controller], motion: AxisMotion, split: Phases
 ) -> Lyapunov:
     """Energies along a run, and where the corrected one rises while no force enters."""
-    dragged = split.dragged
-    shape = motion.x.shape
-    corrected, printed = np.empty(shape), np.empty(shape)
+    # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
+    before = np.concatenate([split.dragged[:1], split.dragged])
+    dragged = before[: len(motion.t), None] if len(before) else np.zeros((1, 1, 6), bool)
     with np.errstate(over="ignore", invalid="ignore"):
-        for n, controller in enumerate(controllers):
-            corrected[:, n] = energy(controller, motion.x[:, n], motion.v[:, n])
-            printed[:, n] = printed_energy(controller, motion.x[:, n], motion.v[:, n])
-    recovering = np.concatenate([~dragged[:1], ~dragged]) if len(dragged) else np.ones((1, 6), bool)
-    left_alone = ~dragged & (split.force == 0.0)
-    rises = np.array([count_rises(corrected[:, n], left_alone) for n in range(shape[1])])
-    for values in (corrected, printed):
-        values[~np.broadcast_to(recovering[:, None, :], shape)] = np.nan
+        corrected, printed = (
+            np.stack([of(c, motion.x[:, n], motion.v[:, n]) for n, c in enumerate(controllers)], 1)
+            for of in (energy, printed_energy)
+        )
+    left_alone = ~split.dragged & (split.force == 0.0)
+    rises = np.array([count_rises(W, left_alone) for W in corrected.swapaxes(0, 1)])
+    corrected, printed = (np.where(dragged, np.nan, W) for W in (corrected, printed))
     return Lyapunov(corrected=corrected, printed=printed, rises=rises)
 
 

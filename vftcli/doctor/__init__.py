@@ -1,7 +1,13 @@
 """The log doctor: faults of a log, their evidence, effects and remedies."""
 
-from vftcli.doctor.examination import Examination, Examiner, examine
-from vftcli.doctor.findings import FindingWords, finding_record, in_words
+from vftcli.doctor.examination import (
+    Examination,
+    Examiner,
+    FindingWords,
+    examine,
+    finding_record,
+    in_words,
+)
 from vftcli.doctor.fit import RobotMatch, guess_robot
 
 __all__ = [

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.stuck import TRAVEL
+from vftcli.doctor.signals import TRAVEL
 from vftcli.doctor.windows import Case, Windows, size_of, solve, spread, terms, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
@@ -130,39 +130,40 @@ class Diagnosis(NamedTuple):
 
 def diagnose(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> Diagnosis | None:
     """The cause of a log's misfit with its arm; None without an effort to judge."""
-    may_be = list(readings(recording, robot, windows_of(recording, robot), ignored))
+    may_be = list(readings(windows_of(recording, robot), robot, ignored))
     if not may_be:
         return None
-    case = may_be[0].case
+    case, found = may_be[0].case, list[Cause]()
     tells = case.gravity_range >= RANGE
-    found = list(read_otherwise(may_be)) if tells else []
+    if tells:
+        best, *rest = sorted(may_be[1:], key=lambda cause: cause.misfit)
+        second = min(cause.misfit for cause in (may_be[0], *rest))
+        # Gravity counted twice may look like a load: none is subtracted.
+        right = case.bare.size < READ_RIGHT * case.size
+        if second > (OVERWHELMING if right else CLEAR) * best.misfit:
+            found.append(best)
     for trial in TRIALS if tells else (turned_or_swapped,):
         found += trial(case)
-    best = min((cause.misfit for cause in found), default=np.inf)
+    best_misfit = min((cause.misfit for cause in found), default=np.inf)
     plain = any(is_plain(case, cause) for cause in found)
-    if tells and (best > GOOD or (best > EXPLAINED * case.misfit and not plain)):
+    if tells and (best_misfit > GOOD or (best_misfit > EXPLAINED * case.misfit and not plain)):
         found += swapped(case)
     diagnosis = chosen(case, found)
     if tells and diagnosis.cause is None and case.misfit > READ_RIGHT:
-        # Gravity counted twice may look like a load: none is subtracted.
         least = min(may_be, key=lambda other: other.case.bare.size / other.case.size)
         return diagnosis._replace(unclear=least if least.code else None)
     return diagnosis
 
 
-def case_of(
-    recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
-) -> Case | None:
+def case_of(windows: Windows, robot: Robot, ignored: Sequence[int] = ()) -> Case | None:
     """The log with its effort as named, None without any."""
-    return next((named.case for named in readings(recording, robot, windows, ignored)), None)
+    return next((named.case for named in readings(windows, robot, ignored)), None)
 
 
-def readings(
-    recording: Recording, robot: Robot, windows: Windows, ignored: Sequence[int] = ()
-) -> Iterator[Cause]:
-    """Readings of an effort, the named one first."""
-    name = effort_name(recording, robot)
-    value, constant = getattr(recording, name), robot.torque_constant
+def readings(windows: Windows, robot: Robot, ignored: Sequence[int] = ()) -> Iterator[Cause]:
+    """Readings of a log's effort, the named one first."""
+    name = effort_name(windows.recording, robot)
+    value, constant = getattr(windows.recording, name), robot.torque_constant
     if value is None or (name == "current" and constant is None):
         return
     mean, idle = windows.mean(value), list(ignored)
@@ -187,17 +188,6 @@ def readings(
         given[:, idle] = (windows.inertial + gravity)[:, idle]
         per_unit = constant if name == "current" and constant is not None else unit
         yield Cause(code, Case(windows=windows, given=given, size=size, constant=per_unit))
-
-
-def read_otherwise(may_be: Sequence[Cause]) -> Iterator[Cause]:
-    """The effort read as another kind."""
-    named, *others = may_be
-    best, *rest = sorted(others, key=lambda cause: cause.misfit)
-    second = min(cause.misfit for cause in (named, *rest))
-    # Gravity counted twice may look like a load: none is subtracted.
-    right = named.case.bare.size < READ_RIGHT * named.case.size
-    if second > (OVERWHELMING if right else CLEAR) * best.misfit:
-        yield best
 
 
 def tilted(case: Case) -> Iterator[Cause]:
@@ -241,7 +231,7 @@ def turned_or_swapped(case: Case) -> Iterator[Cause]:
 def rest_of(case: Case, i: int, j: int, sign: float = 1.0) -> float:
     """Rest of joint i's signed effort beside joint j's model. [N·m]"""
     given = sign * case.given[:, [i]] / case.constant[i] * case.constant[j]
-    friction = np.moveaxis(case.windows.motion[:, :, [j]], 0, 2)
+    friction = case.windows.motion[:, :, [j]].swapaxes(1, 2)
     return solve(given - case.needed[:, [j]], terms(friction, positive=True)).size
 
 
@@ -269,8 +259,8 @@ def scaled(case: Case) -> Iterator[Cause]:
 
     A wrong drive constant scales gravity and inertia; friction has any size beside it.
     """
-    n = len(case.constant)
-    fit = solve(case.given, terms(case.needed[:, :, None]).beside(case.windows.friction))
+    n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
+    fit = solve(case.given, terms(needed).beside(friction))
     factor, sd = float(fit.values[0]), float(fit.sd[0])
     # No load lightens an arm; a heavy one explains a factor above 1 too.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
@@ -279,8 +269,7 @@ def scaled(case: Case) -> Iterator[Cause]:
         # The rest is relative to the effort as logged.
         healed = replace(case, given=case.given / factor, size=case.size / factor)
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
-    each = case.needed[:, :, None] * np.eye(n)
-    fit = solve(case.given, terms(each).beside(case.windows.friction))
+    fit = solve(case.given, terms(needed * np.eye(n)).beside(friction))
     factors, sds = fit.values[:n], fit.sd[:n]
     off = np.abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))
@@ -347,7 +336,7 @@ def is_modelled(case: Case, robot: Robot) -> bool:
     n = len(case.constant)
     if len(robot.friction) != n:
         return False
-    typical = np.sqrt(np.mean(case.windows.motion[1] ** 2, axis=0))
+    typical = np.sqrt(np.mean(case.windows.motion[:, 1] ** 2, axis=0))
     pairs = zip(robot.friction, typical[:, None], strict=True)
     stated = np.abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)

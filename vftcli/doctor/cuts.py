@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.signals import GAP_STEPS
-from vftcli.doctor.stuck import repeated_rows
+from vftcli.doctor.signals import edges_of, repeated_rows
+from vftcli.doctor.velocity import GAP_STEPS
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name
 from vftcli.signals.arrays import Array, Indices, Mask, median
 from vftcli.signals.recording import EFFORTS, Cut, Recording
-from vftcli.signals.remarks import Remark, Where, fact, warning
+from vftcli.signals.remarks import Remark, Where, fact, on_joints, warning
 from vftcli.signals.rest import REST
 from vftcli.signals.series import covered, runs_of
 
@@ -67,10 +67,17 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
     rows = np.zeros(log.samples, dtype=bool)
     cuts = list[Cut]()
     for bad in rules(log, robot):
-        fresh = bad.samples & ~rows[:, None]
-        if 0 < np.mean(fresh.any(axis=1)) <= bad.most:
-            cuts += cuts_of(log.t, bad, fresh)
-            rows |= fresh.any(axis=1)
+        samples = bad.samples & ~rows[:, None]
+        fresh = np.any(samples, axis=1)
+        if not 0 < np.mean(fresh) <= bad.most:
+            continue
+        rows |= fresh
+        for start, stop in runs_of(fresh):
+            here, (first, last) = samples[start:stop], log.t[[start, stop - 1]].tolist()
+            joints, size = on_joints(np.any(here, axis=0)).joints, last - first
+            if bad.sizes is not None:
+                size = float(np.max(np.abs(bad.sizes[start:stop][here])))
+            cuts.append(Cut(bad.code, first, last, stop - start, joints, size))
     return log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
 
 
@@ -91,18 +98,6 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
             until_s=worst.stop,
             size=worst.size,
         )
-
-
-def cuts_of(t: Array, bad: Bad, samples: Mask) -> Iterator[Cut]:
-    """The spans of a rule's cut: some of its samples. (T, n)"""
-    for start, stop in runs_of(np.asarray(samples.any(axis=1))):
-        here = samples[start:stop]
-        first, last = float(t[start]), float(t[stop - 1])
-        size = last - first
-        if bad.sizes is not None:
-            size = float(np.max(np.abs(bad.sizes[start:stop][here])))
-        joints = tuple((np.flatnonzero(here.any(axis=0)) + 1).tolist())
-        yield Cut(bad.code, first, last, stop - start, joints, size)
 
 
 def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
@@ -176,8 +171,7 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
         for start, stop in runs_of(zero[:, j]):
             enough = stop - start >= FEW or every[start:stop].all()
             if start and stop < len(zero) and enough:
-                beside = np.abs(torque[[start - 1, stop], j])
-                found[start:stop, j] = beside.min() > least[j]
+                found[start:stop, j] = np.abs(torque[[start - 1, stop], j]).min() > least[j]
     return found
 
 
@@ -186,7 +180,7 @@ def frozen_rows(recording: Recording) -> Mask:
     t, dq = recording.t, recording.require("dq")
     same = np.zeros(recording.samples - 1, dtype=bool)
     same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
-    first, last = np.array(runs_of(same), dtype=np.intp).reshape(-1, 2).T
+    first, last = edges_of(same)
     lengths, long = last - first, t[last] - t[first] >= FROZEN
     usual = np.median(lengths[~long]) if not long.all() else 1.0
     moves = np.max(np.abs(dq[first]), axis=1) > REST
@@ -228,9 +222,8 @@ def without_turns(recording: Recording) -> Recording:
         return recording
     shift = np.zeros(recording.q.shape)
     shift[steps + 1] = TURN * turns * whole
-    joints = tuple((np.flatnonzero(whole.any(axis=0)) + 1).tolist())
     first = float(recording.t[steps[np.argmax(whole.any(axis=1))] + 1])
-    remark = fact("turn-unwrapped", Where(joints=joints), at_s=first)
+    remark = fact("turn-unwrapped", on_joints(np.any(whole, axis=0)), at_s=first)
     source = replace(recording.source, remarks=(*recording.source.remarks, remark))
     return replace(recording, q=recording.q - np.cumsum(shift, axis=0), source=source)
 
@@ -243,7 +236,7 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     if not steps.size or steps.size > max(2.0, SHARE * recording.samples):
         return
     t, q, dq = recording.t, recording.q, recording.require("dq")
-    rows, meets = np.zeros(q.shape, dtype=bool), np.zeros(q.shape, dtype=bool)
+    rows, meets = np.zeros((2, *q.shape), dtype=bool)
     sizes = np.zeros(q.shape)
     for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
         first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1

@@ -2,17 +2,15 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.cuts import cut_findings, without_bad_samples
-from vftcli.doctor.findings import in_words
 from vftcli.doctor.fit import RobotMatch, arm_findings, guess_robot, profiles
 from vftcli.doctor.lateness import LAGLESS, MISTIMED, effort_lag
-from vftcli.doctor.load import controller_findings
-from vftcli.doctor.signals import clock_findings, signal_findings, unusable_findings
-from vftcli.doctor.temperature import temperature_findings
-from vftcli.doctor.velocity import velocity_fit
+from vftcli.doctor.load import controller_findings, temperature_findings
+from vftcli.doctor.signals import signal_findings, stuck_findings, unusable_findings
+from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_fit
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
@@ -21,7 +19,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import ExaminationError, RobotError
 from vftcli.signals.recording import EFFORTS, Recording
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, as_record, fact, filled, sentence, words
 from vftcli.signals.shown import Shown
 
 #: Findings that an arm's model is another's: what identification is for.
@@ -100,10 +98,7 @@ def stretches(recording: Recording) -> Recording:
 
 
 def examine(
-    recording: Recording,
-    robot: Robot | None = None,
-    *,
-    in_stretches: bool = False,
+    recording: Recording, robot: Robot | None = None, *, in_stretches: bool = False
 ) -> Examination:
     """Examine a log; it is not changed.
 
@@ -118,28 +113,26 @@ def examine(
     if unusable := tuple(unusable_findings(part)):
         return Examination(recording=recording, findings=unusable, robots=())
     velocities = velocity_fit(part)
-    by_clock = clock_findings(recording, velocities, part)
-    by_signal = (*by_clock, *signal_findings(part, velocities))
+    by_signal = (
+        *clock_findings(recording, velocities, part),
+        *signal_findings(part),
+        *velocity_findings(part, velocities),
+        *stuck_findings(part),
+    )
     by_arm, fits = arm_findings(part, robot, by_signal)
     best = robot
     if best is None and fits and fits[0].fits:
         best = profiles()[fits[0].robot]
     if any(finding.code in SIZED for finding in by_arm):
         by_signal = tuple(f for f in by_signal if f.code != "milliamperes")
-    findings = [
-        *cut_findings(recording),
-        *by_signal,
-        *controller_findings(part, best),
-        *by_arm,
-    ]
-    said = {finding.code for finding in findings}
-    if best is not None and not (LAGLESS | REFUSING) & said:
-        findings += effort_lag(part, best)
+    findings = [*cut_findings(recording), *by_signal, *controller_findings(part, best), *by_arm]
     if best is not None:
+        if not (LAGLESS | REFUSING) & {finding.code for finding in findings}:
+            findings += effort_lag(part, best)
         findings += temperature_findings(part, best)
     if part is not recording:
-        counts: dict[str, Any] = {"examined": part.samples, "samples": recording.samples}
-        findings.append(fact("examined-in-stretches", **counts))
+        examined, samples = part.samples, recording.samples
+        findings.append(fact("examined-in-stretches", examined=examined, samples=samples))
     findings.sort(key=lambda finding: finding.level != "warning")
     return Examination(recording=recording, findings=tuple(findings), robots=fits)
 
@@ -191,12 +184,7 @@ class Examiner:
         return tuple(self._robots.values())
 
     def taken(
-        self,
-        recording: Recording,
-        robot: Robot,
-        choice: ReadChoice,
-        *,
-        in_stretches: bool = False,
+        self, recording: Recording, robot: Robot, choice: ReadChoice, *, in_stretches: bool = False
     ) -> Recording:
         """A log in its robot's joints; an open effort is read by the model's best fit.
 
@@ -219,11 +207,7 @@ class Examiner:
         return recording
 
     def examine(
-        self,
-        recording: Recording,
-        robot: Robot,
-        *,
-        in_stretches: bool = False,
+        self, recording: Recording, robot: Robot, *, in_stretches: bool = False
     ) -> Examination:
         """The examination of a log as this arm's, made once.
 
@@ -234,13 +218,13 @@ class Examiner:
         for known, arm, examination in self._made:
             if known is recording and arm is robot:
                 return examination
-        found = examine(recording, robot, in_stretches=in_stretches)
+        examination = examine(recording, robot, in_stretches=in_stretches)
         if not self._anyway:
-            refuse(recording.name, found.refusals(fitting=self._fitting))
-        self._made.append((recording, robot, found))
+            refuse(recording.name, examination.refusals(fitting=self._fitting))
+        self._made.append((recording, robot, examination))
         if self._tell is not None:
-            self._tell(found)
-        return found
+            self._tell(examination)
+        return examination
 
     @property
     def examinations(self) -> tuple[Examination, ...]:
@@ -270,3 +254,36 @@ def refuse(name: str, findings: Iterable[Remark]) -> None:
     others = list(dict.fromkeys(other.name for other in found[1:]))
     more = f" Also: {', '.join(others)}." if others else ""
     raise ExaminationError(f"{name}: {found[0]}{more} With --anyway it goes on all the same.")
+
+
+class FindingWords(NamedTuple):
+    """Text of a finding."""
+
+    name: str  #: Short name; variants of one finding share it.
+    severity: str  #: A note informs; a warning can make results wrong and fails ``--strict``.
+    evidence: str  #: What was seen, with numbers.
+    consequence: str  #: What it does to the results.
+    remedy: str  #: What to do about it.
+
+    def __str__(self) -> str:
+        """The finding on one line."""
+        parts = (self.evidence, self.consequence, self.remedy)
+        return f"{self.name}: {'. '.join(part for part in parts if part)}."
+
+
+def in_words(finding: Remark) -> FindingWords:
+    """A finding's words, its numbers filled in."""
+    entry = words(finding.code)
+    return FindingWords(
+        name=entry.get("name", finding.code),
+        severity="warning" if finding.level == "warning" else "note",
+        evidence=sentence(finding),
+        consequence=filled(entry.get("consequence", ""), finding),
+        remedy=filled(entry.get("remedy", ""), finding),
+    )
+
+
+def finding_record(finding: Remark) -> dict[str, Any]:
+    """A finding for machines: its code and values, and its words."""
+    said = in_words(finding)
+    return {**as_record(finding), **said._asdict(), "message": str(said)}

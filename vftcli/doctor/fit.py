@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
-from vftcli.doctor.findings import on_joints
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import inverted_effort
@@ -23,7 +22,7 @@ from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import EFFORTS, Recording
-from vftcli.signals.remarks import Remark, fact, warning
+from vftcli.signals.remarks import Remark, fact, on_joints, warning
 
 CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
 #: Misfit up to which a profile fits: the maker's own model, and a measured effort.
@@ -137,9 +136,9 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     if recording.joints != robot.joints:
         return None
     windows = windows_of(recording, robot)
-    evidence, case = maker_case(recording, windows)
+    evidence, case = maker_case(windows)
     by_maker = case is not None
-    case = case or case_of(recording, robot, windows, ignored)
+    case = case or case_of(windows, robot, ignored)
     if case is None:
         return None
     load = float(case.loaded.values[0]) if case.carries_load else 0.0
@@ -154,23 +153,23 @@ def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) ->
     )
 
 
-def maker_case(recording: Recording, windows: Windows) -> tuple[str, Case | None]:
+def maker_case(windows: Windows) -> tuple[str, Case | None]:
     """The maker's model of the arm in a log, and its evidence; None without one.
 
     A rigid-body model has no friction; torque less the residual has that before the sensor.
     """
-    target, torque, vendor = recording.target_torque, recording.torque, recording.tau_ext
+    log = windows.recording
+    target, torque, vendor = log.target_torque, log.torque, log.tau_ext
     if target is not None and np.any(target):
         evidence, windows = MAKER, replace(windows, motion=0.0 * windows.motion)
     elif torque is not None and vendor is not None and np.any(vendor):
         evidence, target = RESIDUAL, torque + vendor
     else:
         return MEASURED, None
-    given, unit = windows.mean(target), np.ones(recording.joints)
-    size = size_of(given)
-    if not 0 < size < 1e9:
+    given = windows.mean(target)
+    if not 0 < (size := size_of(given)) < 1e9:
         return MEASURED, None
-    return evidence, Case(windows=windows, given=given, size=size, constant=unit)
+    return evidence, Case(windows=windows, given=given, size=size, constant=np.ones(log.joints))
 
 
 def arm_findings(
@@ -184,16 +183,10 @@ def arm_findings(
     ignored = sorted({j - 1 for f in known if f.code in EFFORT for j in f.where.joints})
     if robot is None and recording.robot_hint in PROFILES:
         robot = load_robot(str(recording.robot_hint))
-    if robot is not None:
-        if robot.joints != recording.joints or not is_judgeable(recording):
-            return ArmFindings()
-        return of_known_arm(recording, robot, ignored)
-    return of_unknown_arm(recording, ignored)
-
-
-def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> ArmFindings:
-    """Findings on a log of an arm that the user knows."""
-    diagnosis, own = diagnose(recording, robot, ignored), match_of(recording, robot, ignored)
+    if robot is None:
+        return of_unknown_arm(recording, ignored)
+    own = match_of(recording, robot, ignored) if is_judgeable(recording) else None
+    diagnosis = None if own is None else diagnose(recording, robot, ignored)
     if diagnosis is None or own is None:
         return ArmFindings()
     case, cause = diagnosis.case, diagnosis.cause
@@ -203,16 +196,18 @@ def of_known_arm(recording: Recording, robot: Robot, ignored: Sequence[int]) -> 
     if (own.by_maker and own.misfit > GUESSED) or case.misfit > DOUBTFUL or heavy or refuted:
         arms = (other for name, other in profiles().items() if name != robot.name)
         others = sorted(filter(None, (match_of(recording, other) for other in arms)), key=by_fit)
-        if (
-            others
-            and is_rather(others[0], own, diagnosis)
-            and (robot.path in PROFILES.values() or is_driven_by(recording, others[0], diagnosis))
-        ):
+        if others and is_rather(others[0], own, diagnosis):
             best, *more = others
-            remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
-            return ArmFindings((remark,), (best, replace(own, fits=False), *more))
+            # A user's own file may be nearer to the arm than its maker's model.
+            arm = load_robot(best.robot)
+            driven = case_of(windows_of(recording, arm), arm)
+            if robot.path in PROFILES.values() or (
+                driven is not None and driven.misfit < ANOTHER * diagnosis.healed.misfit
+            ):
+                remark = warning("other-robot", own=str(own), best=str(best), robot=best.robot)
+                return ArmFindings((remark,), (best, replace(own, fits=False), *more))
     robots = (own, *(replace(other, fits=False) for other in others))
-    return ArmFindings(tuple(explained(recording, robot, diagnosis, robots)), robots)
+    return ArmFindings(tuple(explained(robot, diagnosis, robots)), robots)
 
 
 def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
@@ -226,48 +221,29 @@ def is_rather(other: RobotMatch, own: RobotMatch, diagnosis: Diagnosis) -> bool:
     return other.fits and other.misfit < share * diagnosis.healed.misfit
 
 
-def is_driven_by(recording: Recording, other: RobotMatch, diagnosis: Diagnosis) -> bool:
-    """Whether another arm explains the measured effort much better too.
-
-    A user's own file may be nearer to the arm than its maker's model.
-    """
-    robot = load_robot(other.robot)
-    case = case_of(recording, robot, windows_of(recording, robot))
-    return case is not None and case.misfit < ANOTHER * diagnosis.healed.misfit
-
-
-def explained(
-    recording: Recording, robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]
-) -> Iterator[Remark]:
+def explained(robot: Robot, diagnosis: Diagnosis, robots: Iterable[RobotMatch]) -> Iterator[Remark]:
     """Findings on the cause, or on none; then on the log once it is put right."""
-    healed = diagnosis.healed
-    if diagnosis.cause is None and is_modelled(healed, robot):
+    healed, cause = diagnosis.healed, diagnosis.cause
+    recording, misfit = healed.windows.recording, 100 * diagnosis.case.misfit
+    if cause is None and is_modelled(healed, robot):
         yield warning("no-friction-in-effort", robot=robot.name)
         return
-    if diagnosis.cause is not None:
-        yield cause_remark(recording, diagnosis, diagnosis.cause)
+    if cause is not None:
+        yield cause_remark(diagnosis, cause)
     elif healed.gravity_range < RANGE:
         yield fact("effort-unchecked", range_Nm=healed.gravity_range, least_Nm=RANGE)
         yield from declared_payload(recording, robot)
         return
-    if healed.misfit > NO_FIT and diagnosis.cause is None:
-        yield warning(
-            "no-robot-fits",
-            robot=robot.name,
-            misfit_percent=100 * healed.misfit,
-            ranked="; ".join(str(found) for found in robots),
-        )
+    elif healed.misfit > NO_FIT:
+        ranked = "; ".join(map(str, robots))
+        yield warning("no-robot-fits", robot=robot.name, misfit_percent=misfit, ranked=ranked)
         return
     if (other := diagnosis.unclear) is not None:
-        yield warning(
-            "effort-unclear",
-            other=other.code,
-            misfit_percent=100 * diagnosis.case.misfit,
-            other_percent=100 * other.case.misfit,
-        )
+        left = 100 * other.misfit
+        yield warning("effort-unclear", other=other.code, misfit_percent=misfit, other_percent=left)
     yield from declared_payload(recording, robot)
-    yield from load_remarks(recording, robot, healed)
-    yield from vendor_sign(recording, healed)
+    yield from load_remarks(robot, healed)
+    yield from vendor_sign(healed)
 
 
 def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
@@ -291,7 +267,7 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
             found.append((diagnosis.healed.misfit, robot, diagnosis))
     if found:
         _, robot, diagnosis = min(found, key=lambda one: one[0])
-        return ArmFindings(tuple(explained(recording, robot, diagnosis, fits)), fits)
+        return ArmFindings(tuple(explained(robot, diagnosis, fits)), fits)
     if fits[0].fits:
         return ArmFindings(robots=fits)
     still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
@@ -301,12 +277,12 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
     return ArmFindings((*inverted_effort(recording), remark), fits)
 
 
-def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Remark:
+def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
     """The finding on the cause that explains a log."""
+    recording, rival = diagnosis.case.windows.recording, diagnosis.rival
     if cause.code == "milliamperes":
         typical = float(np.percentile(np.abs(recording.require("current")), 99))
         return warning(cause.code, typical_A=typical)
-    rival = diagnosis.rival
     joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
     by_current = recording.current is not None and bool(np.any(cause.case.constant != 1))
     return warning(
@@ -322,11 +298,12 @@ def cause_remark(recording: Recording, diagnosis: Diagnosis, cause: Cause) -> Re
     )
 
 
-def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
+def vendor_sign(case: Case) -> Iterator[Remark]:
     """That the vendor's torque fits the arm's only with its sign turned.
 
     Moving the arm takes the effort plus the torque ON the robot.
     """
+    recording = case.windows.recording
     if recording.tau_ext is None or recording.torque is None:
         return
     vendor = case.windows.mean(recording.tau_ext)
@@ -340,9 +317,5 @@ def vendor_sign(recording: Recording, case: Case) -> Iterator[Remark]:
         for given in (case.given + vendor, case.given - vendor)
     )
     if turned < CLEARLY * straight:
-        yield warning(
-            "vendor-sign",
-            straight_Nm=straight,
-            turned_Nm=turned,
-            width=recording.joints,
-        )
+        width = recording.joints
+        yield warning("vendor-sign", straight_Nm=straight, turned_Nm=turned, width=width)

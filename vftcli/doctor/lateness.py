@@ -14,14 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.findings import on_joints
 from vftcli.doctor.signals import effort_of
 from vftcli.doctor.windows import spread, trapezoids
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, warning
+from vftcli.signals.remarks import Remark, on_joints, warning
 from vftcli.signals.rest import MOVES
 from vftcli.signals.series import median_step
 
@@ -67,10 +66,10 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
         return
     rest = rest[known]
     together = np.log(rest).mean(axis=0)
-    begin: Lateness | None = late
+    part: Lateness | None = late
     if recording.duration > LONG:
-        begin = lateness_of(recording.between(recording.t[0], recording.t[0] + LONG), robot)
-    if begin is not None and (found := begin.drift(known)) is not None:
+        part = lateness_of(recording.between(recording.t[0], recording.t[0] + LONG), robot)
+    if part is not None and (found := part.drift(known)) is not None:
         yield found
         return
     best = int(np.argmin(together))
@@ -134,14 +133,13 @@ class Lateness(NamedTuple):
         if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
         first = float(self.lags[np.argmin(left[best])])
+        values = {"first_ms": 1e3 * first, "last_ms": 1e3 * (first + grown), "span_s": span}
         return warning(
             "effort-drift",
             on_joints(known[alike]),
             drift_percent=100 * abs(grown) / span,
             pace="slow" if grown > 0 else "fast",
-            first_ms=1e3 * first,
-            last_ms=1e3 * (first + grown),
-            span_s=span,
+            **values,
             ratio=float(better),
         )
 

@@ -1,4 +1,4 @@
-"""Findings about load, payload and drive constants."""
+"""Findings about what a model assumes: load, payload, drive constants, joint temperatures."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor.causes import RANGE
-from vftcli.doctor.findings import on_joints
 from vftcli.doctor.windows import Case, RobustFit, solve
 from vftcli.robots import Robot
+from vftcli.robots.friction import friction_factor, steady_torque
+from vftcli.robots.running_friction import measured_temperature
 from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, caution, warning
-from vftcli.signals.rest import COMMANDED, slower
+from vftcli.signals.remarks import Remark, caution, fact, on_joints, warning
+from vftcli.signals.rest import COMMANDED, MOVES, slower
 
 MISMATCH = 4.0  #: Difference at rest, on two joints, that stiction hardly explains. [N·m]
 USUAL_CONSTANT = 10.0  #: Torque per current near which every UR's large drives lie. [N·m/A]
@@ -70,8 +71,9 @@ def resting(recording: Recording) -> Mask:
     return np.asarray((slower(speed, COMMANDED) & slower(recording.dq)).all(axis=1))
 
 
-def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Remark]:
+def load_remarks(robot: Robot, case: Case) -> Iterator[Remark]:
     """A load that the drives carry and neither the robot file nor the log knows of."""
+    recording = case.windows.recording
     if (changed := load_change(case)) is not None:
         yield changed
         return
@@ -83,27 +85,32 @@ def load_remarks(recording: Recording, robot: Robot, case: Case) -> Iterator[Rem
     if missing and abs(mass - missing) < DECLARED + 0.3 * abs(missing):
         return
     share = case.loaded.size / case.bare.size
-    values: dict[str, Any] = {
-        "load_kg": mass,
-        "sd_kg": float(np.hypot(sd, gain_sd(recording, robot) * mass)),
-        "robot": robot.name,
-        "bare_percent": 100 * case.bare.size / case.size,
-        "loaded_percent": 100 * case.loaded.size / case.size,
-    }
-    if mass > LOAD and share < EXPLAINED:
-        yield warning("unmodelled-load", **values)
-    elif share < PARTLY:
-        yield caution("light-load", **values)
+    heavy = mass > LOAD and share < EXPLAINED
+    if heavy or share < PARTLY:
+        yield (warning if heavy else caution)(
+            "unmodelled-load" if heavy else "light-load",
+            load_kg=mass,
+            sd_kg=float(np.hypot(sd, gain_sd(recording, robot) * mass)),
+            robot=robot.name,
+            bare_percent=100 * case.bare.size / case.size,
+            loaded_percent=100 * case.loaded.size / case.size,
+        )
 
 
 def load_change(case: Case) -> Remark | None:
     """The finding on a load picked up or set down along the log, or None."""
-    count = len(case.given)
-    if with_two_loads(case, count // 2).size > HALVES * case.loaded.size:
+    count, load = len(case.given), case.windows.load
+
+    def with_two_loads(split: int) -> RobustFit:
+        """Fit by friction, a load before a window and another from it on."""
+        late = (np.arange(count) >= split)[:, None, None]
+        before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
+        return solve(case.given - case.needed, before.beside(after).beside(case.windows.friction))
+
+    if with_two_loads(count // 2).size > HALVES * case.loaded.size:
         return None
-    tried = {int(k): with_two_loads(case, int(k)) for k in np.linspace(*BETWEEN, 7) * count}
-    split = min(tried, key=lambda k: tried[k].size)
-    fit = tried[split]
+    tried = {k: with_two_loads(k) for k in map(int, np.linspace(*BETWEEN, 7) * count)}
+    split, fit = min(tried.items(), key=lambda one: one[1].size)
     before, after = fit.values[0], fit.values[4]
     sd = float(np.hypot(fit.sd[0], fit.sd[4]))
     # In one pose any residual passes for a load.
@@ -112,21 +119,8 @@ def load_change(case: Case) -> Remark | None:
         return None
     if abs(after - before) < max(CHANGE, SURE * sd):
         return None
-    return warning(
-        "load-changes",
-        first_kg=float(before),
-        last_kg=float(after),
-        sd_kg=sd,
-        at_s=float(case.windows.t[split, 0]),
-    )
-
-
-def with_two_loads(case: Case, split: int) -> RobustFit:
-    """Fit by friction, a load before a window and another from it on."""
-    load, late = case.windows.load, (np.arange(len(case.given)) >= split)[:, None, None]
-    before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
-    by = before.beside(after).beside(case.windows.friction)
-    return solve(case.given - case.needed, by)
+    first, last, at = float(before), float(after), float(case.windows.t[split, 0])
+    return warning("load-changes", first_kg=first, last_kg=last, sd_kg=sd, at_s=at)
 
 
 def declared_payload(recording: Recording, robot: Robot) -> Iterator[Remark]:
@@ -154,8 +148,8 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
     ratio = constants / profile - 1
     # Freedrive and old controllers follow other laws than K·i: a real joint's constant counts.
     real = (np.abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
-    wrong = np.flatnonzero(np.abs(ratio) > RATIO)
-    if wrong.size and real[wrong].all():
+    wrong = np.abs(ratio) > RATIO
+    if wrong.any() and real[wrong].all():
         yield warning(
             "drive-constants",
             on_joints(wrong),
@@ -189,3 +183,72 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
         extra_Nm=torque[heavy].tolist(),
         payload_kg=recording.payload_mass,
     )
+
+
+#: Share less that a joint rubs for each kelvin: UR's five sizes .011–.022 between 28 and 45 °C.
+PER_KELVIN = 0.015
+#: Distance from the temperature of the model from which a joint rubs 8–15 % otherwise. [K]
+FAR = 7.0
+ASSUMED = 10.0  #: `FAR` where the robot file does not state that temperature. [K]
+#: Range of the law: measured from 28 to 46 °C, and 15 to 20 K beyond. [°C]
+HOLDS = (15.0, 65.0)
+NOTICED = 0.2  #: Friction that is worth a finding. [N·m]
+
+
+def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]:
+    """Whether the log's joints are as warm as the model's, and the log says so."""
+    if not robot.friction or recording.joints != robot.joints or recording.dq is None:
+        return
+    temperature = measured_temperature(recording)
+    lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], dtype=int)
+    reference = [robot.friction[j].reference_temperature for j in lawful]
+    values: dict[str, Any] = {"reference_C": sorted(set(reference)), "robot": robot.name}
+    if temperature is not None:
+        unknown = np.isnan(temperature[:, lawful])
+        if unknown.any():
+            gaps = unknown.any(axis=0)
+            share = 100.0 * float(unknown[:, gaps].mean())
+            yield fact("temperature-gaps", on_joints(lawful[gaps]), **values, share_percent=share)
+        yield from far_temperature(recording, robot, temperature)
+    elif lawful.size:
+        colder = np.full((1, robot.joints), np.nan)
+        colder[0, lawful] = np.array(reference) - 10.0
+        if (factor := friction_factor(robot.friction, colder)) is not None:
+            more = 100.0 * (factor[0, lawful] - 1.0)
+            values |= {"least_percent": float(more.min()), "most_percent": float(more.max())}
+            yield fact("no-temperature", **values)
+
+
+def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
+    """Joints far from their model's temperature, without a friction law there.
+
+    Args:
+        recording: The log.
+        robot: The arm.
+        temperature: Its joint temperatures, NaN where not measured. (T, n) [°C]
+    """
+    far: dict[str, list[tuple[int, float, float, float]]] = {}
+    speeds = np.abs(recording.require("dq"))
+    for j, joint in enumerate(robot.friction):
+        used = (speeds[:, j] > MOVES) & ~np.isnan(temperature[:, j])
+        if joint.model == "none" or not used.any():
+            continue
+        reference = joint.reference_temperature
+        code, (low, high), least = "far-temperature", (reference, reference), FAR
+        if joint.temperature:
+            code, (low, high), least = "temperature-beyond-law", HOLDS, 0.0
+        elif joint.temperature_at is None:
+            code, least = "far-temperature-assumed", ASSUMED
+        coldest, warmest = np.percentile(temperature[used, j], [5.0, 95.0])
+        below, above = low - coldest, warmest - high
+        seen, colder = (coldest, below) if below > above else (warmest, -above)
+        torque = steady_torque(joint, np.median(speeds[used, j], keepdims=True))[0]
+        wrong = abs(float(torque) * float(np.expm1(PER_KELVIN * colder)))
+        if max(below, above) > least and wrong >= NOTICED:
+            far.setdefault(code, []).append((j, float(seen), reference, wrong))
+    for code, rows in far.items():
+        joints, ends, references, torques = zip(*rows, strict=True)
+        level = caution if code == "far-temperature-assumed" else warning
+        values = {"seen_C": list(ends), "reference_C": sorted(set(references))}
+        values |= {"wrong_Nm": list(torques), "range_C": list(HOLDS)}
+        yield level(code, on_joints(joints), robot=robot.name, **values)

@@ -1,105 +1,18 @@
-"""Findings on clock and signals: rate, jitter, gaps, missing ones, units, signs."""
+"""Findings on signals: missing ones, units, signs; those that hold, are zero, clipped or coarse.
 
-from collections.abc import Iterator
+A signal is stuck where it repeats itself to the last bit for half a second while the joint's other
+signals show that it has to change.
+"""
+
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from vftcli.doctor.findings import on_joints
-from vftcli.doctor.stuck import repeated_rows, stuck_findings
-from vftcli.doctor.velocity import VelocityFit, common_cause, velocity_findings
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.recording import EFFORTS, JOINT_SIGNALS, Recording
-from vftcli.signals.remarks import Remark, fact, warning
-from vftcli.signals.rest import NONZERO
-from vftcli.signals.series import gaps_of
-
-SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
-#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
-JITTER = 0.05
-GAP_STEPS = 4.0  #: A step this many times the median is a gap.
-LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
-MISSED = (1.6, 3.4)  #: Steps over the median where one or two samples were missed.
-SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion. [s]
-STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
-
-
-def clock_findings(
-    recording: Recording,
-    fit: VelocityFit | None,
-    part: Recording | None = None,
-) -> Iterator[Remark]:
-    """Findings about the clock, each check independent of the others.
-
-    Args:
-        recording: The log.
-        fit: How its velocities fit its positions.
-        part: Stretches of it where all signals have no room; None for all of it.
-    """
-    common = common_cause(fit)
-    if common is not None and common.code in {"time-unit", "clock-rate"}:
-        yield common
-        if common.code == "time-unit":
-            return  # what else is odd about its steps is this
-    if recording.duration < SHORT:
-        yield fact("short", duration_s=recording.duration)
-    rate = 1 / recording.median_step
-    if rate < SLOW_RATE:
-        yield warning("slow-rate", rate_Hz=rate)
-    yield from uneven_steps(recording)
-    yield from long_steps(recording)
-    source = recording.source
-    if source.duplicates:
-        share = 100 * source.duplicates / max(source.rows, 1)
-        level = warning if share > 10 else fact
-        yield level(
-            "repeated-stamps", repeats=source.duplicates, rows=source.rows, share_percent=share
-        )
-    yield from stale_rows(part or recording)
-
-
-def uneven_steps(recording: Recording) -> Iterator[Remark]:
-    """Samples that were missed, and steps that vary."""
-    usual = recording.median_step
-    steps = np.diff(recording.t)
-    missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
-    if missed > 0.001 * len(steps):
-        yield fact("missing-samples", missed=missed, steps=len(steps))
-    # A gap is no jitter: it has its own finding.
-    steps = steps[steps < GAP_STEPS * usual]
-    low, high = np.percentile(steps, [5, 95], overwrite_input=True)
-    spread = float(high - low) / usual
-    if spread > JITTER:
-        yield fact(
-            "jitter",
-            spread_percent=100 * spread,
-            low_ms=1e3 * float(low),
-            high_ms=1e3 * float(high),
-            clock=recording.source.clock,
-        )
-
-
-def long_steps(recording: Recording) -> Iterator[Remark]:
-    """Gaps, with the longest of them."""
-    t, at = recording.t, gaps_of(recording.t, GAP_STEPS)
-    gaps = np.column_stack([t[at + 1] - t[at], t[at]])
-    for cut in recording.source.cuts:  # has a finding of its own
-        gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
-    if len(gaps):
-        longest, begun = gaps[np.argmax(gaps[:, 0])].tolist()
-        level = warning if longest > LONG_GAP else fact
-        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)
-
-
-def stale_rows(recording: Recording) -> Iterator[Remark]:
-    """Rows that repeat the row before under a new stamp: a packet that was late."""
-    last = repeated_rows(recording, JOINT_SIGNALS)
-    share = len(last) / (recording.samples - 1)
-    # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
-    if recording.dq is None or share < STALE or share > 0.9:
-        return
-    if np.abs(recording.dq[last]).max() >= NONZERO:
-        yield fact("stale-rows", stale=len(last), share_percent=100 * share)
-
+from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.remarks import Remark, fact, on_joints, warning
+from vftcli.signals.rest import HELD, NONZERO
+from vftcli.signals.series import runs_of
 
 #: Net share of work from which a joint's effort counts as inverted.
 #:
@@ -116,6 +29,26 @@ STRAIGHT, BEND, MOVED = 0.6, 1e-3, 0.1
 #: Two turns and a little: no joint of these arms goes further from its zero. [rad]
 LARGE_ANGLE = 13.0
 LARGE_CURRENT = 60.0  #: No joint of these arms draws this much; readings in mA do. [A]
+#: Time, and steps, for which a stuck signal has to repeat itself; way within that time by which
+#: a joint surely moves, at 20 mrad/s. [s, -, rad]
+LONG, MANY, WAY = 0.5, 10, 0.01
+#: A signal's stuck stretch is this many times as long as nearly all its other repeats.
+UNUSUAL = 10.0
+#: Deviation of a speed from a constant acceleration, beyond which its effort changes. [rad/s]
+BENT = 0.005
+TRAVEL = 0.05  #: Travel from which a joint's own data tell anything. [rad]
+#: Steps of the positions that are worth telling: .02 rad/s at 100 Hz. [rad]
+COARSE = 2e-4
+FEW = 2000  #: Samples that tell most of what a column is like.
+ONCE = 0.2  #: Share of a log that no effort stays at its limit in one go.
+CLIPPED = 0.1  #: Time at the very extreme from which an effort is clipped. [s]
+#: Signals that may be stuck, and the finding then.
+STUCK = {
+    "q": "stuck-position",
+    "dq": "stuck-velocity",
+    "current": "stuck-effort",
+    "torque": "stuck-effort",
+}
 
 
 def unusable_findings(recording: Recording) -> Iterator[Remark]:
@@ -133,42 +66,34 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
             yield warning("absurd-values", signal=name, largest=largest)
 
 
-def signal_findings(recording: Recording, fit: VelocityFit | None) -> Iterator[Remark]:
-    """Findings about the signals, each check independent of the others."""
+def signal_findings(recording: Recording) -> Iterator[Remark]:
+    """Signals that are missing, of odd units or interpolated, each check independent."""
     if recording.dq is None:
         yield warning("no-velocity")
     if all(getattr(recording, name) is None for name in EFFORTS):
         yield warning("no-effort")
-    yield from odd_units(recording)
-    yield from interpolated(recording)
-    yield from velocity_findings(recording, fit)
-    yield from stuck_findings(recording)
-
-
-def odd_units(recording: Recording) -> Iterator[Remark]:
-    """Positions and currents too large for radians and ampere."""
-    # The last joint of some arms turns without end.
+    # Radians and ampere are never so large. The last joint of some arms turns without end.
     largest = float(np.max(np.abs(recording.q[:, : max(1, recording.joints - 1)])))
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
-        thinned = recording.current[:: max(1, recording.samples // SOME)]
-        typical = float(np.quantile(np.abs(thinned), 0.99))
+        typical = float(np.quantile(np.abs(recording.current[thinly(recording, SOME)]), 0.99))
         if typical > LARGE_CURRENT:
             yield warning("milliamperes", typical_A=typical)
+    if (effort := effort_of(recording)) is not None:
+        middle = slice(max(0, (recording.samples - SOME) // 2), (recording.samples + SOME) // 2)
+        t = recording.t[middle]
+        straight, _ = bends_of(t, recording.q[middle])
+        share, bends = bends_of(t, effort[1][middle])
+        knots = t[1:-1][bends]
+        if min(straight, share) >= STRAIGHT and len(knots) > 2:
+            rate = 1 / float(np.median(np.diff(knots)))
+            yield warning("interpolated", rate_Hz=rate, logged_Hz=1 / recording.median_step)
 
 
-def interpolated(recording: Recording) -> Iterator[Remark]:
-    """Positions and effort interpolated between few measured samples."""
-    if (effort := effort_of(recording)) is None:
-        return
-    middle = slice(max(0, (recording.samples - SOME) // 2), (recording.samples + SOME) // 2)
-    t = recording.t[middle]
-    shares, bends = zip(*(bends_of(t, x[middle]) for x in (recording.q, effort[1])), strict=True)
-    knots = t[1:-1][bends[1]]
-    if min(shares) >= STRAIGHT and len(knots) > 2:
-        rate = 1 / float(np.median(np.diff(knots)))
-        yield warning("interpolated", rate_Hz=rate, logged_Hz=1 / recording.median_step)
+def thinly(recording: Recording, count: int) -> slice:
+    """Some `count` rows, evenly spread over a log."""
+    return slice(None, None, max(1, recording.samples // count))
 
 
 def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
@@ -191,7 +116,7 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     """
     if recording.dq is None:
         return np.full(recording.joints, np.nan)
-    rows = slice(None, None, max(1, recording.samples // SOME))
+    rows = thinly(recording, SOME)
     speed = recording.dq[rows]
     power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
     gross = np.sum(np.abs(power), axis=0)
@@ -205,10 +130,8 @@ def work_shares(recording: Recording, effort: Array) -> Array:
 
 def effort_of(recording: Recording) -> tuple[str, Array] | None:
     """Name and values of the log's effort: torque before current."""
-    for name in ("torque", "current"):
-        if (value := getattr(recording, name)) is not None:
-            return name, value
-    return None
+    signals = ((name, getattr(recording, name)) for name in ("torque", "current"))
+    return next(((name, value) for name, value in signals if value is not None), None)
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
@@ -218,21 +141,217 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
         return
     name, value = effort
     shares = work_shares(recording, value)
-    (found,) = np.nonzero(shares < STRONG)
-    most = found.size >= max(2, round(0.6 * np.isfinite(shares).sum()))
+    turned = shares < STRONG
+    most = turned.sum() >= max(2, round(0.6 * np.isfinite(shares).sum()))
     if not most:  # a few joints only: nearly all their work
-        (found,) = np.nonzero(shares < ALONE)
-    if not found.size:
+        turned = shares < ALONE
+    if not turned.any():
         return
-    forward = recording.dq[:, found[0]] > NONZERO
+    first = int(np.argmax(turned))
+    forward = value[recording.dq[:, first] > NONZERO, first]
     yield warning(
         "effort-sign-by-work" if most else "effort-sign-of-some",
-        on_joints(found),
+        on_joints(turned),
         signal=name,
-        shares_percent=(100 * shares[found]).tolist(),
-        mean=float(np.mean(value[forward, found[0]])) if forward.any() else float("nan"),
+        shares_percent=(100 * shares[turned]).tolist(),
+        mean=float(np.mean(forward)) if forward.size else float("nan"),
         unit="A" if name == "current" else "N·m",
-        first=int(found[0]) + 1,
+        first=first + 1,
         column="current" if name == "current" else "tau",
         width=recording.joints,
     )
+
+
+def stuck_findings(recording: Recording) -> Iterator[Remark]:
+    """Joints without motion, and signals that hold, are zero, clipped or coarse."""
+    t, travel = recording.t, travel_of(recording)
+    still = travel < HELD
+    if still.all():
+        yield fact("at-rest", travel_mrad=1e3 * float(travel.max()))
+    elif still.any():
+        yield fact("still-joints" if still.sum() > 1 else "still-joint", on_joints(still))
+    for name, code in STUCK.items():
+        if stretches := stuck_stretches(recording, name):
+            _, first, last = max(stretches, key=lambda found: t[found[2]] - t[found[1]])
+            values = {"longest_s": float(t[last] - t[first]), "at_s": float(t[first])}
+            joints = {joint for joint, _, _ in stretches}
+            yield warning(code, on_joints(sorted(joints)), signal=name, **values)
+    yield from zero_signals(recording)
+    least = max(10, round(CLIPPED / recording.median_step))
+    for name, value in efforts_of(recording):
+        columns = zip(value.T, recording.q.T, strict=True)
+        clipped = {j for j, (x, q) in enumerate(columns) if is_clipped(x, q, least)}
+        if clipped and (clipped := clipped.difference(stuck_joints(recording, name))):
+            yield warning("saturation", on_joints(sorted(clipped)), signal=name)
+    yield from coarse_positions(recording)
+
+
+def efforts_of(recording: Recording) -> list[tuple[str, Array]]:
+    """Names and values of all efforts of a log."""
+    return [(name, x) for name in EFFORTS if (x := getattr(recording, name)) is not None]
+
+
+def travel_of(recording: Recording) -> Array:
+    """Travel of each joint in a part of the samples. (n,) [rad]"""
+    return np.asarray(np.ptp(recording.q[thinly(recording, FEW)], axis=0))
+
+
+def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
+    """Rows before those that repeat all of some signals, positions among them. (K,)"""
+    # One column rules most rows out, and the others are compared in what is left.
+    rows = np.flatnonzero(recording.q[1:, 0] == recording.q[:-1, 0])
+    for name in names:
+        if (value := getattr(recording, name)) is not None:
+            rows = rows[(value[rows + 1] == value[rows]).all(axis=1)]
+    return rows
+
+
+def edges_of(mask: Mask) -> tuple[Indices, Indices]:
+    """First sample of each run of a mask, and the one behind its last. (R,) each"""
+    first, last = np.array(runs_of(mask), dtype=np.intp).reshape(-1, 2).T
+    return first, last
+
+
+def stuck_joints(recording: Recording, name: str) -> list[int]:
+    """Joints of which a signal is stuck somewhere."""
+    return sorted({joint for joint, _, _ in stuck_stretches(recording, name)})
+
+
+def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int]]:
+    """Joint, first and last sample where a signal wrongly repeats itself."""
+    t, dq, value = recording.t, recording.dq, getattr(recording, name)
+    if dq is None or value is None:
+        return []
+    found = []
+    for j, first, last in long_repeats(recording, name):
+        rows, column = slice(first, last + 1), value[:, j]
+        time, turned, speed = t[rows], recording.q[rows, j], dq[rows, j]
+        way = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(time)))
+        if name == "q":
+            steps = np.abs(np.diff(column))
+            least = 3 * np.min(steps[steps > 0]) if steps.any() else 0.0
+            stuck = farthest(time, way) > max(WAY, least)
+        elif name == "dq":
+            stuck = farthest(time, turned - way) > WAY
+        else:
+            since = time - time.mean()
+            slope = since @ speed / (since @ since)
+            # An effort follows an acceleration that changes.
+            bent = np.std(speed - slope * since) > max(BENT, 0.03 * np.ptp(speed))
+            varies = bool(np.any(column))  # zero throughout is a finding of its own
+            stuck = (
+                farthest(time, turned) > WAY and bent and not is_extreme(column, rows) and varies
+            )
+        if stuck:
+            found.append((j, first, last))
+    return found
+
+
+def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, int]]:
+    """Long repeats of one joint's signal while its others change, as above."""
+    t, value = recording.t, getattr(recording, name)
+    same = value[1:] == value[:-1]
+    names = [n for n in ("q", "dq", *EFFORTS) if n != name]
+    others = [x for n in names if (x := getattr(recording, n)) is not None]
+    for j in range(value.shape[1]):
+        # A run of steps that change nothing ends with the sample behind its last step.
+        first, last = edges_of(same[:, j])
+        lengths = last - first
+        long = (t[last] - t[first] >= LONG) & (lengths >= MANY)
+        # Repeats of a coarse resolution come in all lengths, those of a stuck signal stand out.
+        usual = np.sort(lengths[~long])
+        least = UNUSUAL * usual[int(0.95 * len(usual))] if usual.size else 0.0
+        for a, b in zip(first[long].tolist(), last[long].tolist(), strict=True):
+            changes = (np.mean(np.diff(x[a : b + 1, j]) != 0) > 0.5 for x in others)
+            if b - a >= least and any(changes):
+                yield j, a, b
+
+
+def farthest(t: Array, way: Array) -> float:
+    """The longest way within half a second. [rad]"""
+    behind = np.searchsorted(t, t - LONG * (1 + 1e-9))
+    return float(np.max(np.abs(way - way[behind])))
+
+
+def is_extreme(value: Array, rows: slice) -> bool:
+    """Whether a stretch is at the extreme of a varying effort: saturation.
+
+    One that is long and the only time at its value is none: the effort came to stand there.
+    """
+    stretch, low, high = value[rows], value.min(), value.max()
+    at = stretch[0]
+    if len(stretch) > ONCE * len(value) + 1 and np.count_nonzero(value == at) == len(stretch):
+        return False
+    return bool(low < high and at in (low, high) and abs(at) >= 0.5 * (high - low))
+
+
+def zero_signals(recording: Recording) -> Iterator[Remark]:
+    """Signals that are zero in every sample, so were not measured."""
+    zeros = {}
+    for name in recording.signals:
+        value = getattr(recording, name)
+        # Nearly every column has another number among its first samples.
+        zero = ~value[:FEW].any(axis=0)
+        zeros[name] = zero & ~value.any(axis=0) if zero.any() else zero
+    for name, value in efforts_of(recording):
+        zero = zeros[name]
+        # Without noise a joint that never moves may need no torque at all.
+        measured = zero.all() or is_noisy(value[:, ~zero])
+        odd = zero if measured else zero & (travel_of(recording) >= TRAVEL)
+        if odd.any():
+            yield warning("zero-effort", on_joints(odd), signal=name)
+    for name in ("tau_ext", "wrench", "target_torque", "dq"):
+        if name in zeros and zeros[name].all():
+            level = fact if name in {"target_torque", "dq"} else warning
+            others = "tau_ext" in zeros and not zeros["tau_ext"].all()
+            beside = "-beside-tau-ext" if name == "wrench" and others else ""
+            yield level(f"zero-{name.replace('_', '-')}{beside}")
+
+
+def is_noisy(value: Array) -> bool:
+    """Whether most columns of a signal are rougher than motion: they were measured.
+
+    Steps of white noise differ by √3 times their own size.
+    """
+    steps = np.diff(value, axis=0)
+    rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
+    return bool(np.mean(rough) > 0.5)
+
+
+def is_clipped(value: Array, position: Array, least: int) -> bool:
+    """Whether an effort stays exactly at its extreme while the joint moves.
+
+    Args:
+        value: An effort that may vary. (T,)
+        position: The joint's position: a joint that is held needs one effort. (T,) [rad]
+        least: Samples in a row.
+    """
+    size = np.ptp(value)
+    for up in (value, -value):
+        extreme = up.max()
+        at = up == extreme
+        count = np.count_nonzero(at)
+        # A drive saturates far from zero; one that often repeats a small value rests.
+        if size == 0 or abs(extreme) < 0.5 * size or count < least:
+            continue
+        # The rounded top of a smooth effort of coarse resolution is wide on the next level too.
+        if np.count_nonzero(up == np.max(up[~at])) > 0.2 * count:
+            continue
+        long = (position[a:b] for a, b in runs_of(at) if b - a >= least)
+        if any(np.ptp(way) > HELD for way in long):
+            return True
+    return False
+
+
+def coarse_positions(recording: Recording) -> Iterator[Remark]:
+    """Positions that move in steps that are large beside what encoders resolve."""
+    sizes = {}
+    for j, column in enumerate(recording.q[thinly(recording, FEW)].T):
+        steps = np.diff(np.unique(column))
+        if steps.size < 20 or (size := float(steps.min())) < COARSE:
+            continue
+        whole = steps / size
+        if np.all(np.abs(whole - np.round(whole)) < 1e-3 * np.maximum(whole, 10)):
+            sizes[j] = 1e3 * size
+    if sizes:
+        yield fact("coarse-positions", on_joints(sizes), steps_mrad=list(sizes.values()))

@@ -1,4 +1,4 @@
-"""Findings on logged velocity beside position: unit, clock, order, lateness.
+"""Findings on the clock, and on logged velocity beside position: unit, order, lateness.
 
 Short windows fit the logged velocity as q̇(t) ≈ a·v(t) − a·τ·v̇(t): v is the derivative of
 the position, a the gain, τ the delay. Both sides get Hann's weights φ; by
@@ -10,14 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.doctor.findings import on_joints
-from vftcli.doctor.stuck import TRAVEL, stuck_joints, travel_of
+from vftcli.doctor.signals import TRAVEL, repeated_rows, stuck_joints, travel_of
 from vftcli.doctor.windows import spread
 from vftcli.signals.arrays import Array, Mask, median
-from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, warning
-from vftcli.signals.rest import MOVES
-from vftcli.signals.series import runs_of
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.remarks import Remark, fact, on_joints, warning
+from vftcli.signals.rest import MOVES, NONZERO
+from vftcli.signals.series import gaps_of, runs_of
 
 #: Length of a window: short beside motion, long beside noise of single samples and an arm's
 #: vibration. [s]
@@ -183,39 +182,27 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
         return
     if swapped := exchanged(fit):
         yield warning("velocity-order", on_joints(swapped))
-    held = held_shares(recording)
-    if held:
+    if held := held_shares(recording):
         yield warning("velocity-held", on_joints(held), shares_percent=list(held.values()))
     judged = fit.known
     judged[[*swapped, *held, *stuck_joints(recording, "dq")]] = False
-    yield from late_velocities(fit, judged, max(LATE, recording.median_step))
-
-
-def late_velocities(fit: VelocityFit, judged: Mask, limit: float) -> Iterator[Remark]:
-    """Findings on joints with a late velocity or another size.
-
-    Args:
-        fit: The fit.
-        judged: Joints without another cause. (n,)
-        limit: Least lag of a late one. [s]
-    """
     gain, sure = fit.gain, SURE * fit.gain_error
-    late = judged & (np.abs(fit.lag) - SURE * fit.lag_error > limit) & (gain > DAMPED_MOST)
+    surely = np.abs(fit.lag) - SURE * fit.lag_error
+    late = judged & (surely > max(LATE, recording.median_step)) & (gain > DAMPED_MOST)
     if late.any():
         # Of a squared motion of rate ω a first-order filter of time constant τ leaves
         # 1/(1 + ω²τ²), a delay all.
         share = median(fit.rate[late] * fit.lag[late]) ** 2
         lost = median(1 - fit.amplitude[late] ** 2)
         damped = median(fit.lag[late]) > 0 and share > DAMPED and lost > share / 2
-        lags = (1e3 * fit.lag[late]).tolist()
         code = "velocity-filtered" if damped else "velocity-lag"
-        yield warning(code, on_joints(np.flatnonzero(late)), lags_ms=lags)
+        yield warning(code, on_joints(late), lags_ms=(1e3 * fit.lag[late]).tolist())
     wrong = judged & ~late & (np.abs(gain - 1) - sure > GAIN)
     turned = wrong & (np.abs(gain + 1) < 0.3)
     beyond = wrong & ~turned & ((gain - sure > BEYOND) | (gain + sure < 1 / BEYOND))
     for code, mask in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond)):
         if mask.any():
-            yield warning(code, on_joints(np.flatnonzero(mask)), slopes=gain[mask].tolist())
+            yield warning(code, on_joints(mask), slopes=gain[mask].tolist())
     seen = {j: quantity_of(fit, j) for j in np.flatnonzero(beyond).tolist()}
     for quantity in dict.fromkeys(seen.values()):
         alike = [j for j in seen if seen[j] == quantity]
@@ -235,8 +222,18 @@ def quantity_of(fit: VelocityFit, joint: int) -> str:
 
 def common_cause(fit: VelocityFit | None) -> Remark | None:
     """The fault of all velocities: clock's unit or rate, or degrees; else None."""
-    factor = common_factor(fit) if fit is not None else None
-    if factor is None:
+    if fit is None:
+        return None
+    known = fit.known & (fit.open < OPEN)
+    if 2 * known.sum() <= fit.known.sum():
+        return None  # most follow another motion
+    gains, errors = fit.gain[known], fit.gain_error[known]
+    factor = median(gains)
+    if not np.all(np.abs(gains - factor) < GAIN * abs(factor) / 2 + SURE * errors):
+        return None
+    # A lag lowers the gain, as delay or filter: no clock's factor.
+    lost = np.max((fit.rate * fit.lag)[known] ** 2) + SURE * median(errors)
+    if abs(factor - 1) < lost:
         return None
     for ticks, unit in UNITS.items():
         if abs(factor / ticks - 1) < WIDE:
@@ -247,20 +244,6 @@ def common_cause(fit: VelocityFit | None) -> Remark | None:
         pace = "fast" if factor > 1 else "slow"
         return warning("clock-rate", gain=factor, percent=100 * abs(factor - 1), pace=pace)
     return None
-
-
-def common_factor(fit: VelocityFit) -> float | None:
-    """The gain of all joints; None if they differ or follow another motion."""
-    known = fit.known & (fit.open < OPEN)
-    if 2 * known.sum() <= fit.known.sum():
-        return None
-    gains, errors = fit.gain[known], fit.gain_error[known]
-    middle = median(gains)
-    if not np.all(np.abs(gains - middle) < GAIN * abs(middle) / 2 + SURE * errors):
-        return None
-    # A lag lowers the gain, as delay or filter: no clock's factor.
-    lost = np.max((fit.rate * fit.lag)[known] ** 2) + SURE * median(errors)
-    return 1.0 if abs(middle - 1) < lost else middle
 
 
 def in_degrees(factor: float) -> bool:
@@ -304,3 +287,70 @@ def held_shares(recording: Recording) -> dict[int, float]:
         if np.mean(jumps < 1.5 * np.quantile(jumps, 0.05)) < 0.5:
             found[j] = 100 * float(shares[j])
     return found
+
+
+SLOW_RATE = 50.0  #: Rate below which a contact of .1 s is a handful of samples. [Hz]
+#: Spread of nine steps in ten, relative to their median, at which a fixed step is visibly wrong.
+JITTER = 0.05
+GAP_STEPS = 4.0  #: A step this many times the median is a gap.
+LONG_GAP = 0.1  #: A gap longer than this can hide a whole contact. [s]
+MISSED = (1.6, 3.4)  #: Steps over the median where one or two samples were missed.
+SHORT = 2.0  #: Shorter logs tell little of noise and nothing of repeated motion. [s]
+STALE = 0.003  #: Share of rows that repeat the one before, from which it is worth telling.
+
+
+def clock_findings(
+    recording: Recording, fit: VelocityFit | None, part: Recording | None = None
+) -> Iterator[Remark]:
+    """Findings about the clock, each check independent of the others.
+
+    Args:
+        recording: The log.
+        fit: How its velocities fit its positions.
+        part: Stretches of it where all signals have no room; None for all of it.
+    """
+    common = common_cause(fit)
+    if common is not None and common.code in {"time-unit", "clock-rate"}:
+        yield common
+        if common.code == "time-unit":
+            return  # what else is odd about its steps is this
+    if recording.duration < SHORT:
+        yield fact("short", duration_s=recording.duration)
+    if (rate := 1 / recording.median_step) < SLOW_RATE:
+        yield warning("slow-rate", rate_Hz=rate)
+    yield from uneven_steps(recording)
+    source = recording.source
+    if source.duplicates:
+        share = 100 * source.duplicates / max(source.rows, 1)
+        repeats, level = source.duplicates, warning if share > 10 else fact
+        yield level("repeated-stamps", repeats=repeats, rows=source.rows, share_percent=share)
+    # Rows that repeat the row before under a new stamp: a packet that was late.
+    part = part or recording
+    last = repeated_rows(part, JOINT_SIGNALS)
+    share = len(last) / (part.samples - 1)
+    # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
+    if part.dq is not None and STALE <= share <= 0.9 and np.abs(part.dq[last]).max() >= NONZERO:
+        yield fact("stale-rows", stale=len(last), share_percent=100 * share)
+
+
+def uneven_steps(recording: Recording) -> Iterator[Remark]:
+    """Samples that were missed, steps that vary, and gaps with the longest of them."""
+    t, usual, source = recording.t, recording.median_step, recording.source
+    steps = np.diff(t)
+    missed = int(np.sum((steps > MISSED[0] * usual) & (steps < MISSED[1] * usual)))
+    if missed > 0.001 * len(steps):
+        yield fact("missing-samples", missed=missed, steps=len(steps))
+    # A gap is no jitter: it has its own finding.
+    even = steps[steps < GAP_STEPS * usual]
+    low, high = np.percentile(even, [5, 95], overwrite_input=True).tolist()
+    if (width := (high - low) / usual) > JITTER:
+        values = {"spread_percent": 100 * width, "low_ms": 1e3 * low, "high_ms": 1e3 * high}
+        yield fact("jitter", **values, clock=source.clock)
+    at = gaps_of(t, GAP_STEPS)
+    gaps = np.column_stack([steps[at], t[at]])
+    for cut in source.cuts:  # has a finding of its own
+        gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
+    if len(gaps):
+        longest, begun = gaps[np.argmax(gaps[:, 0])].tolist()
+        level = warning if longest > LONG_GAP else fact
+        yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)

@@ -69,13 +69,12 @@ class RobustFit(NamedTuple):
     @property
     def size(self) -> float:
         """Root mean square of the torque left over in the kept windows. [N·m]"""
-        return float(np.sqrt(np.mean(self.rest[self.kept] ** 2)))
+        return size_of(self.rest[self.kept])
 
     @property
     def by_joint(self) -> Array:
         """That of each joint. (n,) [N·m]"""
-        size: Array = np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0))
-        return size
+        return np.asarray(np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0)))
 
 
 def solve(target: Array, by: Terms) -> RobustFit:
@@ -89,10 +88,10 @@ def solve(target: Array, by: Terms) -> RobustFit:
     across = columns.swapaxes(1, 2)
     gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
     used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
-    kept = np.ones(len(target), dtype=bool)
+    kept, prior = np.ones(len(target), dtype=bool), np.diag(by.prior**-2)
 
     def inverse() -> Array:
-        return inverse_of((gram[kept].sum(axis=0) + np.diag(by.prior**-2))[np.ix_(used, used)])
+        return inverse_of((gram[kept].sum(axis=0) + prior)[np.ix_(used, used)])
 
     for _ in range(ROUNDS):
         values = np.zeros(len(used))
@@ -120,27 +119,20 @@ class Windows:
     t: Array  #: Those instants. (W, K) [s]
     q: Array  #: Positions at a few instants of each window. (W, K, n) [rad]
     dq: Array  #: Velocities there. (W, K, n) [rad/s]
-    motion: Array  #: Mean direction and mean speed of every joint. (2, W, n) [-, rad/s]
+    motion: Array  #: Mean direction and mean speed of every joint. (W, 2, n) [-, rad/s]
 
     def exchanged(self, i: int, j: int, few: Indices) -> "Windows":
         """Some of the windows, all signals of two joints in them exchanged."""
-        order = np.arange(self.q.shape[2])
-        order[[i, j]] = j, i
-        q, dq, motion = self.q[few], self.dq[few], self.motion[:, few]
-        return replace(
-            self,
-            first=self.first[few],
-            last=self.last[few],
-            t=self.t[few],
-            q=q[:, :, order],
-            dq=dq[:, :, order],
-            motion=motion[:, :, order],
-        )
+        times = {name: getattr(self, name)[few] for name in ("first", "last", "t")}
+        signals = {name: getattr(self, name)[few] for name in ("q", "dq", "motion")}
+        for values in signals.values():
+            values[:, :, [i, j]] = values[:, :, [j, i]]
+        return replace(self, **times, **signals)
 
     @property
     def ways(self) -> Indices:
         """Windows in which each joint moves forth, and back. (2, n)"""
-        direction = self.motion[0]
+        direction = self.motion[:, 0]
         return np.stack([(direction > FAST).sum(axis=0), (direction < -FAST).sum(axis=0)])
 
     @cached_property
@@ -161,14 +153,13 @@ class Windows:
         """
         few = self.q[:, GRAVITY]
         held = gravity_by_up(self.chain, few.reshape(-1, few.shape[2]))
-        grouped = held.reshape(*few.shape, 3)
-        return np.asarray(np.einsum("k,wk...->w...", SIMPSON, grouped))
+        return np.asarray(np.einsum("k,wk...->w...", SIMPSON, held.reshape(*few.shape, 3)))
 
     @cached_property
     def friction(self) -> Terms:
         """Coulomb and viscous friction of every joint, which only ever take energy."""
-        each = [motion[:, :, None] * np.eye(motion.shape[1]) for motion in self.motion]
-        return terms(np.concatenate(each, axis=2), positive=True)
+        each = self.motion[..., None] * np.eye(self.q.shape[2])
+        return terms(np.concatenate([each[:, 0], each[:, 1]], axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:
@@ -189,7 +180,6 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
     first = first[spread(len(first), WINDOWS)]
     last = first + length
     at = first[:, None] + np.linspace(0, length, POINTS).round().astype(int)
-    motion = [means(t, value, first, last) for value in (np.tanh(dq / SLOW), dq)]
     return Windows(
         recording=recording,
         chain=robot.loaded_chain,
@@ -198,7 +188,7 @@ def windows_of(recording: Recording, robot: Robot) -> Windows:
         t=t[at],
         q=recording.q[at],
         dq=dq[at],
-        motion=np.stack(motion),
+        motion=np.stack([means(t, x, first, last) for x in (np.tanh(dq / SLOW), dq)], axis=1),
     )
 
 
@@ -252,7 +242,6 @@ VARIED = 0.3
 #: there where the log without it leaves less than this share of what is left with it.
 FELT, REFUTED = 4.0, 0.6
 LASTING = 0.95  #: Share of the windows in which a cause that lasts must not be refuted.
-UPRIGHT = np.array([0.0, 0.0, 1.0])  #: The robot file's own "up".
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -264,7 +253,7 @@ class Case:
     size: float  #: Root mean square of the column that was logged. [N·m]
     constant: Array  #: Torque per unit of the column that was logged, joint by joint. (n,)
     #: Direction of "up" in axes of which the third is the robot file's own. (3,)
-    up: Array = field(default_factory=lambda: UPRIGHT)
+    up: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
 
     @cached_property
     def gravity(self) -> Array:
@@ -336,10 +325,9 @@ class Case:
 
     def exchanged(self, i: int, j: int) -> "Case":
         """The log with the logged efforts of two joints exchanged."""
-        order = np.arange(len(self.constant))
-        order[[i, j]] = j, i
         logged = self.given / self.constant
-        return replace(self, given=logged[:, order] * self.constant)
+        logged[:, [i, j]] = logged[:, [j, i]]
+        return replace(self, given=logged * self.constant)
 
 
 def size_of(given: Array) -> float:

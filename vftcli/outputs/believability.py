@@ -12,8 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.doctor.examination import REFUSING
-from vftcli.doctor.findings import in_words
+from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
 from vftcli.outputs.answer import answer, free_words, hardest_words

@@ -8,8 +8,7 @@ import numpy as np
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, Latency, latencies, run_closed_loop
 from vftcli.admittance.law import UnstableError
-from vftcli.admittance.metrics import drags_of, releases_of, rows_of
-from vftcli.admittance.motion import release
+from vftcli.admittance.motion import drags_of, release, releases_of, rows_of
 from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling

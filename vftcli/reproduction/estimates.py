@@ -9,7 +9,7 @@ import polars as pl
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.driving_force import stored_force
-from vftcli.admittance.metrics import SHARES, Drag, return_time
+from vftcli.admittance.motion import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation

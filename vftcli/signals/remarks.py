@@ -25,6 +25,8 @@ from vftcli.signals.shown import Shown
 if TYPE_CHECKING:
     import polars as pl
 
+    from vftcli.signals.arrays import Mask
+
 #: A fact informs, a caution limits what can be said, a warning can make results wrong.
 Level = Literal["fact", "caution", "warning"]
 WORDS = Path(__file__).parent / "words"  #: The catalogue: a file a room.
@@ -89,6 +91,13 @@ class Remarks(Shown, tuple[Remark, ...]):
         joints = [list(remark.where.joints) for remark in self]
         table = pl.DataFrame(rows, dict.fromkeys(names, pl.String), orient="row")
         return table.with_columns(pl.Series("joints", joints, pl.List(pl.Int64)))
+
+
+def on_joints(joints: "Iterable[int] | Mask") -> Where:
+    """The place of a remark about some joints: a mask, or their numbers from zero."""
+    is_mask = str(getattr(joints, "dtype", "")) == "bool"
+    numbers = (j for j, one in enumerate(joints) if one) if is_mask else joints
+    return Where(joints=tuple(int(j) + 1 for j in numbers))
 
 
 def fact(code: str, where: Where = Where(), **values: object) -> Remark:  # noqa: B008 - immutable
