@@ -15,8 +15,7 @@ from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs

@@ -6,8 +6,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array

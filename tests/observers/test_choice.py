@@ -110,14 +110,6 @@ def test_set_goes_before_a_file_and_a_file_before_the_robot(tmp_path: Path) -> N
     assert gain(both) == 33.0
 
 
-def test_a_file_leaves_what_it_does_not_name(tmp_path: Path) -> None:
-    file = tmp_path / "gains.toml"
-    file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")
-    there = ObserverChoice(gains=file).gains_over(UR5.gains)
-    assert there["kfo"] == UR5.gains["kfo"]
-    assert UR5.gains["gmo"]["gain"] != 21.0
-
-
 def test_gains_of_a_file_are_not_the_robot_s(tmp_path: Path) -> None:
     file = tmp_path / "gains.toml"
     file.write_text("[observers.gmo]\ngain = 21.0\n", encoding="utf-8")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.observers.error_band import ENOUGH, UNSEEN, FreeError, error_band, free_error
+from vftcli.observers.spectra import ENOUGH, UNSEEN, FreeError, error_band, free_error
 from vftcli.robots.friction import HELD
 
 FRICTION = np.array([4.0, 0.0])

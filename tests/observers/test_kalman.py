@@ -8,8 +8,13 @@ import pytest
 from scipy.linalg import expm, solve_discrete_are
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_model import NOISE_CONVENTIONS, Covariance, Densities, zero_order_hold
-from vftcli.observers.uneven import gain_sequence
+from vftcli.observers.kalman_model import (
+    NOISE_CONVENTIONS,
+    Covariance,
+    Densities,
+    gain_sequence,
+    zero_order_hold,
+)
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.steady_filter import PIECE
@@ -38,7 +43,7 @@ def dense(observer: KalmanObserver, log: DynamicsTerms) -> tuple[np.ndarray, np.
     n, clock = log.joints, log.clock
     eye, zero = np.eye(n), np.zeros((n, n))
     C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = observer.steady(clock.step, n).prior
+    prior = observer.first_prior(clock.step, n)
     P = np.block(
         [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
     )
@@ -201,15 +206,16 @@ def test_the_printed_44_is_unsymmetric_indefinite_and_a_quarter_sample_faster() 
 def test_closed_form_gains_are_scipys_riccati(scheme: str, convention: str, step: float) -> None:
     observer = paper(scheme, convention)
     settled, m = observer.steady(step, 6), observer.model(step, 6)
+    prior = observer.first_prior(step, 6)
     for j in (0, 3):
         A = np.array([[1.0, m.a12[j]], [0.0, m.a22[j]]])
         Q = np.array([[m.q11[j], m.q12[j]], [m.q12[j], m.q22[j]]])
         P = solve_discrete_are(A.T, np.array([[1.0], [0.0]]), Q, np.array([[m.r[j]]]))
-        found = [getattr(settled.prior, name)[j] for name in ("p11", "p12", "p22")]
+        found = [getattr(prior, name)[j] for name in ("p11", "p12", "p22")]
         # SciPy's solver is good to about 1e-9 on these ill-scaled problems
         np.testing.assert_allclose(found, [P[0, 0], P[0, 1], P[1, 1]], rtol=1e-8)
         L = P[:, 0] / (P[0, 0] + m.r[j])
-        np.testing.assert_allclose([settled.gains.l1[j], settled.gains.l2[j]], L, rtol=1e-8)
+        np.testing.assert_allclose([settled.l1[j], settled.l2[j]], L, rtol=1e-8)
 
 
 def test_started_from_the_stationary_prior_there_is_no_transient() -> None:
@@ -217,9 +223,9 @@ def test_started_from_the_stationary_prior_there_is_no_transient() -> None:
     observer = paper("fe")
     settled = observer.steady(STEP, 6)
     model = observer.model(np.full((300, 1), STEP), 6)
-    gains = gain_sequence(model, settled.prior, settled.gains.posterior)
-    np.testing.assert_allclose(gains.l1, np.tile(settled.gains.l1, (300, 1)), rtol=1e-11)
-    np.testing.assert_allclose(gains.posterior.p22[-1], settled.gains.posterior.p22, rtol=1e-11)
+    gains = gain_sequence(model, observer.first_prior(STEP, 6), settled.posterior)
+    np.testing.assert_allclose(gains.l1, np.tile(settled.l1, (300, 1)), rtol=1e-11)
+    np.testing.assert_allclose(gains.posterior.p22[-1], settled.posterior.p22, rtol=1e-11)
 
 
 @pytest.mark.parametrize("scheme", ["fe", "zoh"])
@@ -324,7 +330,7 @@ def test_gains_are_found_for_a_covariance_that_forgets_slowly() -> None:
     samples = 900
     model = observer.model(np.full((samples, 1), STEP), 1)
     start = Covariance(np.array([10.0]), np.array([0.0]), np.array([1e3]))
-    guess = observer.steady(STEP, 1).gains.posterior
+    guess = observer.steady(STEP, 1).posterior
     found = gain_sequence(model, start, guess).posterior.p22[-1, 0]
     P, m = np.array([10.0, 0.0, 1e3]), observer.model(STEP, 1)
     for k in range(samples):

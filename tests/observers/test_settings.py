@@ -16,7 +16,6 @@ from vftcli.observers.table import (
     load_gains,
     overlay_gains,
     parse_settings,
-    sections,
 )
 from vftcli.robots import PROFILES, load_robot
 from vftcli.signals.errors import ParameterError, VftError
@@ -24,7 +23,7 @@ from vftcli.signals.errors import ParameterError, VftError
 
 def setup(robot: str, *assignments: str, joints: int = 6, step: float = 0.008) -> Setup:
     gains = load_robot(robot).gains if robot else {}
-    settings = parse_settings(assignments, sections())
+    settings = parse_settings(assignments)
     return Setup(gains=gains, settings=settings, joints=joints, step=step, as_printed=False)
 
 
@@ -123,7 +122,7 @@ MALFORMED = {
 @pytest.mark.parametrize("assignment", MALFORMED)
 def test_a_malformed_assignment_says_what_is_wrong(assignment: str) -> None:
     with pytest.raises(ParameterError, match=MALFORMED[assignment]):
-        parse_settings([assignment], sections())
+        parse_settings([assignment])
 
 
 def test_another_number_of_gains_is_refused() -> None:
@@ -141,7 +140,7 @@ def test_an_unknown_observer_lists_what_there_is() -> None:
 def test_sections_are_read_as_a_robot_file_s(tmp_path: Path) -> None:
     path = tmp_path / "gains.toml"
     path.write_text("[observers.gmo]\ngain = [1.0, 2.0]\n[observers.kfo-rts]\nr_diag = 0.1\n")
-    assert load_gains(path, sections()) == {
+    assert load_gains(path) == {
         "gmo": {"gain": [1.0, 2.0]},
         "kfo-rts": {"r_diag": 0.1},
     }
@@ -175,7 +174,7 @@ def test_what_is_no_gains_file_is_refused(tmp_path: Path, text: str, words: str)
     path = tmp_path / "gains.toml"
     path.write_text(text)
     with pytest.raises(VftError, match=words):
-        load_gains(path, sections())
+        load_gains(path)
 
 
 def test_a_robot_file_s_gains_are_checked_like_a_gains_file_s(tmp_path: Path) -> None:
@@ -199,7 +198,7 @@ def test_the_upper_layer_wins_parameter_by_parameter() -> None:
 
 def test_a_word_that_is_no_file_of_gains_says_which_words_there_are(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="--gains takes auto, paper, or a file"):
-        load_gains(tmp_path / "papper", {})
+        load_gains(tmp_path / "papper")
 
 
 def test_gains_come_from_a_pipe_too() -> None:
@@ -207,6 +206,6 @@ def test_gains_come_from_a_pipe_too() -> None:
     os.write(write, b"[observers.gmo]\ngain = 12.0\n")
     os.close(write)
     try:
-        assert load_gains(Path(f"/dev/fd/{read}"), sections()) == {"gmo": {"gain": 12.0}}
+        assert load_gains(Path(f"/dev/fd/{read}")) == {"gmo": {"gain": 12.0}}
     finally:
         os.close(read)

@@ -25,7 +25,7 @@ def dense_rts(smooth: KalmanSmoother, log: DynamicsTerms) -> tuple[np.ndarray, n
     f, n, clock = smooth.filter, log.joints, log.clock
     eye, zero = np.eye(n), np.zeros((n, n))
     C, whole = np.hstack([eye, zero]), np.eye(2 * n)
-    prior = f.steady(clock.step, n).prior
+    prior = f.first_prior(clock.step, n)
     P = np.block(
         [[np.diag(prior.p11), np.diag(prior.p12)], [np.diag(prior.p12), np.diag(prior.p22)]]
     )

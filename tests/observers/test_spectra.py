@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_runs import samples_of
 
-from vftcli.observers.spectra import Spectra, around_impacts, looks_free, neighbour_mean, spectra_of
+from vftcli.observers.spectra import Spectra, looks_free, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
@@ -208,7 +208,6 @@ def test_a_part_of_impacts_alone_has_the_spectrum_of_the_impacts() -> None:
     found = spectra_of(samples_of(terms, tap), [samples_of(terms, t < 10.0)])
     power = float(np.sum(found.loaded - found.free) * found.width)
     assert power == pytest.approx(np.mean(tau[tap] ** 2), rel=0.25)
-    assert np.array_equal(around_impacts(t, t > 10.0), t > 10.0)  # lasts, so stays as it is
 
 
 def spectra(contact: float) -> Spectra:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_model import Covariance, Gains, update
-from vftcli.observers.uneven import gain_sequence
+from vftcli.observers.kalman_model import Covariance, Gains, gain_sequence
 from vftcli.robots.terms import DynamicsTerms
 
 SAMPLES = 3000
@@ -28,7 +27,7 @@ def looped(
     rounding does not add up over the samples.
     """
     model = observer.model(dt[:, None], len(prior.p11))
-    found = [update(prior, model.r[0])]
+    found = [joseph(prior, model.r[0])]
     for k in range(1, len(dt)):
         p11, p12, p22 = found[-1].posterior if before is None else (p[k - 1] for p in before)
         moved = p12 + model.a12[k] * p22
@@ -37,10 +36,24 @@ def looped(
             model.a22[k] * moved + model.q12[k],
             model.a22[k] ** 2 * p22 + model.q22[k],
         )
-        found.append(update(prior, model.r[k]))
+        found.append(joseph(prior, model.r[k]))
     p11, p12, p22 = (np.array([getattr(g.posterior, n) for g in found]) for n in Covariance._fields)
     l1, l2 = (np.array([getattr(g, n) for g in found]) for n in ("l1", "l2"))
-    return Gains(l1, l2, Covariance(p11, p12, p22))
+    return Gains(l1, l2, Covariance(p11, p12, p22), np.array([g.S for g in found]))
+
+
+def joseph(prior: Covariance, r: np.ndarray) -> Gains:
+    """The update (I − LC)P(I − LC)ᵀ + LRLᵀ, written out."""
+    p11, p12, p22 = prior
+    S = p11 + r
+    # 1 − L₁ as a quotient: the difference would lose every digit of a small r.
+    l1, l2, rest = p11 / S, p12 / S, r / S
+    posterior = Covariance(
+        rest**2 * p11 + l1**2 * r,
+        rest * (p12 - l2 * p11) + l1 * l2 * r,
+        p22 - 2.0 * l2 * p12 + l2**2 * p11 + l2**2 * r,
+    )
+    return Gains(l1, l2, posterior, S)
 
 
 SETTINGS = {
@@ -62,10 +75,10 @@ def test_gains_are_those_of_the_plain_loop(setting: str, scheme: str) -> None:
     more, dt, first = SETTINGS[setting]
     observer = KalmanObserver(discretisation=scheme, **more)
     settled = observer.steady(0.008, 2)
-    prior = settled.prior
+    prior = observer.first_prior(0.008, 2)
     if first is not None:
         prior = Covariance(np.full(2, first), np.zeros(2), np.full(2, first))
-    found = gain_sequence(observer.model(dt[:, None], 2), prior, settled.gains.posterior)
+    found = gain_sequence(observer.model(dt[:, None], 2), prior, settled.posterior)
     expected = looped(observer, dt, prior, found.posterior)
     # P₁₂, and L₂ = P₁₂/R with it, passes zero behind a gap and keeps no digits of its own there:
     # it is held against √(P₁₁P₂₂). A block starts from other roundings: 200 eps of that were seen.
@@ -86,7 +99,7 @@ def test_the_filter_is_the_plain_loop(samples: int, q_tau: float) -> None:
     observer = KalmanObserver(q_tau_diag=q_tau, initial_covariance=np.array([1.0, 0.0, 9.0]))
     found = observer.estimate(log)
     dt = np.broadcast_to(log.dt[:, 0], samples)
-    gains = looped(observer, dt, observer.first_prior(observer.steady(log.clock.step, 2)))
+    gains = looped(observer, dt, observer.first_prior(log.clock.step, 2))
     model, e, tau = observer.model(dt[:, None], 2), np.zeros(2), np.zeros(2)
     for k in range(samples):
         x = e - model.a12[k] * tau + log.d[k]

@@ -10,8 +10,7 @@ from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.repetition.choice import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
-from vftcli.repetition.ladder import RUNGS
+from vftcli.repetition.difference import RUNGS
 from vftcli.signals.errors import ReferenceTorqueError
 
 

@@ -3,16 +3,14 @@
 import numpy as np
 import pytest
 
-from vftcli.repetition.error_model import (
+from vftcli.repetition.difference import (
     ErrorModel,
-    less_noise,
     local_rms,
+    noise_below,
     noise_of,
     noise_when_quiet,
     off_line,
     rms,
-    slope_noise,
-    white,
 )
 from vftcli.robots.run import band
 from vftcli.signals.filters import low_pass
@@ -22,17 +20,10 @@ T = STEP * np.arange(6000)
 MOVING = np.ones((6000, 1), dtype=bool)
 
 
-def test_the_slope_noise_is_taken_off_as_power() -> None:
-    """A motion error of √20 N·m with a slope noise of 2 N·m in it is 4; none is left of less."""
-    assert less_noise(np.sqrt([20.0]), np.array([2.0])) == pytest.approx(4.0)
-    assert less_noise(np.array([1.0]), np.array([2.0])) == 0.0
-
-
 def test_white_noise_is_measured_under_a_smooth_signal() -> None:
     rng = np.random.default_rng(1)
     x = 0.3 * rng.standard_normal((6000, 1)) + 10.0 * np.sin(2 * np.pi * 0.5 * T)[:, None]
-    assert white(x, MOVING) == pytest.approx(0.3, rel=0.05)  # 6000 samples tell 1 %
-    assert noise_of(T, x, MOVING, STEP, None) == pytest.approx(0.3, rel=0.05)
+    assert noise_of(T, x, MOVING, STEP, None) == pytest.approx(0.3, rel=0.05)  # 6000 tell 1 %
 
 
 @pytest.mark.parametrize("cutoff", [6.0, 12.0])
@@ -83,7 +74,8 @@ def test_what_a_differentiated_noise_leaves() -> None:
     p = np.random.default_rng(3).standard_normal((6000, 1))
     slope = np.gradient(low_pass(T, p, 8.0), T, axis=0)
     shown = float(np.sqrt(np.mean(slope[50:-50] ** 2)))
-    assert slope_noise(T, p, MOVING, STEP, 8.0) == pytest.approx(shown, rel=0.1)
+    found = noise_below(T, p, MOVING, STEP, band(STEP, 8.0), 8.0, slope=1)
+    assert found == pytest.approx(shown, rel=0.1)
 
 
 def test_a_local_mean_square_spans_a_tenth_of_a_second() -> None:

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
+from vftcli.repetition.cycles import Cycles, FreeCycles, find_free_cycles
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
@@ -59,7 +58,7 @@ def test_of_cycles_that_are_all_alike_the_last_is_left_to_be_compared(
     assert found.numbers == (0, 1)
     assert found.residuals is not None
     np.testing.assert_allclose(found.residuals, 1.0, atol=0.5)  # noise alone
-    assert found.remark(CYCLES.whole).code == "free-cycles-found"
+    assert found.remarks(CYCLES.whole)[0].code == "free-cycles-found"
 
 
 def test_a_log_shorter_than_a_cycle_has_no_free_one(pushed: Callable[..., Run]) -> None:

@@ -111,11 +111,11 @@ def test_the_fit_finds_the_weights_of_its_own_columns() -> None:
     rng = np.random.default_rng(4)
     A = rng.standard_normal((400, 2, 3))
     weights = np.array([2.0, -1.0, 0.5])
-    found = weigh(A @ weights + 0.1 * rng.standard_normal((400, 2)), A, np.full(3, 20.0))
-    np.testing.assert_allclose(found.weights, weights, atol=0.02)  # 4 sd of .1/√800
-    np.testing.assert_allclose(found.left, 0.1, rtol=0.15)
+    found, sd, left = weigh(A @ weights + 0.1 * rng.standard_normal((400, 2)), A, np.full(3, 20.0))
+    np.testing.assert_allclose(found, weights, atol=0.02)  # 4 sd of .1/√800
+    np.testing.assert_allclose(left, 0.1, rtol=0.15)
     # nine samples count as one: sd = .1·√(9/800)
-    np.testing.assert_allclose(found.sd, 0.1 * np.sqrt(9 / 800), rtol=0.2)
+    np.testing.assert_allclose(sd, 0.1 * np.sqrt(9 / 800), rtol=0.2)
 
 
 def test_what_lies_far_from_a_piece_is_not_heard(

@@ -9,8 +9,7 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.repetition.two_cycle import partners_in_log, partners_in_logs
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run

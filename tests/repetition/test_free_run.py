@@ -9,7 +9,7 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition import alignment as room
-from vftcli.repetition.free_run import FreeRun
+from vftcli.repetition.free_motion import FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError

@@ -5,10 +5,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.error_model import ErrorModel
-from vftcli.repetition.ladder import WORTH, Difference, difference, differences, most_certain
-from vftcli.repetition.laid_over import LaidOver
-from vftcli.repetition.pairing import pair_with_run
+from vftcli.repetition.difference import (
+    WORTH,
+    Difference,
+    ErrorModel,
+    difference,
+    differences,
+    most_certain,
+)
+from vftcli.repetition.paired_runs import PairedRuns, pair_with_run
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 
@@ -33,7 +38,7 @@ MODEL, FREE_MODEL = RNG.standard_normal((2, len(T), 1))
 def test_a_difference_is_free_less_loaded_with_the_model_s_own_taken_off(drive: Make) -> None:
     """τ + τ_ext is what the model says of each motion: the push comes out exactly."""
     loaded, free = drive(MODEL - PUSH, MODEL), drive(FREE_MODEL, FREE_MODEL)
-    laid = LaidOver(motion=loaded, pairings=[pair_with_run(T, free, 0.0)])
+    laid = PairedRuns(motion=loaded, pairings=[pair_with_run(T, free, 0.0)])
     corrected = difference(laid, "model", None)
     np.testing.assert_allclose(corrected.tau, PUSH, atol=1e-9)
     plain = difference(laid, "period", None)
@@ -57,7 +62,7 @@ def test_rungs_without_their_clock_are_left_out(drive: Make) -> None:
 
 def test_too_few_partners_are_refused(drive: Make) -> None:
     loaded = drive(MODEL, MODEL)
-    laid = LaidOver(motion=loaded, pairings=[pair_with_run(T, loaded, T[-1] - T[14])])
+    laid = PairedRuns(motion=loaded, pairings=[pair_with_run(T, loaded, T[-1] - T[14])])
     with pytest.raises(ReferenceTorqueError, match="only 15 samples have a partner"):
         difference(laid, "period", None)
 
@@ -71,13 +76,13 @@ def test_the_simpler_of_two_alike_is_taken() -> None:
         )
 
     low = made("period", 1.0, 1.0)
-    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)]).chosen.rung == "period"
-    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)]).chosen.rung == "phase"
+    assert most_certain([low, made("phase", WORTH + 0.01, WORTH + 0.01)])[0].rung == "period"
+    assert most_certain([low, made("phase", WORTH - 0.01, WORTH - 0.01)])[0].rung == "phase"
     better = [low, made("phase", 0.9, 0.9), made("model", 0.9 * WORTH + 0.01, 0.88)]
-    assert most_certain(better).chosen.rung == "phase"
+    assert most_certain(better)[0].rung == "phase"
     # A joint that stands decides nothing.
     stands = replace_standing(made("model", 0.5, 9.0), joint=1)
-    assert most_certain([replace_standing(low, joint=1), stands]).chosen.rung == "model"
+    assert most_certain([replace_standing(low, joint=1), stands])[0].rung == "model"
 
 
 def replace_standing(made: Difference, joint: int) -> Difference:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.ladder import RUNGS
-from vftcli.repetition.periodicity import find_period
+from vftcli.repetition.cycles import find_period
+from vftcli.repetition.difference import RUNGS
 from vftcli.repetition.two_cycle import two_cycle_difference
 from vftcli.robots import load_robot
 from vftcli.signals.arrays import Array

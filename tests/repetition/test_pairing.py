@@ -5,13 +5,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.cycles import Cycles
-from vftcli.repetition.pairing import (
+from vftcli.repetition.cycles import Cycles, pair_with_cycle
+from vftcli.repetition.paired_runs import (
     Pairing,
     by_phase,
     in_gap,
     mean_of,
-    pair_with_cycle,
     pair_with_run,
 )
 from vftcli.robots.run import Run

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.repetition.cycles import segment
-from vftcli.repetition.periodicity import find_period, moving_part
+from vftcli.repetition.cycles import find_period, moving_part, segment
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 

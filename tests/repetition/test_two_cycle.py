@@ -10,7 +10,7 @@ import pytest
 
 from vftcli.readers import read
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.ladder import RUNGS
+from vftcli.repetition.difference import RUNGS
 from vftcli.repetition.two_cycle import friction_change, two_cycle_difference
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run

@@ -94,7 +94,7 @@ class OnlineKalman:
         self.pin, self.model, self.robot, self.step = pin, robot.model, robot, step
         self.averaged, self.friction = averaged, RunningFriction(robot.friction)
         self.data: Any = self.model.createData()
-        self.system, self.gains = observer.model(step, n), observer.steady(step, n).gains
+        self.system, self.gains = observer.model(step, n), observer.steady(step, n)
         self.p: Array | None = None
         self.mu, self.tau = np.zeros(n), np.zeros(n)
 

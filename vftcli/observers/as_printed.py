@@ -17,18 +17,10 @@ and so does the covariance: all four entries are carried, and the gain is its le
 
 import numpy as np
 
-from vftcli.observers.kalman_model import (
-    Covariance,
-    Densities,
-    Discrete,
-    Gains,
-    KalmanState,
-    Steady,
-)
-from vftcli.observers.uneven import recursion
+from vftcli.observers.kalman_model import Covariance, Densities, Discrete, Gains, KalmanState
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array
-from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.steady_filter import filtered
 
 #: Relative change of a covariance in one sample from which on rounding moves it alone.
 SETTLED = 1e-14
@@ -71,9 +63,9 @@ def updated(prior: Array, r: Array) -> tuple[Array, Array]:
     return gain, prior - gain[:, None] * prior[0]
 
 
-def settled_prior(model: Discrete, noise: Array) -> Array:
+def settled_prior(model: Discrete, d: Densities) -> Array:
     """Settled covariance before a measurement, constant sample time. (2, 2, n)"""
-    prior = noise
+    prior = noise = printed_noise(model, d)
     for _ in range(LONGEST):
         before = prior
         prior = predicted(updated(prior, model.r)[1], model.a12, model.a22, noise)
@@ -82,48 +74,31 @@ def settled_prior(model: Discrete, noise: Array) -> Array:
     return prior
 
 
-def as_covariance(P: Array) -> Covariance:
-    """A covariance without its lower-left entry, as the symmetric ones are kept."""
-    return Covariance(P[0, 0], P[0, 1], P[1, 1])
-
-
-def printed_steady(model: Discrete, d: Densities) -> Steady:
-    """The gains and covariances that a constant sample time settles to; one a joint."""
-    prior = settled_prior(model, printed_noise(model, d))
-    (l1, l2), posterior = updated(prior, model.r)
-    return Steady(Gains(l1, l2, as_covariance(posterior)), as_covariance(prior))
+def printed_steady(model: Discrete, d: Densities) -> Gains:
+    """Gains that a constant sample time settles to, the covariance's lower left left out."""
+    prior = settled_prior(model, d)
+    (l1, l2), ((p11, p12), (_, p22)) = updated(prior, model.r)
+    return Gains(l1, l2, Covariance(p11, p12, p22), prior[0, 0] + model.r)
 
 
 def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) -> Array:
     """Input of the FDO with printed k₃ and, at a log's begin, start. (T, n) [N·m·s]"""
     a = 0.5 * omega * terms.dt
-    driven: Array = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
+    d: Array = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
     if begins:
-        driven[0] = (1.0 + a[0]) * terms.p[0]  # which alone makes τ̂⁰ = ωp⁰
-    return driven
+        d[0] = (1.0 + a[0]) * terms.p[0]  # which alone makes τ̂⁰ = ωp⁰
+    return d
 
 
 def printed_momentum(terms: DynamicsTerms, gain: Array, start: Array) -> tuple[Array, Array]:
     """rᵗ = rᵗ⁻¹ + K dᵗ − a(rᵗ⁻¹ + rᵗ⁻²): (T, n), the last two (2, n). [N·m]"""
     a = 0.5 * terms.dt * gain
     F, g = np.array([[1.0 - a, -a], [a**0, 0.0 * a]]), np.array([gain, 0.0 * gain])
+    F, g = (F[:, :, 0], g) if terms.clock.uniform else (F, g[:, None])
     # As printed it may well diverge: that is the result, and is shown as unknown.
     with np.errstate(over="ignore", invalid="ignore"):
-        if terms.clock.uniform:
-            first = np.array([[1.0], [0.0]])
-            tau, end = steady_filter(F[:, :, 0], g, terms.d, start, wanted=first)
-        else:
-            states = recursion(F, g[:, None] * terms.d, start)
-            tau, end = states[0], states[:, -1]
+        (tau,), end = filtered(F, g, terms.d, start, [np.array([[1.0], [0.0]])])
     return np.where(np.isfinite(tau), tau, np.nan), end
-
-
-def printed_start(usual: Discrete, densities: Densities, prior: Covariance | None) -> KalmanState:
-    """State of the printed-hold filter before a log: its prior, settled by default."""
-    P = settled_prior(usual, printed_noise(usual, densities))
-    if prior is not None:
-        P = np.array([[prior.p11, prior.p12], [prior.p12, prior.p22]])
-    return KalmanState(np.zeros((2, P.shape[2])), as_covariance(P), P[1, 0] - P[0, 1])
 
 
 def printed_hold_steps(
@@ -135,12 +110,11 @@ def printed_hold_steps(
         d: The filter's input. (T, n) [N·m·s]
         model: The models of all samples. (T, n) each
         densities: The parameters, one a joint.
-        state: What the filter is before the block.
+        state: What the filter is before the block; where the log begins, its prior.
         begins: Whether the log begins here.
     """
     tau, sd = np.zeros((2, *d.shape))
-    (error, torque), (p11, p12, p22) = state.error, state.posterior
-    P = np.array([[p11, p12], [p12 + state.skew, p22]])
+    (error, torque), P = state
     noise = np.moveaxis(printed_noise(model, densities), 2, 0)
     for k, (a12, a22, r) in enumerate(zip(model.a12, model.a22, model.r, strict=True)):
         if k or not begins:
@@ -150,4 +124,4 @@ def printed_hold_steps(
         torque = a22 * torque + l2 * error
         error = (1.0 - l1) * error
         tau[k], sd[k] = torque, np.sqrt(P[1, 1])
-    return tau, sd, KalmanState(np.array([error, torque]), as_covariance(P), P[1, 0] - P[0, 1])
+    return tau, sd, KalmanState(np.array([error, torque]), P)

@@ -1,8 +1,7 @@
 """Gains from a log's spectra: natural frequencies of least expected error.
 
 A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise that
-passes. Both follow from the spectra of the log's free and loaded part,
-without a guess:
+passes. Both follow from the spectra of the log's free and loaded part, without a guess:
 
     ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
 
@@ -75,8 +74,7 @@ KINDS: dict[str, Kind] = {
 def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
     """Natural frequencies to try at a sample time. (G,) [rad/s]"""
     found: Array = np.geomspace(SLOWEST, FASTEST / step, TRIED)
-    fast: Array = found[found >= min(slowest, found[-1])]
-    return fast
+    return np.asarray(found[found >= min(slowest, found[-1])])
 
 
 def expected_error(kind: Kind, omega_n: Array, spectra: Spectra) -> Array:
@@ -96,29 +94,18 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
-    """A warning on joints at a bound of the natural frequencies, if any.
+    """A warning on joints (n,) at a bound of the natural frequencies tried (G,), if any. [rad/s]
 
     At the slowest the spectra do not separate external torque from noise; at the fastest, not
     noise from external torque.
-
-    Args:
-        name: The observer.
-        rate: The chosen ones. (n,) [rad/s]
-        grid: The tried ones, of `natural_frequencies`. (G,) [rad/s]
     """
-    reached = {
-        "gain-at-slowest": (rate <= grid[0], grid[0]),
-        "gain-at-fastest": (rate >= grid[-1], grid[-1]),
-    }
-    return tuple(
-        warning(
-            code,
-            Where(name, tuple(int(j) + 1 for j in np.flatnonzero(joints))),
-            rate_rad_s=float(bound),
-        )
-        for code, (joints, bound) in reached.items()
-        if joints.any()
-    )
+    found = []
+    reached = {"slowest": (rate <= grid[0], grid[0]), "fastest": (rate >= grid[-1], grid[-1])}
+    for end, (joints, bound) in reached.items():
+        if joints.any():
+            where = Where(name, tuple(int(j) + 1 for j in np.flatnonzero(joints)))
+            found.append(warning(f"gain-at-{end}", where, rate_rad_s=float(bound)))
+    return tuple(found)
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
@@ -127,20 +114,18 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's jump,
     ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too small where few
     impacts extrapolate S_d, and no filter runs on R = 0: R is at least `LEAST_SHARE` of S_n's R and
-    the noise of `FINEST`, a torque that is constant over a
-    sample.
+    the noise of `FINEST`, a torque that is constant over a sample.
     """
-    n = len(omega_n)
-    unit = kalman_filter(omega_n)
-    settled, model = unit.steady(spectra.step, n), unit.model(spectra.step, n)
+    n, unit = len(omega_n), kalman_filter(omega_n)
+    settled = unit.steady(spectra.step, n)
     response = unit.frequency_response(spectra.frequency, spectra.step, n)
     jump = 2.0 * np.sin(np.pi * spectra.frequency * spectra.step)[:, None]
-    share = (np.abs(response) * jump / settled.gains.l2) ** 2
+    share = (np.abs(response) * jump / settled.l2) ** 2
     both, noise = (
         np.sum(share * density, axis=0) * spectra.width
         for density in (spectra.loaded, spectra.free)
     )
-    scale = np.maximum(both, LEAST_SHARE**2 * noise) / (settled.prior.p11 + model.r)
+    scale = np.maximum(both, LEAST_SHARE**2 * noise) / settled.S
     return np.asarray(np.maximum(scale, FINEST**2 * spectra.step**3))
 
 

@@ -11,7 +11,7 @@ from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.observers.observer import Observer
-    from vftcli.observers.table import Gains, LogSpectra, Settings
+    from vftcli.observers.table import LogSpectra, Settings
     from vftcli.observers.tuning import Goal
     from vftcli.robots.robot import Robot
     from vftcli.robots.terms import DynamicsTerms
@@ -23,22 +23,14 @@ LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call f
 
 
 def settings_of(words: Sequence[str]) -> "Settings":
-    """The parameters of ``OBSERVER.PARAMETER=VALUE`` words.
+    """The parameters of ``OBSERVER.PARAMETER=VALUE`` words."""
+    from vftcli.observers.table import parse_settings
 
-    Raises:
-        ParameterError: If there is no such parameter, or a value is malformed.
-    """
-    from vftcli.observers.table import parse_settings, sections
-
-    return parse_settings(words, sections())
+    return parse_settings(words)
 
 
 def source_of(source: str | Path) -> "str | Path | Goal":
-    """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file.
-
-    Raises:
-        ParameterError: If a goal is malformed, or `vftcli identify` alone serves it.
-    """
+    """Where gains come from: `PAPER_GAINS`, `LOG_GAINS`, a goal for every observer, or a file."""
     text = str(source)
     if text in {PAPER_GAINS, LOG_GAINS}:
         return text
@@ -131,9 +123,9 @@ class ObserverChoice(Choice):
     @classmethod
     def takes(cls, name: str) -> bool:
         """Whether a name is one of an observer's numbers, as ``gmo.gain``."""
-        from vftcli.observers.table import sections
+        from vftcli.observers.table import SECTIONS
 
-        return name.partition(".")[0] in sections()
+        return name.partition(".")[0] in SECTIONS
 
     @property
     def gains_file(self) -> Path | None:
@@ -172,13 +164,9 @@ class ObserverChoice(Choice):
     def build(
         self, robot: "Robot", step: float, shown: "LogSpectra | None" = None
     ) -> "tuple[tuple[Observer, ...], tuple[Remark, ...]]":
-        """Observers for one robot and sample time, with remarks on unset gains.
+        """Observers for one robot and sample time [s], with remarks on unset gains.
 
-        Args:
-            robot: The arm; its file gives the gains that are not set here.
-            step: Sample time. [s]
-            shown: What the complete log shows of noise and contact, None where its free part is
-                not known.
+        `shown` is what the complete log shows of noise and contact, None without a free part.
 
         Raises:
             ParameterError: If a gain is out of range, or a match cannot be reached.
@@ -186,20 +174,16 @@ class ObserverChoice(Choice):
         from vftcli.observers import table
         from vftcli.signals.remarks import caution
 
-        shown = shown or table.NOT_SHOWN
-        table.check_gains(robot.gains, table.sections(), str(robot.path or robot.name))
-        setup = table.Setup(
-            gains=self.gains_over(robot.gains, shown),
-            settings=self.settings,
-            joints=robot.joints,
-            step=step,
-            as_printed=self.as_printed,
-            shown=shown,
-        )
+        shown, gains = shown or table.NOT_SHOWN, robot.gains
+        table.check_gains(gains, str(robot.path or robot.name))
         if self.gains_of_log:
-            setup = table.read_as(
-                "density", setup
-            )  # what a log tunes, and so what it falls back to
+            gains = table.overlay_gains(gains, shown.gains or {})
+        elif self.gains_file is not None:
+            gains = table.overlay_gains(gains, table.load_gains(self.gains_file))
+        setup = table.Setup(gains, self.settings, robot.joints, step, self.as_printed, shown)
+        if self.gains_of_log:
+            # what a log tunes, and so what it falls back to
+            setup = table.read_as("density", setup)
         observers, remarks = table.build_observers(self.names, setup)
         if self.gains_of_log and shown.gains is None:
             remarks = (*remarks, caution("gains-without-free-part"))
@@ -215,16 +199,6 @@ class ObserverChoice(Choice):
         from vftcli.observers.lead import estimate_from_rest
 
         return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
-
-    def gains_over(self, gains: "Gains", shown: "LogSpectra | None" = None) -> "Gains":
-        """A robot's gains with those of the log or of the gains file put over them."""
-        from vftcli.observers.table import load_gains, overlay_gains, sections
-
-        if self.gains_of_log and shown is not None and shown.gains is not None:
-            return overlay_gains(gains, shown.gains)
-        if self.gains_file is None:
-            return gains
-        return overlay_gains(gains, load_gains(self.gains_file, sections()))
 
 
 @dataclass(frozen=True, kw_only=True)

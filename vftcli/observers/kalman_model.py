@@ -1,21 +1,38 @@
-"""Disturbance Kalman filter at a sample time: A, B, Q, R, gains L (36)–(44).
+r"""Disturbance Kalman filter: A, B, Q, R and gains L (36)–(44), settled or at every step.
 
 For one joint: state x = [p; τ_ext], input μ, output p, ẋ = A_c x + B_c μ + w with
-A_c = [[0, 1], [0, −a]].
+A_c = [[0, 1], [0, −a]]. With diagonal R and Q an n-joint filter is n such filters.
 
-With diagonal R and Q an n-joint filter is n independent two-state filters.
+On a clock that jitters the gains follow every step. The covariance recursion is run over blocks of
+samples side by side, all blocks of a piece at once. Where a block starts follows exactly from what
+it makes of any other start: if the posterior P it starts from changes by Δ, the one at its end
+changes by
+
+    Φ Δ (I + O Δ)⁻¹ Φᵀ,  Φ ← (I − LC)A Φ,  O ← O + uuᵀ/S,  u = (CAΦ)ᵀ
+
+with Φ and O from one pass from any start (the closed-loop transition, and the information that the
+block's samples have on its start). So one pass over the samples from a guess, some rounds over the
+blocks' ends, and one pass from the right starts give what the plain loop gives.
+
+References:
+    B. D. O. Anderson, J. B. Moore, "Optimal Filtering", Prentice-Hall, 1979, Sec. 4.5, for the
+    difference of two solutions of a Riccati equation.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array
+from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.steady_filter import Fold, moved, run_blocks, spans
 
 #: Below this a·Ts the integrals are summed as series: their closed forms cancel there.
 SERIES = 1e-2
+#: Relative change of the blocks' starts below which another round would change nothing.
+SETTLED = 1e-15
 
 
 class Densities(NamedTuple):
@@ -107,21 +124,16 @@ NOISE_CONVENTIONS = {
 
 
 def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discrete:
-    """Discretise with a scheme ("fe", "zoh") under a noise convention.
+    """The model of a key of `DISCRETISATIONS` and one of `NOISE_CONVENTIONS`.
 
-    Args:
-        scheme: A key of `DISCRETISATIONS`.
-        convention: A key of `NOISE_CONVENTIONS`.
-        step: Sample time, one or one a sample as a column (T, 1). [s]
-        d: Parameters, one a joint.
+    At one sample time [s], or at one a sample as a column (T, 1).
     """
-    if scheme == "fe" and np.any(np.asarray(step) * d.decay > 2.0):
-        worst = float(np.max(np.asarray(step) * d.decay))
+    if scheme == "fe" and (worst := float(np.max(step * d.decay))) > 2.0:
         raise ParameterError(
             f"kfo-fe is unstable: decay·Ts = {worst:.3g} is above 2; "
             "choose a smaller kfo.decay or the observer kfo-zoh"
         )
-    model = DISCRETISATIONS[scheme](np.asarray(step, dtype=np.float64), d)
+    model = DISCRETISATIONS[scheme](step, d)
     if convention == "discrete":
         return model
     model = model._replace(r=model.r / model.step)
@@ -140,79 +152,75 @@ class Covariance(NamedTuple):
 
 
 class Gains(NamedTuple):
-    """Filtered gains L₁ (momentum), L₂ (torque), covariance after the update."""
+    """Filtered gains and what goes with them, one a joint (and sample)."""
 
-    l1: Array
-    l2: Array
-    posterior: Covariance
-
-
-class Steady(NamedTuple):
-    """Settled gains and prior covariance at a constant sample time."""
-
-    gains: Gains
-    prior: Covariance
+    l1: Array  #: L₁ of the momentum.
+    l2: Array  #: L₂ of the torque. [1/s]
+    posterior: Covariance  #: Covariance after the update.
+    S: Array  #: Variance of the innovation.
 
 
-def steady(model: Discrete, decay: Array) -> Steady:
-    """Stationary filter: stabilising solution of the discrete Riccati equation.
+class KalmanState(NamedTuple):
+    """State of a Kalman observer after a block of a log."""
+
+    error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
+    posterior: Array  #: Their covariance's entries. (3, n), (2, 2, n) of (44) as printed
+
+
+def steady(model: Discrete, decay: Array) -> Gains:
+    """Gains of the stationary filter: stabilising solution of the discrete Riccati equation.
 
     For A_τ = 0 in closed form, λ = Ts√(Q₂₂/R), β = (Q₁₁ − TsQ₁₂)/R, y = ½(λ + √(λ² + 16 + 4β)),
     r = ½(y − √(y² − 4)), L₁ = 1 − r², L₂ = λr/Ts; for A_τ ≠ 0 by SciPy's solver, joint by joint.
     The prior follows from the gains: P₁₁ = R L₁/(1−L₁), P₁₂ = R L₂/(1−L₁).
     """
+    step, a12, a22, q11, q12, q22, R = model
     if np.any(decay > 0.0):
-        prior = solved_prior(model)
+        from scipy.linalg import solve_discrete_are
+
+        Ps = []
+        for j in range(len(step)):
+            A, Q = [[1.0, a12[j]], [0.0, a22[j]]], [[q11[j], q12[j]], [q12[j], q22[j]]]
+            Ps.append(solve_discrete_are(np.transpose(A), [[1.0], [0.0]], Q, [[R[j]]]))
+        (p11, p12), (_, p22) = np.transpose(Ps, (1, 2, 0))
     else:
-        lam = model.step * np.sqrt(model.q22 / model.r)
-        beta = (model.q11 - model.step * model.q12) / model.r
+        lam, beta = step * np.sqrt(q22 / R), (q11 - step * q12) / R
         y = 0.5 * (lam + np.sqrt(lam**2 + 16.0 + 4.0 * beta))
         # 1 − r² and 1/r² − 1 lose digits when r is near 1: both follow from √(y² − 4) instead.
         root = np.sqrt(np.maximum((y - 2.0) * (y + 2.0), 0.0))
         r = 2.0 / (y + root)
-        l1, l2 = r * root, lam * r / model.step
-        p11, p12 = model.r * l1 / r**2, model.r * l2 / r**2
-        p22 = (model.r * l2 * root / r - model.q12) / model.step + model.q22
-        prior = Covariance(p11, p12, p22)
-    return Steady(update(prior, model.r), prior)
+        l1, l2 = r * root, lam * r / step
+        p11, p12 = R * l1 / r**2, R * l2 / r**2
+        p22 = (R * l2 * root / r - q12) / step + q22
+    return update(Covariance(p11, p12, p22), R)
 
 
-def solved_prior(model: Discrete) -> Covariance:
-    """Stationary prior by SciPy's discrete Riccati solver, each joint. (n,)"""
-    from scipy.linalg import solve_discrete_are
-
-    entries = []
-    for j in range(len(model.step)):
-        A = np.array([[1.0, model.a12[j]], [0.0, model.a22[j]]])
-        Q = np.array([[model.q11[j], model.q12[j]], [model.q12[j], model.q22[j]]])
-        P = solve_discrete_are(A.T, np.array([[1.0], [0.0]]), Q, np.array([[model.r[j]]]))
-        entries.append((P[0, 0], P[0, 1], P[1, 1]))
-    return Covariance(*np.array(entries).T)
+def predict(P: Covariance, model: Discrete) -> Covariance:
+    """Covariance before the next measurement, P⁻ = A P Aᵀ + Q."""
+    carried = P.p12 + model.a12 * P.p22
+    return Covariance(
+        P.p11 + model.a12 * (P.p12 + carried) + model.q11,
+        model.a22 * carried + model.q12,
+        model.a22 * model.a22 * P.p22 + model.q22,
+    )
 
 
 def update(prior: Covariance, r: Array) -> Gains:
     """Gains for a measured momentum, and the covariance after it in Joseph's form."""
-    p11, p12, p22 = prior
-    innovation = p11 + r
-    # 1 − L₁ as a quotient: the difference would lose every digit of a small r.
-    l1, l2 = p11 / innovation, p12 / innovation
-    rest = r / innovation
-    # Joseph's form stays positive whatever the rounding of the gains.
-    posterior = Covariance(
-        rest**2 * p11 + l1**2 * r,
-        rest * (p12 - l2 * p11) + l1 * l2 * r,
-        p22 - 2.0 * l2 * p12 + l2**2 * p11 + l2**2 * r,
-    )
-    return Gains(l1, l2, posterior)
+    S = prior.p11 + r
+    l1, l2 = prior.p11 / S, prior.p12 / S
+    # Joseph's form: an error of L₂ counts squared. R L₁ is (1 − L₁)P₁₁ with every digit.
+    p22 = prior.p22 - l2 * (2.0 * prior.p12 - l2 * S)
+    return Gains(l1, l2, Covariance(r * l1, r * l2, p22), S)
 
 
-def closed_loop(gains: Gains, a12: Array, a22: Array) -> Array:
+def closed_loop(gains: Gains, model: Discrete) -> Array:
     """Transition F = (I − LC)A of the filtered state, entry by entry. (2, 2, …)"""
     rest = 1.0 - gains.l1
-    return np.array([[rest, rest * a12], [-gains.l2, a22 - gains.l2 * a12]])
+    return np.array([[rest, rest * model.a12], [-gains.l2, model.a22 - gains.l2 * model.a12]])
 
 
-def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
+def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
     """Transition (2, 2, …) and input (2, …) of the filter on its error e = p − p̂.
 
     Subtracting p from x̂ᵗ = (I−LC)(A x̂ᵗ⁻¹ + B u) + L pᵗ leaves one input, `DynamicsTerms.d`:
@@ -222,14 +230,134 @@ def error_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
     from e⁰ = 0, τ̂⁰ = 0, which is x̂⁰ = [p⁰; 0]. It is the same filter without the cancellation of
     two large momenta.
     """
-    (f11, f12), (f21, f22) = closed_loop(gains, a12, a22)
+    (f11, f12), (f21, f22) = closed_loop(gains, model)
     return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])
 
 
-class KalmanState(NamedTuple):
-    """State of a Kalman observer after a block of a log."""
+def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
+    """The gains and covariances of a whole log. (T, n) each
 
-    error: Array  #: e = p − p̂ [kg·m²/s] and τ̂ [N·m]. (2, n)
-    posterior: Covariance  #: Their covariance. (n,) each
-    #: Its lower-left entry less its upper-right one, which only (44) as printed has. (n,)
-    skew: Array | float = 0.0
+    Args:
+        model: The models of all samples; that of sample 0 only has its noise used. (T, n) each
+        prior: Covariance before the first sample's update. (n,)
+        guess: Where blocks start before they know better, the stationary posterior. (n,)
+    """
+    first = update(prior, model.r[0])
+    rows = [flat(first)[:, None]]
+    entering = first.posterior
+    for span in spans(len(model.r), begins=True):
+        fold = Fold.of(span.stop - span.start)
+        gains = settle(Discrete(*(fold.fold(entry[span]) for entry in model)), entering, guess)
+        entering = Covariance(*map(fold.last, gains.posterior))
+        rows.append(fold.unfold(flat(gains)))
+    l1, l2, *posterior, S = np.concatenate(rows, axis=1)
+    return Gains(l1, l2, Covariance(*posterior), S)
+
+
+def flat(gains: Gains) -> Array:
+    """L₁, L₂, P₁₁, P₁₂, P₂₂ and S in one array. (6, …)"""
+    return np.array([gains.l1, gains.l2, *gains.posterior, gains.S])
+
+
+def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
+    """Gains of one piece, everything in blocks. (length, n, blocks) each
+
+    Args:
+        model: The models of its samples. (length, n, blocks) each
+        entering: Covariance after the sample before the piece. (n,)
+        guess: Where blocks start before they know better. (n,)
+    """
+    blocks = model.r.shape[2]
+    starts = np.repeat(np.stack(guess)[..., None], blocks, axis=2)
+    starts[..., 0] = entering
+    if blocks > 1:
+        guessed = starts.copy()
+        end, phi, information = block_response(model, Covariance(*guessed))
+        (o11, o12), (_, o22) = information
+        # After k rounds the first k blocks are exact, so this ends, mostly long before.
+        for _ in range(blocks):
+            # The posterior at the end after a start changed by Δ: X = Δ(I + OΔ)⁻¹ in full.
+            a, b, c = starts - guessed
+            delta = a * c - b * b
+            whole = 1.0 + o11 * a + 2.0 * o12 * b + o22 * c + (o11 * o22 - o12 * o12) * delta
+            cross = b - o12 * delta
+            X = np.array([[a + o22 * delta, cross], [cross, c + o11 * delta]]) / whole
+            gained = moved(phi, moved(phi, X).swapaxes(0, 1))
+            new = (end + gained[(0, 0, 1), (0, 1, 1)])[..., :-1]
+            change = np.abs(new - starts[..., 1:]) / np.maximum(np.abs(new), np.finfo(float).tiny)
+            starts[..., 1:] = new
+            if np.max(change) <= SETTLED:
+                break
+    each, P = list[Gains](), Covariance(*starts)
+    for step in steps_of(model):
+        each.append(update(predict(P, step), step.r))
+        P = each[-1].posterior
+    l1, l2, posterior, S = zip(*each, strict=True)
+    P = Covariance(*(np.stack(entry) for entry in zip(*posterior, strict=True)))
+    return Gains(np.stack(l1), np.stack(l2), P, np.stack(S))
+
+
+def block_response(model: Discrete, P: Covariance) -> tuple[Array, Array, Array]:
+    """Posterior at each block's end from a start, Φ and O. (3, n, blocks), (2, 2, n, blocks) × 2"""
+    information, phi = np.zeros((2, 2, 2, *P.p11.shape))
+    phi[0, 0] = phi[1, 1] = 1.0
+    for step in steps_of(model):
+        gains = update(predict(P, step), step.r)
+        P = gains.posterior
+        u = phi[0] + step.a12 * phi[1]
+        information += u[:, None] * u / gains.S
+        phi[0] = step.r / gains.S * u
+        phi[1] = step.a22 * phi[1] - gains.l2 * u
+    return np.stack(P), phi, information
+
+
+def steps_of(model: Discrete) -> Iterator[Discrete]:
+    """The models at each position of the blocks. (n, blocks) each"""
+    return (Discrete(*entries) for entries in zip(*model, strict=True))
+
+
+def kalman_steps(
+    terms: DynamicsTerms,
+    d: Array,
+    model_of: Callable[[Densities, Array], Discrete],
+    densities: Densities,
+    guess: Covariance,
+    state: KalmanState,
+    *,
+    begins: bool,
+) -> tuple[Array, Array, KalmanState]:
+    """τ̂ and √P₂₂ of a block, gains by each step's sample time. (T, n) each
+
+    Args:
+        terms: The block.
+        d: The filter's input. (T, n) [N·m·s]
+        model_of: The discrete model of some joints at some sample times [s].
+        densities: The parameters, one a joint.
+        guess: The stationary posterior. (n,)
+        state: What the filter is before the block; at a log's begin after its first sample.
+        begins: Whether the log begins here.
+    """
+    samples, n = d.shape
+    tau, sd = empty_series(samples, n), empty_series(samples, n)
+    dt, (error, posterior) = np.broadcast_to(terms.dt, (samples, 1)), state
+    if begins:
+        tau[0], sd[0] = 0.0, np.sqrt(posterior[2])
+    # Joints with equal numbers have equal gains: compute one of each kind.
+    numbers = np.stack([*densities, *posterior])
+    _, kept, kind = np.unique(numbers, axis=1, return_index=True, return_inverse=True)
+    kind = kind.ravel()
+    own = Densities(*(x[kept, None] for x in densities))
+    guess, entering = (Covariance(*(p[kept] for p in each)) for each in (guess, posterior))
+    for span in spans(samples, begins=begins):
+        fold = Fold.of(span.stop - span.start)
+        # What is one for all joints is written out: rows of one size need no iterator.
+        model = model_of(own, fold.fold(dt[span]))
+        model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
+        gains = settle(model, entering, guess)
+        entering = Covariance(*map(fold.last, gains.posterior))
+        F, g = error_filter(gains, model)
+        states = run_blocks(F, g[:, :, kind] * fold.fold(d[span]), error, kind)
+        error = fold.last(states)
+        tau[span] = fold.unfold(states[1])
+        sd.T[:, span] = fold.unfold(np.sqrt(gains.posterior.p22)).T[kind]
+    return tau, sd, KalmanState(error, np.stack([p[kind] for p in entering]))

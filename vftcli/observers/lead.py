@@ -13,40 +13,22 @@ LONGEST = 1 << 17  #: Samples of that time at most.
 SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
 
 
-def led(terms: DynamicsTerms, count: int) -> DynamicsTerms:
-    """The terms with their first sample before them, as often and at the median step."""
-    step = terms.clock.step
-    before = terms.t[0] - step * np.arange(count, 0, -1)
-    return DynamicsTerms(
-        t=np.concatenate([before, terms.t]),
-        p=np.concatenate([np.repeat(terms.p[:1], count, axis=0), terms.p]),
-        mu=np.concatenate([np.repeat(terms.mu[:1], count, axis=0), terms.mu]),
-    )
-
-
 def estimate_from_rest(observer: Observer, terms: DynamicsTerms) -> ExternalTorque:
     """Run an observer as if the log's first sample had lasted for long: τ̂⁰ = −μ⁰ where unbiased.
 
     From zero a log that begins in contact rises over some delays; with ṗ = μ + τ_ext it is −μ⁰.
     """
-    count = lead_samples(observer, terms.clock.step, terms.joints)
-    found = observer.estimate(led(terms, count))
-    return replace(
-        found,
-        t=terms.t,
-        tau=found.tau[count:],
-        sd=None if found.sd is None else found.sd[count:],
-    )
+    step = terms.clock.step
+    count = lead_samples(observer, step, terms.joints)
+    before = terms.t[0] - step * np.arange(count, 0, -1)
+    p, mu = (np.vstack([np.repeat(x[:1], count, axis=0), x]) for x in (terms.p, terms.mu))
+    found = observer.estimate(DynamicsTerms(t=np.concatenate([before, terms.t]), p=p, mu=mu))
+    sd = None if found.sd is None else found.sd[count:]
+    return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
 
 
 def settling_samples(observer: Observer, step: float, joints: int) -> int:
-    """Samples until `SETTLED` of a start is left, of the slowest joint.
-
-    Args:
-        observer: The observer.
-        step: Sample time. [s]
-        joints: Number of joints.
-    """
+    """Samples until `SETTLED` of a start is left at a sample time [s], of the slowest joint."""
     samples = 2 + lead_samples(observer, step, joints)
     zero = np.zeros((samples, joints))
     terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)

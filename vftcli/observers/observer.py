@@ -92,6 +92,12 @@ def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
     return frozen(np.atleast_1d(found))
 
 
+def angular(frequency: Array) -> Array:
+    """ω of frequencies [Hz], at 0 Hz so near that quotients have their limit. (F, 1) [rad/s]"""
+    omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
+    return np.where(omega == 0.0, 1e-9, omega)
+
+
 def check_terms(terms: DynamicsTerms) -> None:
     """Raise a ParameterError unless what an observer runs over are dynamics terms."""
     check_kind(terms, DynamicsTerms, "terms", "dynamics_terms(recording, robot)")

@@ -8,14 +8,14 @@ one input is the momentum gained over a sample beyond the model:
     FDO, GMO   τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a),  a = ½K Ts
     KFO        νᵗ = eᵗ⁻¹ + dᵗ − A₁₂τ̂ᵗ⁻¹,  eᵗ = (1−L₁)νᵗ,  τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ
 
-from zero at the log's first sample. `first_order` holds the first two's common part,
-`kalman_model` A, Q, R and L at a sample time, `uneven` the runs on a clock that jitters,
-`as_printed` the paper's printed variants. An observer runs over a block and returns its state;
-a whole log is one block.
+from zero at the log's first sample. `kalman_model` holds A, Q, R and L, also on a clock that
+jitters, `as_printed` the paper's printed variants. An observer runs over a block and returns its
+state; a whole log is one block.
 """
 
+from abc import abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -23,14 +23,8 @@ from vftcli.observers.as_printed import (
     printed_dynamics_input,
     printed_hold_steps,
     printed_momentum,
-    printed_start,
     printed_steady,
-)
-from vftcli.observers.first_order import (
-    FirstOrderState,
-    first_order_response,
-    first_order_tuning,
-    run_first_order,
+    settled_prior,
 )
 from vftcli.observers.kalman_model import (
     DISCRETISATIONS,
@@ -38,11 +32,13 @@ from vftcli.observers.kalman_model import (
     Covariance,
     Densities,
     Discrete,
+    Gains,
     KalmanState,
-    Steady,
     closed_loop,
     discretise,
     error_filter,
+    kalman_steps,
+    predict,
     steady,
     update,
 )
@@ -50,26 +46,98 @@ from vftcli.observers.observer import (
     BlockObserver,
     Complex,
     Tuning,
+    angular,
     check_terms,
     numbers_of,
     per_joint,
 )
-from vftcli.observers.uneven import kalman_steps
 from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.parsing import check_known
-from vftcli.signals.remarks import Where, warning
+from vftcli.signals.remarks import Where, caution, warning
 from vftcli.signals.series import Clock
-from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.steady_filter import recursion, steady_filter
 from vftcli.signals.wrench import ExternalTorque
 
+GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 #: Weights of the external torque in a Kalman filter's two states. (2, 1)
 TORQUE = np.array([[0.0], [1.0]])
 
 
+class FirstOrderState(NamedTuple):
+    """State of a first-order observer after a block of a log."""
+
+    states: Array  #: Its states, the estimate first. (m, n) [N·m]
+    gaps: int = 0  #: Number of gaps that it started afresh after.
+    longest: float = 0.0  #: The longest of them. [s]
+
+
+class FirstOrderObserver(BlockObserver):
+    """τ̂ᵗ = [(1−a)τ̂ᵗ⁻¹ + K dᵗ]/(1+a), a = K·Ts/2, common to FDO and GMO.
+
+    Past a gap (`GAP` nominal steps) so long that a > 1 the state would change its sign: there the
+    filter starts afresh, and a remark says so. Gains with a > 1 at the nominal step restart
+    nothing.
+    """
+
+    @abstractmethod
+    def rates(self, joints: int) -> Array:
+        """K, or ω, of every joint. (n,) [1/s]"""
+
+    def run_corrected(
+        self,
+        terms: DynamicsTerms,
+        state: FirstOrderState | None,
+        d: Array,
+        afresh: Array | None = None,
+    ) -> tuple[ExternalTorque, FirstOrderState]:
+        """A block's estimate of an input d (T, n) [N·m·s], from zero or `afresh` (T, n) [N·m]."""
+        before, gaps, longest = state or FirstOrderState(np.zeros((1, terms.joints)))
+        rate, clock = self.rates(terms.joints), terms.clock
+        a = 0.5 * (rate[:, None] * terms.dt[:, 0]).T  # columns whole
+        decay, gain = ((1.0 - a) / (1.0 + a))[None], (rate / (1.0 + a))[None]
+        if clock.uniform:
+            tau, end = steady_filter(decay, gain[0], d, before, wanted=np.ones((1, 1)))
+        else:
+            x = gain * d
+            late = (terms.dt > GAP * clock.step) & (a > 1.0) & (0.5 * clock.step * rate <= 1.0)
+            if late.any():
+                decay[0, late], x[0, late] = 0.0, 0.0 if afresh is None else afresh[late]
+                rows = late.any(axis=1)
+                gaps, longest = gaps + int(rows.sum()), max(longest, float(terms.dt[rows].max()))
+            tau = recursion(decay[None], x, before)[0]
+            end = tau[-1:]
+        code = "restarted-after-gap" if gaps == 1 else "restarted-after-gaps"
+        remarks = (caution(code, gaps=gaps, longest_s=longest),) if gaps else ()
+        return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end, gaps, longest)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """Cutoff, delay 1/K and −3 dB frequency at a sample time. [s]
+
+        The bilinear transform warps frequency: tan(ωTs/2) = K·Ts/2 at the −3 dB point of the filter
+        alone; the exact response of sampled momentum is in `frequency_response`.
+        """
+        rate = self.rates(joints)
+        return Tuning(
+            omega_n=rate,
+            zeta=np.full(joints, np.nan),
+            delay=1.0 / rate,
+            bandwidth=np.arctan(rate * step / 2.0) / (np.pi * step),
+            dc_gain=np.ones(joints),
+            parameter_count=1 if self.name == "fdo" else joints,
+        )
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Exact gain to τ_ext = e^{jωt}, its momentum the integral, sampled. (F, n) of [Hz]"""
+        rate, omega = self.rates(joints), angular(frequency)
+        back, a = np.exp(-1j * omega * step), 0.5 * step * rate
+        response: Complex = rate * (1.0 - back) / ((1.0 + a) - (1.0 - a) * back) / (1j * omega)
+        return response
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class FilteredDynamicsObserver(BlockObserver):
+class FilteredDynamicsObserver(FirstOrderObserver):
     r"""FDO (19)–(29): low-pass filtered :math:`\dot p - \mu`, no derivative.
 
     τ̂ = F₁{−μ} + F₂{p} + ωp with F₁ = ω/(s+ω) and F₂ = −ω²/(s+ω), discretised by the bilinear
@@ -97,30 +165,23 @@ class FilteredDynamicsObserver(BlockObserver):
         if not (np.isfinite(self.omega) and self.omega > 0):
             raise ParameterError(f"fdo.omega is {self.omega:g} rad/s; it must be positive")
 
+    def rates(self, joints: int) -> Array:
+        """ω of every joint. (n,) [rad/s]"""
+        return np.full(joints, self.omega)
+
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
-        driven = afresh = None
-        if self.as_printed:
-            afresh = self.omega * terms.p
-            driven = printed_dynamics_input(terms, self.omega, begins=state is None)
-        rate = np.full(terms.joints, self.omega)
-        tau, state = run_first_order(terms, rate, state, driven, afresh)
-        return self.estimated(terms, tau, remarks=state.remarks), state
-
-    def tuning(self, step: float, joints: int) -> Tuning:
-        """Meaning of ω at a sample time. [s]"""
-        return first_order_tuning(np.full(joints, self.omega), step, parameter_count=1)
-
-    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain of a momentum observer with K = ω at `frequency` [Hz]. (F, n)"""
-        return first_order_response(np.full(joints, self.omega), frequency, step)
+        if not self.as_printed:
+            return self.run_corrected(terms, state, terms.d)
+        d = printed_dynamics_input(terms, self.omega, begins=state is None)
+        return self.run_corrected(terms, state, d, afresh=self.omega * terms.p)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class MomentumObserver(BlockObserver):
+class MomentumObserver(FirstOrderObserver):
     r"""GMO (30)–(35): residual of the momentum balance, :math:`\dot r = K(\dot p - \mu - r)`.
 
     Discretised by the implicit trapezoidal rule with a = K·Ts/2, stable for every gain:
@@ -145,29 +206,24 @@ class MomentumObserver(BlockObserver):
         if not (np.all(np.isfinite(gain)) and np.all(gain > 0)):
             raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
 
+    def rates(self, joints: int) -> Array:
+        """K of every joint. (n,) [1/s]"""
+        return per_joint(self.gain, joints)
+
     def run(
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
-        gain = per_joint(self.gain, terms.joints)
         if not self.as_printed:
-            tau, state = run_first_order(terms, gain, state)
-            return self.estimated(terms, tau, remarks=state.remarks), state
+            return self.run_corrected(terms, state, terms.d)
+        gain = self.rates(terms.joints)
         start = np.zeros((2, terms.joints)) if state is None else state.states
         tau, end = printed_momentum(terms, gain, start)
         unstable = np.flatnonzero(0.5 * terms.clock.step * gain >= 1.0)
         joints = Where(joints=tuple(int(j) + 1 for j in unstable))
         remarks = (warning("unstable-as-printed", joints),) if len(unstable) else ()
         return self.estimated(terms, tau, remarks=remarks), FirstOrderState(end)
-
-    def tuning(self, step: float, joints: int) -> Tuning:
-        """Meaning of K at a sample time. [s]"""
-        return first_order_tuning(per_joint(self.gain, joints), step, parameter_count=joints)
-
-    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
-        """Complex gain at `frequency` [Hz]. (F, n)"""
-        return first_order_response(per_joint(self.gain, joints), frequency, step)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -225,27 +281,28 @@ class KalmanObserver(BlockObserver):
     ) -> tuple[ExternalTorque, KalmanState]:
         """A block's estimate after the last block's state; None at the log's start."""
         check_terms(terms)
-        n, begins = terms.joints, state is None
-        densities, d = self.densities(n), self.unexplained(terms)
-        model = self._model_of(densities, terms.clock.step)
-        settled = self._settled(model, densities)
+        n, step, begins, d = terms.joints, terms.clock.step, state is None, self.unexplained(terms)
+        zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)
         if self.is_steady(terms.clock):
-            F, g = error_filter(settled.gains, model.a12, model.a22)
-            start = np.zeros((2, n)) if state is None else state.error
+            F, g = error_filter(settled, self.model(step, n))
+            start = zero if state is None else state.error
             tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
-            sd = np.broadcast_to(handed_over(np.sqrt(settled.gains.posterior.p22)), tau.shape)
-            state = KalmanState(end, settled.gains.posterior)
+            sd = np.broadcast_to(handed_over(np.sqrt(settled.posterior.p22)), tau.shape)
+            state = KalmanState(end, np.stack(settled.posterior))
         elif self.prints_hold:
-            every = self._model_of(densities, np.broadcast_to(terms.dt, (len(d), 1)))
-            given = None if self.initial_covariance is None else self.first_prior(settled)
-            before = state or printed_start(model, densities, given)
-            tau, sd, state = printed_hold_steps(d, every, densities, before, begins=begins)
+            every = self.model(np.broadcast_to(terms.dt, (len(d), 1)), n)
+            if state is None:
+                p11, p12, p22 = self.first_prior(step, n)
+                P = np.array([[p11, p12], [p12, p22]])
+                if self.initial_covariance is None:
+                    P = settled_prior(self.model(step, n), densities)
+                state = KalmanState(zero, P)
+            tau, sd, state = printed_hold_steps(d, every, densities, state, begins=begins)
         else:
             if state is None:
-                first = self.model(terms.dt[:1], n).r[0]
-                posterior = update(self.first_prior(settled), first).posterior
-                state = KalmanState(np.zeros((2, n)), posterior)
-            guess = settled.gains.posterior
+                prior, first = self.first_prior(step, n), self.model(terms.dt[:1], n).r[0]
+                state = KalmanState(zero, np.stack(update(prior, first).posterior))
+            guess = settled.posterior
             tau, sd, state = kalman_steps(
                 terms, d, self._model_of, densities, guess, state, begins=begins
             )
@@ -258,28 +315,24 @@ class KalmanObserver(BlockObserver):
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """Discrete model at one sample time, or at each as a column (T, 1). [s]"""
-        return self._model_of(self.densities(joints), step)
+        return self._model_of(self.densities(joints), np.asarray(step, dtype=np.float64))
 
-    def _model_of(self, densities: Densities, step: Array | float) -> Discrete:
+    def _model_of(self, densities: Densities, step: Array) -> Discrete:
         """The discrete model of some joints."""
         convention = "literal" if self.as_printed else self.noise_convention
-        step = np.asarray(step, dtype=np.float64)
         return discretise(self.discretisation, convention, step, densities)
 
-    def steady(self, step: float, joints: int) -> Steady:
-        """Stationary gains and prior at a sample time. [s]"""
-        return self._settled(self.model(step, joints), self.densities(joints))
+    def steady(self, step: float, joints: int) -> Gains:
+        """Stationary gains and covariances at a sample time. [s]"""
+        model, densities = self.model(step, joints), self.densities(joints)
+        if self.prints_hold:
+            return printed_steady(model, densities)
+        return steady(model, densities.decay)
 
     @property
     def prints_hold(self) -> bool:
         """Whether its noise is (44)'s as printed."""
         return self.as_printed and self.discretisation == "zoh"
-
-    def _settled(self, model: Discrete, densities: Densities) -> Steady:
-        """Settled state of a model at one sample time."""
-        if self.prints_hold:
-            return printed_steady(model, densities)
-        return steady(model, densities.decay)
 
     def is_steady(self, clock: Clock) -> bool:
         """Whether a log's clock gives stationary gains from its start."""
@@ -291,11 +344,11 @@ class KalmanObserver(BlockObserver):
             return terms.d
         return terms.d + 0.5 * terms.dt * (one_sample_earlier(terms, "mu") - terms.mu)
 
-    def first_prior(self, settled: Steady) -> Covariance:
-        """Covariance before the first update: given or stationary. (n,)"""
+    def first_prior(self, step: float, joints: int) -> Covariance:
+        """Covariance before the first update: given, or stationary at a sample time [s]. (n,)"""
         if self.initial_covariance is None:
-            return settled.prior
-        given, joints = np.asarray(self.initial_covariance, np.float64), len(settled.prior.p11)
+            return predict(self.steady(step, joints).posterior, self.model(step, joints))
+        given = np.asarray(self.initial_covariance, np.float64)
         if given.shape not in {(3,), (3, 1), (3, joints)}:
             words = f"initial_covariance of {self.name} has shape {given.shape}"
             raise ShapeError(f"{words}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")
@@ -307,11 +360,14 @@ class KalmanObserver(BlockObserver):
         Q and R are the convention's effective densities at this sample time; the delay to a ramp
         is L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
         """
-        d, model = self.densities(joints), self.model(step, joints)
-        gains = self.steady(step, joints).gains
+        d, model, gains = (
+            self.densities(joints),
+            self.model(step, joints),
+            self.steady(step, joints),
+        )
         # The convention scales all of Q: Q₂₂/Ts (with A_τ = 0) is the effective density.
         literal = self.as_printed or self.noise_convention == "literal"
-        scale = model.step if literal and self.discretisation == "fe" else np.ones(joints)
+        scale = step if literal and self.discretisation == "fe" else 1.0
         r, q_p, q_tau = model.r * step, d.q_p * scale, d.q_tau * scale
         omega = (q_tau / r) ** 0.25
         zeta = 0.5 * np.sqrt(2.0 + q_p / np.sqrt(q_tau * r))
@@ -328,11 +384,13 @@ class KalmanObserver(BlockObserver):
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Exact response to τ_ext = e^{jωt}, its integral, the momentum, sampled. (F, n)"""
-        model, gains = self.model(step, joints), self.steady(step, joints).gains
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
-        omega = np.where(omega == 0.0, 1e-9, omega)
+        model, gains, omega = (
+            self.model(step, joints),
+            self.steady(step, joints),
+            angular(frequency),
+        )
         back = np.exp(-1j * omega * step)
-        (f11, f12), (f21, f22) = closed_loop(gains, model.a12, model.a22)
+        (f11, f12), (f21, f22) = closed_loop(gains, model)
         # (I − F z⁻¹) x = L p: the inverse's second row times L.
         determinant = (1.0 - f11 * back) * (1.0 - f22 * back) - f12 * f21 * back**2
         second = (f21 * back * gains.l1 + (1.0 - f11 * back) * gains.l2) / determinant

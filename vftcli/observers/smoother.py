@@ -20,18 +20,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.kalman_model import Covariance, Discrete, Gains, closed_loop, error_filter
+from vftcli.observers.kalman_model import closed_loop, error_filter, gain_sequence
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
-from vftcli.observers.uneven import gain_sequence, recursion
 from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.arrays import Array, empty_series, handed_over
+from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.shown import Shown
-from vftcli.signals.steady_filter import steady_filter
+from vftcli.signals.steady_filter import filtered
 from vftcli.signals.wrench import ExternalTorque
-
-#: Share of the settled information that may still be missing.
-SETTLED = 1e-16
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -46,51 +42,47 @@ class KalmanSmoother(Shown):
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """A smoothed log; `sd` is the smoother's own √P₂₂."""
-        if self.filter.is_steady(terms.clock):
-            tau, sd = self._steady(terms)
-        else:
-            tau, sd = self._step_by_step(terms)
-        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=handed_over(sd))
-
-    def _steady(self, terms: DynamicsTerms) -> tuple[Array, Array]:
-        """Smoothed with settled gains. (T, n) each"""
-        samples, n = terms.p.shape
-        settled = self.filter.steady(terms.clock.step, n)
-        model = self.filter.model(terms.clock.step, n)
-        gains, S = settled.gains, settled.prior.p11 + model.r
-        (F, g), d = error_filter(gains, model.a12, model.a22), self.filter.unexplained(terms)
-        tau, _ = steady_filter(F, g, d, np.zeros((2, n)), wanted=TORQUE)
-        nu = innovations(tau, gains.l2 * S, model.a22)  # ν/S
-        backward, b = backward_filter(gains, model.a12, model.a22)
-        # νᵗ⁺¹ drives λ̃ᵗ: in reverse, the sample before.
-        driven = np.zeros_like(nu)
-        driven[1:] = nu[:0:-1]
-        weights = np.stack([gains.posterior.p12, gains.posterior.p22])
-        correction, _ = steady_filter(backward, b, driven, 0.0 * weights, wanted=weights)
-        tau -= correction[::-1]
-        deviation, sd = steady_deviation(gains, model, S, samples), empty_series(samples, n)
-        sd[:] = deviation[-1]
-        sd[samples - len(deviation) :] = deviation[::-1]
-        return tau, sd
-
-    def _step_by_step(self, terms: DynamicsTerms) -> tuple[Array, Array]:
-        """Smoothed with gains for each step's sample time. (T, n) each"""
-        samples, n = terms.p.shape
-        settled = self.filter.steady(terms.clock.step, n)
-        model = self.filter.model(np.broadcast_to(terms.dt, (samples, 1)), n)
-        gains = gain_sequence(model, self.filter.first_prior(settled), settled.gains.posterior)
-        # L₁ = P⁻₁₁/S and R = S − P⁻₁₁, so S = R/(1 − L₁).
-        with np.errstate(divide="ignore"):  # after a gap of days: L₁ = 1, S = ∞
-            S = model.r / (1.0 - gains.l1)
-        (F, g), d = error_filter(gains, model.a12, model.a22), self.filter.unexplained(terms)
-        states = recursion(F, g * d, np.zeros((2, n)))
-        e, tau = np.concatenate([np.zeros((2, 1, n)), states[:, :-1]], axis=1)
-        innovation = e + d - model.a12 * tau
-        backward, b = backward_filter(gains, model.a12, model.a22)
-        lam, P = from_the_end(backward, b * (innovation / S)), gains.posterior
-        step, gain = information_step(gains, model.a12, model.a22), information_gain(model.a12, S)
-        variance = smoothed_variance(P, from_the_end(step, gain))
-        return states[1] - (P.p12 * lam[0] + P.p22 * lam[1]), np.sqrt(variance)
+        kalman, step, n, d = (
+            self.filter,
+            terms.clock.step,
+            terms.joints,
+            self.filter.unexplained(terms),
+        )
+        model, gains, even = (
+            kalman.model(step, n),
+            kalman.steady(step, n),
+            kalman.is_steady(terms.clock),
+        )
+        if not even:
+            model = kalman.model(np.broadcast_to(terms.dt, (terms.samples, 1)), n)
+            gains = gain_sequence(model, kalman.first_prior(step, n), gains.posterior)
+        (_, p12, p22), a12, S = gains.posterior, model.a12, gains.S
+        # νᵗ = dᵗ + eᵗ⁻¹ − A₁₂ᵗτ̂ᵗ⁻¹
+        ahead = a12 if even else np.roll(a12, -1, axis=0)
+        wanted = [TORQUE, np.array([np.ones_like(a12), -ahead])]
+        (tau, late), _ = filtered(*error_filter(gains, model), d, np.zeros((2, n)), wanted)
+        nu = d.copy(order="K")
+        nu[1:] += late[:-1]
+        F = closed_loop(gains, model)
+        b = -np.array([np.ones_like(a12), a12])
+        tau -= from_the_end(F.swapaxes(0, 1), b, nu / S, np.array([p12, p22]))
+        # Λ̃ᵗ = Fᵀ(Λ̃ᵗ⁺¹)F + AᵀCᵀCA/S of its entries 11, 12, 22; P₂₂ less [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ
+        (f11, f12), (f21, f22) = F
+        information = np.array(
+            [
+                [f11 * f11, 2.0 * f11 * f21, f21 * f21],
+                [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],
+                [f12 * f12, 2.0 * f12 * f22, f22 * f22],
+            ]
+        )
+        gained = from_the_end(
+            information,
+            np.array([1.0 / S, a12 / S, a12**2 / S]),
+            np.ones_like(tau),
+            np.array([p12**2, 2.0 * p12 * p22, p22**2]),
+        )
+        sd = handed_over(np.sqrt(p22 - gained))
+        return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 
     def tuning(self, step: float, joints: int) -> Tuning:
         """Meaning of the parameters: no delay, −3 dB at |H_KFO|² = 1/√2.
@@ -119,76 +111,10 @@ class KalmanSmoother(Shown):
         return response
 
 
-def steady_deviation(gains: Gains, model: Discrete, S: Array, samples: int) -> Array:
-    """√P₂₂ from a log's last sample backwards until settled. (≤ T, n)"""
-    step = information_step(gains, model.a12, model.a22)
-    missing = missing_information(step, information_gain(model.a12, S), samples)
-    return np.sqrt(smoothed_variance(gains.posterior, (missing[0] - missing).transpose(1, 0, 2)))
-
-
-def innovations(tau: Array, l2: Array, a22: Array) -> Array:
-    """ν of the steady filter from its estimate: τ̂ᵗ = A₂₂τ̂ᵗ⁻¹ + L₂νᵗ. (T, n)
-
-    Args:
-        tau: τ̂. (T, n)
-        l2: Its gain L₂. (n,)
-        a22: A₂₂ of its model. (n,)
-    """
-    nu = tau.copy(order="K")
-    nu[1:] -= a22 * tau[:-1]
-    nu /= l2
-    return nu
-
-
-def backward_filter(gains: Gains, a12: Array, a22: Array) -> tuple[Array, Array]:
-    """Transition ((I − LC)A)ᵀ and input −AᵀCᵀ, backwards. (2, 2, …), (2, …)"""
-    return closed_loop(gains, a12, a22).swapaxes(0, 1), np.array([-np.ones_like(a12), -a12])
-
-
-def information_step(gains: Gains, a12: Array, a22: Array) -> Array:
-    """Λ̃ ← FᵀΛ̃F with F = (I − LC)A, as a matrix on (Λ₁₁, Λ₁₂, Λ₂₂). (3, 3, …)"""
-    (f11, f12), (f21, f22) = closed_loop(gains, a12, a22)
-    return np.array(
-        [
-            [f11 * f11, 2.0 * f11 * f21, f21 * f21],
-            [f11 * f12, f11 * f22 + f12 * f21, f21 * f22],
-            [f12 * f12, 2.0 * f12 * f22, f22 * f22],
-        ]
-    )
-
-
-def information_gain(a12: Array, S: Array) -> Array:
-    """AᵀCᵀCA/S, a sample's information on the one before. (3, …)"""
-    return np.array([1.0 / S, a12 / S, a12**2 / S])
-
-
-def smoothed_variance(P: Covariance, information: Array) -> Array:
-    """Smoothed torque's variance P₂₂ − [P₁₂ P₂₂] Λ̃ [P₁₂ P₂₂]ᵀ, like P₂₂. [(N·m)²]"""
-    l11, l12, l22 = information
-    gained = P.p12**2 * l11 + 2.0 * P.p12 * P.p22 * l12 + P.p22**2 * l22
-    variance: Array = P.p22 - gained
-    return variance
-
-
-def missing_information(step: Array, gain: Array, samples: int) -> Array:
-    """Λ̃ less its settled value, 0, 1, 2 … samples from a log's end. (N, 3, n)
-
-    Λ̃ ← SΛ̃ + g settles at Λ̃∞ = (I − S)⁻¹g; k samples later Sᵏ Λ̃∞ is missing. The powers
-    come by doubling, until nothing is missing or the log ends.
-    """
-    S, g = np.moveaxis(step, -1, 0), np.moveaxis(gain, -1, 0)
-    settled = np.linalg.solve(np.eye(3) - S, g[..., None])[..., 0]
-    missing, power = settled.T[None], S
-    while len(missing) < samples:
-        missing = np.concatenate([missing, np.einsum("jab,kbj->kaj", power, missing)])
-        power = power @ power
-        if np.all(np.abs(missing[-1]) <= SETTLED * np.abs(settled.T)):
-            break
-    kept: Array = np.asarray(missing[:samples], dtype=np.float64)
-    return kept
-
-
-def from_the_end(F: Array, x: Array) -> Array:
-    """y_t = F_t y_{t+1} + x_t from a log's end, at each sample."""
-    y = recursion(F[:, :, ::-1], x[:, ::-1], np.zeros_like(x[:, 0]))[:, ::-1]
-    return np.concatenate([y[:, 1:], np.zeros_like(y[:, :1])], axis=1)
+def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> Array:
+    """weights·y_{t+1} of y_t = F_t y_{t+1} + g_t d_t, from zero at a log's end. (T, n)"""
+    if F.ndim == 4:
+        F, g, weights = F[:, :, ::-1], g[:, ::-1], np.roll(weights, 1, axis=1)[:, ::-1]
+    (found,), _ = filtered(F, g, d[::-1], np.zeros((len(F), d.shape[1])), [weights])
+    found[-1] = 0.0
+    return np.roll(found[::-1], -1, axis=0)

@@ -11,16 +11,27 @@ linear estimator with frequency response H:
 
 H is complex, so that delay counts. The spectra are one-sided and not detrended: a constant error is
 an error too.
+
+One model gives every estimate's error sample by sample, whatever its own covariance says,
+
+    sd² = e² + ∫|1 − H|² S_τ df + c²,
+
+with e² the mean square of what the estimator reads where nothing touches the arm, bias and model
+error included, a resting joint's and a moving joint's apart; and c the standard deviation of a
+subtracted correction. A resting joint holds stiction that no estimator sees: there e is at least
+the share of the dry friction that drives were measured to hold.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.disturbance import disturbance_stretches
+from vftcli.robots.friction import HELD
 from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
@@ -36,7 +47,6 @@ SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [H
 #: Beyond, it is held to fall at least as f to the minus this: between the 2 of a torque that jumps
 #: and the 4 of one that has no jumps and no corners.
 FALL = 2.5
-
 
 #: A free part that was found is believed if on most joints the loaded part has this share of its
 #: slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact
@@ -116,16 +126,12 @@ class Spectra:
         return np.where(above, neighbour_mean(self.free), np.min(levels, axis=0))
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|1 − H|² S_τ df, what an estimator's lag and bandwidth leave out. (n,) [(N·m)²]
-
-        Args:
-            response: H at `frequency`, one column a joint. (F, n)
-        """
+        """∫|1 − H|² S_τ df, what lag and bandwidth leave out, of H (F, n). (n,) [(N·m)²]"""
         share: Array = np.abs(1.0 - response) ** 2
         return np.asarray(np.sum(share * self.external, axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
-        """∫|H|² S_n df, what of the noise comes through. (n,) [(N·m)²]"""
+        """∫|H|² S_n df, what of the noise comes through H (F, n). (n,) [(N·m)²]"""
         share: Array = np.abs(response) ** 2
         return np.asarray(np.sum(share * self.noise, axis=0) * self.width)
 
@@ -140,16 +146,6 @@ def neighbour_mean(spectrum: Array) -> Array:
     return mean
 
 
-def around_impacts(t: Array, inside: Mask) -> Mask:
-    """A part, or half of `IMPACT` more on either side if it is too short. (T,)
-
-    Args:
-        t: Clock. (T,) [s]
-        inside: The loaded samples. (T,)
-    """
-    return inside if intervals(t, inside, least=IMPACT) else grown(t, inside, 0.5 * IMPACT)
-
-
 def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """Spectra of a loaded part and a free one, by one estimator.
 
@@ -157,7 +153,8 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     """
     t = loaded.run.t
     nominal = median_step(t) if len(t) > 1 else 0.0
-    inside = around_impacts(t, loaded.inside)
+    short = not intervals(t, loaded.inside, least=IMPACT)
+    inside = grown(t, loaded.inside, 0.5 * IMPACT) if short else loaded.inside
     heavy = disturbance_stretches(loaded.run.terms, inside, nominal)
     quiet = [d for run, at in free for d in disturbance_stretches(run.terms, at, nominal)]
     longest = [max((len(run) for run in found), default=0) for found in (heavy, quiet)]
@@ -185,3 +182,70 @@ def looks_free(spectra: Spectra) -> bool:
     slow = spectra.frequency < CONTACT_BAND
     power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)
+
+
+ENOUGH = 50  #: Free samples of a resting or a moving joint that its own mean square needs.
+
+#: Share of the dry friction by which friction in motion may be off, where no free motion shows it.
+#:
+#: On a UR10e the maker's friction differs by .05 to .25 of itself from what the drives show that
+#: day.
+UNSEEN = 0.2
+
+
+class FreeError(NamedTuple):
+    """Mean square of what an estimator reads where nothing touches the arm."""
+
+    moving: Array  #: While the joint moves. (n,) [(N·m)²]
+    resting: Array  #: While it rests. (n,) [(N·m)²]
+    #: Joints that hardly move while nothing touches the arm, so that `moving` rests on their dry
+    #: friction. (n,)
+    unseen: Mask
+
+
+def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
+    """The mean squares of an estimator's free samples, of which there is one at least.
+
+    Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for it: a
+    moving joint then adds `UNSEEN` of its dry friction, because friction in motion was not seen.
+
+    Args:
+        read: What the estimator reads in them, NaN where it does not know. (S, n) [N·m]
+        resting: Whether a joint rests in them. (S, n)
+        dry_friction: Of each joint, 0 where nothing is known of it. (n,) [N·m]
+    """
+    known = np.isfinite(read)
+    square = np.where(known, read, 0.0) ** 2
+    whole = np.sum(square, axis=0) / np.maximum(np.count_nonzero(known, axis=0), 1)
+
+    def mean_over(where: Mask) -> tuple[Array, Mask]:
+        count = np.count_nonzero(where, axis=0)
+        few = count < ENOUGH
+        mean = np.sum(np.where(where, square, 0.0), axis=0) / np.maximum(count, 1)
+        return np.where(few, whole, mean), few
+
+    moving, unseen = mean_over(known & ~resting)
+    still, _ = mean_over(known & resting)
+    return FreeError(
+        moving=np.where(unseen, moving + (UNSEEN * dry_friction) ** 2, moving),
+        resting=np.maximum(still, (HELD * dry_friction) ** 2),
+        unseen=unseen,
+    )
+
+
+def error_band(
+    free: FreeError, missed: Array, resting: Mask, correction_sd: Array | None = None
+) -> Array:
+    """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
+
+    Args:
+        free: What the estimator reads where nothing touches the arm.
+        missed: What lag and bandwidth leave out, `Spectra.missed`. (n,) [(N·m)²]
+        resting: Where a joint rests. (T, n)
+        correction_sd: Standard deviation of a correction of the model. (T, n) [N·m]
+    """
+    variance = np.where(resting, free.resting + missed, free.moving + missed)
+    if correction_sd is not None:
+        variance += correction_sd**2
+    sd: Array = np.sqrt(variance, out=variance)
+    return sd

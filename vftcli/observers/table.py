@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -48,7 +48,7 @@ LARGEST_VARIANCE = 1e15
 SMALLEST = 1e-15
 
 
-def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[str]]) -> Settings:
+def parse_settings(assignments: Iterable[str]) -> Settings:
     """Assignments ``observer.parameter=VALUE``; a number or one a joint."""
     settings: Settings = {}
     for text in assignments:
@@ -56,7 +56,7 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
         section, dot, parameter = name.partition(".")
         if not dot:
             raise ParameterError(f"--set {text!r} is not {FORM}")
-        check_name(section, parameter, sections)
+        check_name(section, parameter)
         given: Value = value
         if parameter not in WORDS:
             given = set_value(value, text)
@@ -65,13 +65,11 @@ def parse_settings(assignments: Iterable[str], sections: Mapping[str, Sequence[s
     return settings
 
 
-def check_name(
-    section: str, parameter: str, sections: Mapping[str, Sequence[str]], where: str = ""
-) -> None:
+def check_name(section: str, parameter: str, where: str = "") -> None:
     """Raise a ParameterError that lists what there is unless the name exists."""
-    check_known(section, sections, f"{where}no observer {section!r} to set")
-    known = sections[section]
-    check_known(parameter, known, f"{where}{section} has no parameter {parameter!r}")
+    check_known(section, SECTIONS, f"{where}no observer {section!r} to set")
+    complaint = f"{where}{section} has no parameter {parameter!r}"
+    check_known(parameter, SECTIONS[section], complaint)
 
 
 def check_range(parameter: str, values: float | list[float], where: str) -> None:
@@ -86,30 +84,19 @@ def check_range(parameter: str, values: float | list[float], where: str) -> None
             )
 
 
-def check_gains(gains: Gains, sections: Mapping[str, Sequence[str]], where: str) -> None:
-    """Raise a ParameterError on a file's gains of unknown names.
-
-    Args:
-        gains: The ``[observers.*]`` tables.
-        sections: Sections and parameters there are.
-        where: The file, for the message.
-    """
+def check_gains(gains: Gains, where: str) -> None:
+    """Raise a ParameterError on a file's ``[observers.*]`` of unknown names or wild values."""
     for section, table in gains.items():
         for parameter, value in table.items():
-            check_name(section, parameter, sections, f"{where}: ")
+            check_name(section, parameter, f"{where}: ")
             name = f"{where}: {section}.{parameter}"
             (TEXT if parameter in WORDS else PER_JOINT).check(name, value)
             if parameter not in WORDS:
                 check_range(parameter, value, name)
 
 
-def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
-    """Read gains from a file of their own, ``[observers.*]`` as in a robot file.
-
-    Args:
-        path: A TOML file with ``[observers.SECTION]`` tables.
-        sections: Sections and parameters there are.
-    """
+def load_gains(path: Path) -> Gains:
+    """Gains of a TOML file of their own, ``[observers.*]`` as in a robot file."""
     if not path.exists():
         raise ParameterError(
             f"{path}: no such file of gains; --gains takes auto, paper, or a file of identify "
@@ -122,7 +109,7 @@ def load_gains(path: Path, sections: Mapping[str, Sequence[str]]) -> Gains:
             "writes, as [observers.gmo] gain = 10.0"
         )
     gains = checked_gains(root.section("observers"))
-    check_gains(gains, sections, str(path))
+    check_gains(gains, str(path))
     return gains
 
 
@@ -132,16 +119,12 @@ def overlay_gains(under: Gains, over: Gains) -> Gains:
     return {name: {**under.get(name, {}), **over.get(name, {})} for name in names}
 
 
-def parameters_given(
-    section: str, name: str, *sources: Mapping[str, Mapping[str, Any]]
-) -> dict[str, Any]:
+def parameters_given(section: str, name: str, *sources: Gains) -> dict[str, Any]:
     """Parameters of one observer: later sources win, its section over the shared."""
     found: dict[str, Any] = {}
     for source in sources:
-        found |= source.get(section, {})
         # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
-        if name != section:
-            found |= source.get(name, {})
+        found |= {**source.get(section, {}), **source.get(name, {})}
     return found
 
 
@@ -187,33 +170,32 @@ class Entry(NamedTuple):
     section: str  #: The ``--set`` section its parameters stand in.
     equations: str  #: The paper's equations.
     summary: str  #: What it does, in a sentence.
-    build: Callable[[Setup], Built]  #: Makes it from a Setup, with remarks on gains nobody gave.
+    #: Makes it of a Setup and its name here, with remarks on gains nobody gave.
+    build: Callable[[Setup, str], Built]
     from_spectra: bool = False  #: Whether it takes its gains from the log's spectra.
     online: bool = True  #: Whether it could run while the log is being written.
 
 
-def build_fdo(setup: Setup) -> Built:
+def build_fdo(setup: Setup, name: str) -> Built:
     """Filtered dynamics observer, cutoff given or from the Kalman filter."""
-    omega, origin = first_order_gain(setup, "fdo", "omega")
+    omega, origin = first_order_gain(setup, name, "omega")
     if origin:
         # One cutoff for all joints: the one with the joints' mean delay.
         omega = np.full_like(omega, 1.0 / np.mean(1.0 / omega))
     if np.any(omega != omega[0]):
         raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
     cutoff = float(omega[0])
+    values: dict[str, Any] = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
     observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
-    return observer, tuple(
-        fact(code, parameter="fdo.omega", gain=cutoff, unit="rad/s") for code in origin
-    )
+    return observer, tuple(fact(code, **values) for code in origin)
 
 
-def build_gmo(setup: Setup) -> Built:
+def build_gmo(setup: Setup, name: str) -> Built:
     """The momentum observer, its gains given or left over from the Kalman filter."""
-    gain, origin = first_order_gain(setup, "gmo", "gain")
+    gain, origin = first_order_gain(setup, name, "gain")
+    values = {"parameter": "gmo.gain", "gain": gain.tolist(), "unit": "1/s"}
     observer = MomentumObserver(gain=gain, as_printed=setup.as_printed)
-    return observer, tuple(
-        fact(code, parameter="gmo.gain", gain=gain.tolist(), unit="1/s") for code in origin
-    )
+    return observer, tuple(fact(code, **values) for code in origin)
 
 
 def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
@@ -228,7 +210,7 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
         return spread(given[parameter], setup.joints, "joints", f"{name}.{parameter}"), ()
     rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
     if "kfo" in setup.gains or "kfo" in setup.settings:
-        kalman, _ = build_kfo("fe")(read_as("density", setup))
+        kalman, _ = build_kfo(read_as("density", setup), "kfo-fe")
         rate = 1.0 / kalman.tuning(setup.step, setup.joints).delay
         origin = "gain-from-kalman-delay"
     return np.minimum(rate, 2.0 / setup.step), (origin,)
@@ -242,61 +224,51 @@ def read_as(convention: str, setup: Setup) -> Setup:
     return setup._replace(gains={**setup.gains, "kfo": file})
 
 
-def build_kfo(scheme: str, section: str | None = None) -> Callable[[Setup], Built]:
-    """The builder of a Kalman observer with one discretisation.
+def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ...]]:
+    """A Kalman observer with the parameters of this name.
 
     R and Q of a file are read as "discrete" unless a convention is named: with that reading the
     paper's gains win joints 1 to 3, as its Table I says. Without a file they are densities.
     """
-
-    def build(setup: Setup) -> Built:
-        file = read_as("discrete", setup).gains
-        given = parameters_given("kfo", section or f"kfo-{scheme}", file, setup.settings)
-        convention = str(given.pop("noise_convention", "density"))
-        convention = "literal" if setup.as_printed else convention
-        values = {
-            key: spread(value, setup.joints, "joints", f"kfo.{key}")
-            for key, value in given.items()
-            if key in PARAMETERS["kfo"]
-        }
-        observer = KalmanObserver(
-            discretisation=scheme,
-            noise_convention=convention,
-            as_printed=setup.as_printed,
-            **values,
-        )
-        missing = [key for key in ("r_diag", "q_p_diag", "q_tau_diag") if key not in values]
-        if not missing:
-            return observer, ()
-        omega = float(observer.tuning(setup.step, setup.joints).omega_n[0])
-        names = [f"kfo.{key}" for key in missing]
-        code = "kalman-gains-from-default"
-        return observer, (fact(code, parameters=names, omega_n_rad_per_s=omega),)
-
-    return build
+    given = parameters_given("kfo", name, read_as("discrete", setup).gains, setup.settings)
+    convention = str(given.pop("noise_convention", "density"))
+    values = {
+        key: spread(value, setup.joints, "joints", f"kfo.{key}")
+        for key, value in given.items()
+        if key in PARAMETERS["kfo"]
+    }
+    observer = KalmanObserver(
+        discretisation="fe" if name == "kfo-fe" else "zoh",
+        noise_convention="literal" if setup.as_printed else convention,
+        as_printed=setup.as_printed,
+        **values,
+    )
+    missing = [f"kfo.{k}" for k in ("r_diag", "q_p_diag", "q_tau_diag") if k not in values]
+    if not missing:
+        return observer, ()
+    omega = float(observer.tuning(setup.step, setup.joints).omega_n[0])
+    code = "kalman-gains-from-default"
+    return observer, (fact(code, parameters=missing, omega_n_rad_per_s=omega),)
 
 
-def build_rts(setup: Setup) -> Built:
+def build_rts(setup: Setup, _: str) -> Built:
     """Smoother on the zero-order-hold filter: its noise leaves no bias on a ramp."""
     from vftcli.observers.smoother import KalmanSmoother
 
-    kalman, remarks = build_kfo("zoh", "kfo-rts")(setup)
-    return KalmanSmoother(filter=cast("KalmanObserver", kalman)), remarks
+    kalman, remarks = build_kfo(setup, "kfo-rts")
+    return KalmanSmoother(filter=kalman), remarks
 
 
-def build_auto(name: str, by_hand: Callable[[Setup], Built]) -> Callable[[Setup], Built]:
-    """The builder of an observer with the log's gains, else `by_hand`'s as densities."""
+def build_auto(setup: Setup, name: str) -> Built:
+    """An observer with the log's gains, else with those set by hand, as densities."""
+    from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
 
-    def build(setup: Setup) -> Built:
-        from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
-
-        if (spectra := setup.shown.under(name)) is not None:
-            return tune_to_spectra(name, spectra), ()
-        observer, remarks = by_hand(read_as("density", setup))
-        fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
-        return AutoTuned(name=name, observer=observer), (*remarks, fallback)
-
-    return build
+    if (spectra := setup.shown.under(name)) is not None:
+        return tune_to_spectra(name, spectra), ()
+    by_hand = build_kfo if name == "kfo-auto" else build_rts
+    observer, remarks = by_hand(read_as("density", setup), "kfo-zoh")
+    fallback = caution("tuning-without-free-part", Where(name), observer=observer.name)
+    return AutoTuned(name=name, observer=observer), (*remarks, fallback)
 
 
 #: Name at the command line → the observer.
@@ -306,7 +278,7 @@ OBSERVERS: dict[str, Entry] = {
         "kfo",
         "not in the paper",
         "rts-auto once the bias of the whole log is off; else what the log does allow, said",
-        build_auto(BEST, build_rts),
+        build_auto,
         from_spectra=True,
         online=False,
     ),
@@ -329,14 +301,14 @@ OBSERVERS: dict[str, Entry] = {
         "kfo",
         "(36)–(42)",
         "momentum and a random-walk torque as states; three variances a joint",
-        build_kfo("fe"),
+        build_kfo,
     ),
     "kfo-zoh": Entry(
         "disturbance Kalman filter, zero-order hold",
         "kfo",
         "(36)–(40), (43), (44)",
         "the same with the exact process noise",
-        build_kfo("zoh"),
+        build_kfo,
     ),
     "kfo-rts": Entry(
         "Rauch–Tung–Striebel smoother on kfo-zoh",
@@ -351,7 +323,7 @@ OBSERVERS: dict[str, Entry] = {
         "kfo",
         "not in the paper",
         "ω_n of each joint from the spectra of the log's free and loaded part",
-        build_auto("kfo-auto", build_kfo("zoh")),
+        build_auto,
         from_spectra=True,
         online=False,
     ),
@@ -360,7 +332,7 @@ OBSERVERS: dict[str, Entry] = {
         "kfo",
         "not in the paper",
         "the same for the smoother",
-        build_auto("rts-auto", build_rts),
+        build_auto,
         from_spectra=True,
         online=False,
     ),
@@ -370,10 +342,11 @@ PAPER = ("fdo", "gmo", "kfo-fe", "kfo-zoh")
 DEFAULT = (BEST, *PAPER)  #: What runs where nobody chooses.
 
 
-def sections() -> dict[str, Sequence[str]]:
-    """The ``--set`` sections with parameters: shared, then each observer's."""
-    own = {name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()}
-    return {**PARAMETERS, **own}
+#: The ``--set`` sections with parameters: shared, then each observer's.
+SECTIONS: dict[str, tuple[str, ...]] = {
+    **PARAMETERS,
+    **{name: PARAMETERS[entry.section] for name, entry in OBSERVERS.items()},
+}
 
 
 def build_observers(
@@ -386,9 +359,9 @@ def build_observers(
     """
     for name in names:
         check_known(name, OBSERVERS, f"no observer {name!r}")
-    made = [OBSERVERS[name].build(setup) for name in dict.fromkeys(names)]
+    built = [OBSERVERS[name].build(setup, name) for name in dict.fromkeys(names)]
     # Several observers may miss one gain: remark on it once.
     remarks: list[Remark] = []
-    for _, own in made:
+    for _, own in built:
         remarks += [remark for remark in own if remark not in remarks]
-    return tuple(observer for observer, _ in made), tuple(remarks)
+    return tuple(observer for observer, _ in built), tuple(remarks)

@@ -26,6 +26,8 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark, fact
 
+#: Kalman filter and smoother, of which R and Q_τ follow from the natural frequencies.
+KALMAN: dict[str, Kind] = {"kfo-zoh": kalman_filter, "kfo-rts": kalman_smoother}
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
 #: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
 GOALS = {
@@ -80,11 +82,10 @@ def match_observers(
             "--gains or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
-    remarks = [
-        fact("delay-matched", delay_s=goal.value)
-        if goal.name == "delay"
-        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
-    ]
+    values: dict[str, Any] = {
+        goal.name + {"delay": "_s", "bandwidth": "_Hz"}[goal.name]: goal.value
+    }
+    remarks = [fact(f"{goal.name}-matched", **values)]
     if {"fdo", "gmo"} <= {observer.name for observer in tuned}:
         remarks.append(fact("first-order-observers-alike"))
     return tuned, tuple(remarks)
@@ -105,15 +106,22 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
         changed: dict[str, Any] = {knob: float(value[0]) if knob == "omega" else value}
         return replace(cast("MomentumObserver", observer), **changed)
 
+    def excess(x: Array) -> Array:
+        """Delay [s], or share of a sinusoid at a bandwidth, over the goal. (n,)"""
+        tuning = turned(x).tuning(step, joints)
+        if goal.name == "delay":
+            return tuning.delay - goal.value
+        gain = turned(x).frequency_response(np.array([goal.value]), step, joints)[0]
+        return np.asarray(np.abs(gain) / tuning.dc_gain - np.sqrt(0.5))
+
     rising = goal.name == "bandwidth"
     a, b = (np.full(joints, np.log(limit)) for limit in (low, high))
-    ends = [excess(turned(x), goal, step, joints) for x in (a, b)]
+    ends = excess(a), excess(b)
     if not np.all((np.minimum(*ends) <= 0.0) & (np.maximum(*ends) >= 0.0)):
-        unit, limit = (
-            ("Hz", f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)")
-            if rising
-            else ("s", f"a delay of more than half a sample ({0.5 * step:g} s)")
-        )
+        unit, limit = "s", f"a delay of more than half a sample ({0.5 * step:g} s)"
+        if rising:
+            unit = "Hz"
+            limit = f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)"
         raise ParameterError(
             f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
             f"{1.0 / step:.4g} Hz; choose {limit}"
@@ -121,21 +129,9 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
     # Both measures are monotonic in the gain, so that halving its logarithm finds the one crossing.
     for _ in range(HALVINGS):
         middle = 0.5 * (a + b)
-        above = excess(turned(middle), goal, step, joints) > 0.0
-        a, b = np.where(above == rising, a, middle), np.where(above == rising, middle, b)
+        above = (excess(middle) > 0.0) == rising
+        a, b = np.where(above, a, middle), np.where(above, middle, b)
     return turned(0.5 * (a + b))
-
-
-def excess(observer: Observer, goal: Goal, step: float, joints: int) -> Array:
-    """An observer's delay, or share of a sinusoid at a bandwidth, over the goal.
-
-    (n,) [s] or [1]
-    """
-    tuning = observer.tuning(step, joints)
-    if goal.name == "delay":
-        return tuning.delay - goal.value
-    gain = np.abs(observer.frequency_response(np.array([goal.value]), step, joints)[0])
-    return np.asarray(gain / tuning.dc_gain - np.sqrt(0.5))
 
 
 class Tuned(NamedTuple):
@@ -158,12 +154,7 @@ class Tuned(NamedTuple):
 
 
 def parse_goal(text: str, threshold: str | None = None) -> Goal:
-    """Read what ``--gains`` and ``alarm.threshold`` ask for.
-
-    Args:
-        text: As `parse_target` reads it, any of `GOALS`.
-        threshold: One number or one a joint, positive. [N·m]
-    """
+    """What ``--gains`` asks for, any of `GOALS`, and ``alarm.threshold``, positive. [N·m]"""
     goal = parse_target(text, GOALS)
     level = None
     if threshold is not None:
@@ -190,52 +181,46 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
 
     The smoother has no delay: for a delay it gets the gains with the smallest error.
     """
-    threshold = goal.threshold
-    if threshold is not None and len(threshold) not in {1, spectra.joints}:
+    threshold, n, step = goal.threshold, spectra.joints, spectra.step
+    if threshold is not None and len(threshold) not in {1, n}:
         raise ParameterError(
-            f"alarm.threshold has {len(threshold)} values; give one, or one for each of "
-            f"{spectra.joints} joints"
+            f"alarm.threshold has {len(threshold)} values; give one, or one for each of {n} joints"
         )
     first_order = rates(momentum, spectra, goal)
     # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
     shared = float(np.min(first_order))
     if goal.name == "auto":
-        grid = natural_frequencies(spectra.step)
+        grid = natural_frequencies(step)
         shared = float(grid[np.argmin(expected_error(momentum, grid, spectra).mean(axis=1))])
-    single = np.full(spectra.joints, shared)
-    causal = rates(kalman_filter, spectra, goal)
-    smooth = rates(kalman_smoother, spectra, goal)
-    lines = [
-        ("fdo", "fdo", {"omega": shared}, FilteredDynamicsObserver(omega=shared), single),
-        ("gmo", "gmo", {"gain": first_order.tolist()}, momentum(first_order), first_order),
-        ("kfo-zoh", "kfo", densities(causal, spectra), kalman_filter(causal), causal),
-        ("kfo-rts", "kfo-rts", densities(smooth, spectra), kalman_smoother(smooth), smooth),
-    ]
+    lines: dict[str, tuple[Observer, Array, dict[str, Any]]] = {
+        "fdo": (FilteredDynamicsObserver(omega=shared), np.full(n, shared), {"omega": shared}),
+        "gmo": (momentum(first_order), first_order, {"gain": first_order.tolist()}),
+    }
+    for name, kind in KALMAN.items():
+        rate = rates(kind, spectra, goal)
+        r = noise_level(rate, spectra)
+        gains = {"r_diag": r.tolist(), "q_p_diag": 0.0, "q_tau_diag": (r * rate**4).tolist()}
+        lines[name] = kind(rate), rate, {**gains, "noise_convention": "density"}
     tuned = []
-    for name, section, gains, observer, rate in lines:
-        response = observer.frequency_response(spectra.frequency, spectra.step, spectra.joints)
-        tuned.append(
-            Tuned(
-                observer=name,
-                section=section,
-                gains=gains,
-                rate=rate,
-                delay=np.asarray(observer.tuning(spectra.step, spectra.joints).delay),
-                rmse=np.sqrt(spectra.missed(response) + spectra.passed(response)),
-                alarms=None if threshold is None else alarms(response, spectra, threshold),
-                running=observer,
-            )
+    for name, (observer, rate, gains) in lines.items():
+        response = observer.frequency_response(spectra.frequency, step, n)
+        line = Tuned(
+            observer=name,
+            section="kfo" if name == "kfo-zoh" else name,
+            gains=gains,
+            rate=rate,
+            delay=np.asarray(observer.tuning(step, n).delay),
+            rmse=np.sqrt(spectra.missed(response) + spectra.passed(response)),
+            alarms=None if threshold is None else alarms(response, spectra, threshold),
+            running=observer,
         )
+        tuned.append(line)
     return tuple(tuned)
 
 
 def tuning_curves(spectra: Spectra) -> dict[str, Curve]:
     """Observer → expected error over rate; both first-order ones share a curve."""
-    kinds: dict[str, Kind] = {
-        "fdo, gmo": momentum,
-        "kfo-zoh": kalman_filter,
-        "kfo-rts": kalman_smoother,
-    }
+    kinds = {"fdo, gmo": momentum, **KALMAN}
     return {name: error_curve(kind, spectra) for name, kind in kinds.items()}
 
 
@@ -245,17 +230,6 @@ def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tupl
         return ()
     grid = natural_frequencies(spectra.step)
     return tuple(r for line in tuned for r in bound_remarks(line.observer, line.rate, grid))
-
-
-def densities(omega_n: Array, spectra: Spectra) -> dict[str, Any]:
-    """R, Q_p and Q_τ of natural frequencies, under ``density``, R to the log's scale."""
-    r = noise_level(omega_n, spectra)
-    return {
-        "r_diag": r.tolist(),
-        "q_p_diag": 0.0,
-        "q_tau_diag": (r * omega_n**4).tolist(),
-        "noise_convention": "density",
-    }
 
 
 def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
@@ -294,13 +268,7 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
 
 
 def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
-    """Expected false alarms an hour. (n,)
-
-    Args:
-        response: An observer's, one column a joint or one for all. (F, n) or (F, 1)
-        spectra: What the log shows.
-        threshold: Torque beyond which there is an alarm. (n,) or (1,) [N·m]
-    """
+    """Expected false alarms an hour beyond a threshold [N·m], of H (F, n) or (F, 1). (n,)"""
     power = np.abs(response) ** 2 * spectra.noise * spectra.width
     return crossings(power, spectra.frequency, threshold)
 

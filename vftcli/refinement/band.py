@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.observers.error_band import (
+from vftcli.observers.spectra import (
     ENOUGH,
     UNSEEN,
     FreeError,
@@ -26,7 +26,7 @@ from vftcli.signals.wrench import ExternalTorque
 def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
     """The estimate with its band, marked in motion; itself if nothing is known.
 
-    The band is `vftcli.observers.error_band`'s: a filter's own covariance, `sd`, knows no lag.
+    The band is `vftcli.observers.spectra`'s: a filter's own covariance, `sd`, knows no lag.
     """
     estimate, spectra, run = reading.estimate, found.spectra, found.motion.log
     if spectra is None or not len(reading.samples):

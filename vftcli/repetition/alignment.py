@@ -55,7 +55,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
     every whole period: the shift with most overlap wins.
     """
     check_same_arm(recording, free)
-    closest = lying_at(recording, free, *best_fit(recording, free))
+    closest = aligned_at(recording, free, *best_fit(recording, free))
     fits = closest.deviation <= SAME_TRAJECTORY
     found = closest if fits else shared_part(recording, free)
     if found is not None and abs(found.rate - 1.0) <= SAME_RATE:
@@ -65,10 +65,10 @@ def align(recording: Recording, free: Recording) -> Alignment:
         # A useless rate is no rate: report the distance at equal clocks.
         middle = 0.5 * (recording.t[0] + recording.t[-1])
         shift = closest.shift + (closest.rate - 1.0) * middle
-        apart_by = lying_at(recording, free, float(shift), 1.0).deviation
+        distance = aligned_at(recording, free, float(shift), 1.0).deviation
         raise ReferenceTorqueError(
             f"{free.name} is not a free run of the trajectory in {recording.name}: at the best "
-            f"shift ({shift:.3f} s) the joint positions still differ by {apart_by:.3g} rad rms; "
+            f"shift ({shift:.3f} s) the joint positions still differ by {distance:.3g} rad rms; "
             "give a log of the same motion with --free"
         )
     raise ReferenceTorqueError(why_slower(recording, free, found.rate))
@@ -132,16 +132,15 @@ def pace(recording: Recording) -> float | None:
 
 def check_same_arm(recording: Recording, free: Recording) -> None:
     """Raise a ReferenceTorqueError if two logs cannot be of one arm."""
+    problem, hints = "", (free.robot_hint, recording.robot_hint)
     if free.joints != recording.joints:
+        problem = f"has {free.joints} joints, {recording.name} has {recording.joints}"
+    elif None not in hints and hints[0] != hints[1]:
+        problem = f"is a log of {hints[0]}, {recording.name} of {hints[1]}"
+    if problem:
         raise ReferenceTorqueError(
-            f"{free.name} has {free.joints} joints, {recording.name} has {recording.joints}: "
-            "a free run must be of the same arm; give another log with --free"
-        )
-    hints = (free.robot_hint, recording.robot_hint)
-    if None not in hints and hints[0] != hints[1]:
-        raise ReferenceTorqueError(
-            f"{free.name} is a log of {hints[0]}, {recording.name} of {hints[1]}: a free run must "
-            "be of the same arm; give another log with --free"
+            f"{free.name} {problem}: a free run must be of the same arm; give another log with "
+            "--free"
         )
 
 
@@ -149,23 +148,20 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """The shared part of two logs' motions, None if too short.
 
     At the shift most of the recording's motion is within `SAME_TRAJECTORY`; this must be at
-    least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or
-    more.
+    least `LEAST_OVERLAP` of it. The partners are unbroken stretches of a second or more.
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
     path = np.append(np.max(np.abs(np.diff(q, axis=0)), axis=1), 0.0)
     span = recording.duration + free.duration
-    step = max(0.02, span / 5000.0)
-    shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, step)
+    shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, max(0.02, span / 5000.0))
     shared = [float(np.sum(path * near(t + shift, q, free))) for shift in shifts]
-    best = float(shifts[int(np.argmax(shared))])
     if max(shared) < LEAST_OVERLAP * float(np.sum(path)):
         return None
-    shift, rate = refined(recording, free, best, 1.0)
+    shift, rate = refined(recording, free, float(shifts[int(np.argmax(shared))]), 1.0)
     matched = near(rate * recording.t + shift, recording.q, free)
     long = covered(intervals(recording.t, matched, least=1.0), recording.samples)
-    found = lying_at(recording, free, shift, rate, long)
+    found = aligned_at(recording, free, shift, rate, long)
     return found if np.isfinite(found.deviation) else None
 
 
@@ -194,7 +190,7 @@ def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None
         step = max(recording.median_step * rate, free.median_step, free.duration / 4000.0)
         fit = lag_fit(uniform(free, step), uniform(recording, step / rate), LEAST_OVERLAP)
         shift = fit.closest * step + float(free.t[0] - rate * recording.t[0])
-        found = lying_at(recording, free, *refined(recording, free, shift, float(rate)))
+        found = aligned_at(recording, free, *refined(recording, free, shift, float(rate)))
         if found.deviation <= 0.5 * SAME_TRAJECTORY and is_same_path(recording, found):
             return found
     return None
@@ -242,48 +238,35 @@ def refined(
     """Shift [s] and clock rate, refined on the logs' own clocks.
 
     Gauss–Newton on q_free(rate·t + shift) = q(t), each joint weighted by its spread, samples
-    by Cauchy's weight against contacts.
+    by Cauchy's weight against contacts; as they are without information.
     """
     slope = np.gradient(free.q, free.t, axis=0)
     for _ in range(15):
-        move = gauss_newton_step(recording, free, rate * recording.t + shift, slope)
-        shift, rate = shift - move[0], rate - move[1]
-        if abs(move[0]) < 1e-9 and abs(move[1]) < 1e-12:
+        t = rate * recording.t + shift
+        distance = apart(t, recording.q, free)
+        inside = np.isfinite(distance[:, 0])
+        if np.count_nonzero(inside) < 8:
+            break
+        own, distance = recording.t[inside], distance[inside]
+        middle = float(own.mean())
+        speed = resample_columns(t[inside], free.t, slope)
+        scale = robust_sd(distance) + 1e-7
+        share = speed / (scale**2 + distance**2)
+        arm = (own - middle)[:, None]
+        a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))
+        e, f = float(np.sum(share * distance)), float(np.sum(share * distance * arm))
+        determinant = a * c - b * b
+        if not determinant > 1e-12 * max(a * c, 1e-300):
+            break
+        more = (a * f - b * e) / determinant
+        later = (c * e - b * f) / determinant - more * middle
+        shift, rate = shift - later, rate - more
+        if abs(later) < 1e-9 and abs(more) < 1e-12:
             break
     return shift, rate
 
 
-def gauss_newton_step(
-    recording: Recording, free: Recording, t: Array, slope: Array
-) -> tuple[float, float]:
-    """Errors of shift [s] and rate, first order; zeros without information.
-
-    Args:
-        recording: The log.
-        free: The free run.
-        t: Its clock at the log's samples, by shift and rate so far. (T,) [s]
-        slope: Its velocities. (S, n) [rad/s]
-    """
-    distance = apart(t, recording.q, free)
-    inside = np.isfinite(distance[:, 0])
-    if np.count_nonzero(inside) < 8:
-        return (0.0, 0.0)
-    own, distance = recording.t[inside], distance[inside]
-    middle = float(own.mean())
-    speed = resample_columns(t[inside], free.t, slope)
-    scale = robust_sd(distance) + 1e-7
-    share = speed / (scale**2 + distance**2)
-    arm = (own - middle)[:, None]
-    a, b, c = (float(np.sum(share * speed * arm**k)) for k in range(3))
-    e, f = float(np.sum(share * distance)), float(np.sum(share * distance * arm))
-    determinant = a * c - b * b
-    if not determinant > 1e-12 * max(a * c, 1e-300):
-        return (0.0, 0.0)
-    rate = (a * f - b * e) / determinant
-    return (c * e - b * f) / determinant - rate * middle, rate
-
-
-def lying_at(
+def aligned_at(
     recording: Recording, free: Recording, shift: float, rate: float, within: Mask | None = None
 ) -> Alignment:
     """Alignment of two logs at a shift [s] and rate, in the overlap or `within`. (T,)
@@ -294,7 +277,6 @@ def lying_at(
     overlap = np.isfinite(distance[:, 0])
     if within is not None:
         overlap &= within
-    deviation = float("inf")
-    if np.count_nonzero(overlap) >= 2:
-        deviation = float(np.sqrt(np.mean(distance[overlap] ** 2)))
+    some = np.count_nonzero(overlap) >= 2
+    deviation = float(np.sqrt(np.mean(distance[overlap] ** 2))) if some else float("inf")
     return Alignment(shift, rate, deviation, overlap)

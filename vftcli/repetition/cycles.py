@@ -1,19 +1,208 @@
-"""The cycles of a repeated motion in one log, without the way in and the way out."""
+"""A motion that repeats: its period, its cycles, and those of them that nobody touched."""
 
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.repetition.periodicity import Period, moving_part
+from vftcli.repetition.difference import difference
+from vftcli.repetition.paired_runs import PairedRuns, Pairing, in_gap
+from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import low_pass
+from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.rest import standing
 from vftcli.signals.series import resample_columns
+
+LEAST_REPEATED = 0.15  #: Share of the moving part of the log that must be there twice.
+
+#: Positions return if a quarter of them come back within this share of their own spread.
+#:
+#: A quarter: a soft servo is off its path while it is pushed, which may be most of the time.
+RETURNS = 0.015
+
+#: A valley is worth refining if a quarter of the samples come back within this share.
+SHORTLIST = 0.15
+CANDIDATES = 40  #: Valleys looked at, the deepest ones.
+MULTIPLES = 12  #: Multiples of the period that refine it.
+AROUND = 0.03  #: How far from a stated period the true one is looked for, relative: clocks drift.
+ENOUGH = 2560  #: Samples that refine a period: more of them only take longer.
+#: Spans this many times what the samples fill at their usual step are gaps, not motion.
+SPARSE = 10.0
 
 #: A sample is on the repeated path if it is there again one period away, within this. [rad]
 ON_PATH = 0.1
 COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as whole.
+
+#: A cycle is free too if its difference from the freest is within this many expected errors.
+ALIKE = 1.5
+MOST_LAID = 8  #: Free cycles that are laid under the others, at most.
+SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
+
+
+class Period(NamedTuple):
+    """A motion's period."""
+
+    seconds: float  #: On the log's own clock. [s]
+    #: Lower quartile over time of the joint-position distance after one period. [rad]
+    deviation: float
+
+
+def find_period(recording: Recording, stated: float | None = None) -> Period:
+    """Find the time after which the joint positions return.
+
+    The mean squared distance between the log and itself later (the autocorrelation with its
+    overlap accounted for) has a valley at every multiple of the period. The first valley from
+    which enough samples return is refined below the sample time by Gauss–Newton steps on all
+    its multiples together, robust against contacts that push the arm off its path.
+
+    Args:
+        recording: The log.
+        stated: The commanded period, if known: the search stays within `AROUND` of it. [s]
+    """
+    t, q = moving_part(recording)
+    check_stated(recording, stated, float(t[-1] - t[0]))
+    step = recording.median_step
+    if float(t[-1] - t[0]) > SPARSE * step * len(t):
+        raise ReferenceTorqueError(
+            f"{recording.name}: {len(t)} samples over {t[-1] - t[0]:.4g} s: nearly all of that is "
+            "a gap, in which no repetition can be looked for; leave the gap out with --interval"
+        )
+    x = resample_columns(np.arange(t[0], t[-1], step), t, q)
+    spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
+    closest = (float("nan"), float("inf"))
+    for lag in valleys(distances(x), step, stated):
+        seconds, deviation = lag * step, returned(t, q, lag * step)
+        if deviation <= SHORTLIST * spread:
+            seconds = refined_period(t, q, seconds)
+            deviation = returned(t, q, seconds)
+        if deviation <= RETURNS * spread:
+            return Period(seconds, deviation)
+        closest = min(closest, (seconds, deviation), key=lambda c: c[1])
+    wanted = f" near {stated:g} s" if stated is not None else ""
+    seconds, deviation = closest
+    near = (
+        f" (closest after {seconds:.4g} s, where three quarters of them are more than "
+        f"{deviation:.2g} rad off)"
+    )
+    raise ReferenceTorqueError(
+        f"{recording.name}: no repetition found{wanted}: the joint positions do not return within "
+        f"the log{near if np.isfinite(deviation) else ''}; give a free run of the same motion "
+        "with --free"
+    )
+
+
+def check_stated(recording: Recording, stated: float | None, duration: float) -> None:
+    """Raise unless a stated period fits into the moving part of the log."""
+    if stated is None:
+        return
+    if not (np.isfinite(stated) and stated > 0):
+        raise ReferenceTorqueError(f"two-cycle.period is {stated:g} s; it must be positive")
+    if stated > (1.0 - LEAST_REPEATED) * duration:
+        raise ReferenceTorqueError(
+            f"{recording.name}: a period of {stated:g} s does not fit into the {duration:.4g} s "
+            "the arm moves, which must hold more than one cycle; give a shorter "
+            "two-cycle.period, or in its place a free run in another log with --free"
+        )
+    if stated < 4.0 * recording.median_step:
+        raise ReferenceTorqueError(
+            f"{recording.name}: a period of {stated:g} s is shorter than four samples "
+            f"({recording.median_step:g} s each); two-cycle.period is in seconds"
+        )
+
+
+def moving_part(recording: Recording) -> tuple[Array, Array]:
+    """Clock [s] and positions [rad] without the rest before and after the motion."""
+    t, q = recording.t, recording.q
+    if recording.samples < 8:
+        raise ReferenceTorqueError(
+            f"{recording.name}: {recording.samples} samples are too few to find a period in, "
+            "or to compare with a free run; record a longer log"
+        )
+    dq = recording.dq if recording.dq is not None else np.gradient(q, t, axis=0)
+    moving = np.flatnonzero(~np.all(standing(t, dq), axis=1))
+    if len(moving) < 8 or np.ptp(q[moving], axis=0).max() < 0.01:
+        raise ReferenceTorqueError(
+            f"{recording.name}: the arm does not move, so it repeats nothing; the two-cycle "
+            "difference needs a repeated motion, or a free run of the same with --free"
+        )
+    span = slice(moving[0], moving[-1] + 1)
+    return t[span], q[span]
+
+
+def distances(x: Array) -> Array:
+    """Mean squared distance of x and x `lag` samples later, every lag. (N,)"""
+    x = x - x.mean(axis=0)
+    samples = len(x)
+    size = 1 << int(np.ceil(np.log2(2 * samples)))
+    spectrum = np.fft.rfft(x, size, axis=0)
+    product = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:samples]
+    energy = np.concatenate([[0.0], np.cumsum(np.sum(x**2, axis=1))])
+    lag = np.arange(samples)
+    total = energy[samples - lag] + energy[samples] - energy[lag] - 2.0 * product
+    return np.asarray(np.maximum(total, 0.0) / (samples - lag))
+
+
+def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
+    """Lags at the distance's minima with overlap, shortest first. [samples]"""
+    low, high = 4, int((1.0 - LEAST_REPEATED) * len(distance))
+    if stated is not None:
+        low = max(2, int(np.floor((1.0 - AROUND) * stated / step)))
+        high = min(high, int(np.ceil((1.0 + AROUND) * stated / step)) + 1)
+    # None where a clock of bursts spans hardly more than a few of its median steps.
+    lags = np.arange(low, high)
+    before, here, after = distance[lags - 1], distance[lags], distance[lags + 1]
+    found = lags[(here <= before) & (here <= after)]
+    if stated is not None and len(lags) and not len(found):
+        found = lags[[int(np.argmin(here))]]
+    deep = np.sort(found[np.argsort(distance[found])[:CANDIDATES]])
+    bend = distance[deep - 1] - 2.0 * distance[deep] + distance[deep + 1]
+    tilt = 0.5 * (distance[deep - 1] - distance[deep + 1])
+    return [float(x) for x in deep + np.clip(tilt / np.where(bend > 0, bend, np.inf), -0.5, 0.5)]
+
+
+def returned(t: Array, q: Array, seconds: float) -> float:
+    """Lower quartile of the distance of q and q `seconds` later. [rad]"""
+    inside = t + seconds <= t[-1]
+    distance = resample_columns(t[inside] + seconds, t, q) - q[inside]
+    return float(np.quantile(np.sqrt(np.sum(distance**2, axis=1)), 0.25))
+
+
+def refined_period(t: Array, q: Array, period: float) -> float:
+    """Refine a period below the sample time, on the log's own clock. [s]
+
+    Gauss–Newton on q(t + mP) = q(t), first for m = 1, then for up to `MULTIPLES` multiples the log
+    holds, each joint weighted by its own spread, samples by Cauchy's weight, so that pushes do not
+    pull the period.
+    """
+    # Interpolation goes along time, column by column.
+    q = np.asfortranarray(q)
+    dq = np.asfortranarray(np.gradient(q, t, axis=0))
+    last = max(1, int((t[-1] - t[0]) / period - LEAST_REPEATED))
+    several = np.unique(np.linspace(1, last, min(last, MULTIPLES)).astype(int))
+    every = -(-len(t) // ENOUGH)
+    here, path = t[::every], q[::every]
+    for multiples in (several[:1], several):
+        for _ in range(20):
+            move = weight = 0.0
+            for m in multiples:
+                there = here + m * period
+                inside = there <= t[-1]
+                distance = resample_columns(there[inside], t, q) - path[inside]
+                slope = m * resample_columns(there[inside], t, dq)
+                scale = robust_sd(distance) + 1e-7
+                share = 1.0 / (scale**2 + distance**2)
+                move += float(np.sum(share * slope * distance))
+                weight += float(np.sum(share * slope**2))
+            step = move / weight if weight > 0 else 0.0
+            change = float(np.clip(step, -0.1 * period, 0.1 * period))
+            period -= change
+            if abs(change) < 1e-9 * period:
+                break
+    return period
 
 
 class Cycles(NamedTuple):
@@ -76,3 +265,102 @@ def settled(t: Array, on_path: Mask, seconds: float) -> float:
     share = (count[stop] - count[here]) / np.maximum(stop - here, 1)
     good = np.flatnonzero(on_path & (share >= 0.75))
     return float(t[good[0]]) if len(good) else float(t[-1])
+
+
+def pair_with_cycle(motion: Run, cycles: Cycles, free: int, period: float) -> Pairing:
+    """Pair a log with one of its own cycles, from 0, which itself has no partner.
+
+    By the commanded or the found period [s].
+    """
+    t, number = motion.t, cycles.number(motion.t)
+    first, last = cycles.span(free)
+    times = t - np.rint((t - 0.5 * (first + last)) / period) * period
+    usable = (number >= 0) & (number != free) & (times >= first) & (times <= last)
+    return Pairing(motion, np.where(usable & ~in_gap(t, times), times, np.nan))
+
+
+class FreeCycles(NamedTuple):
+    """Cycles assumed free."""
+
+    numbers: tuple[int, ...]  #: Counted from 0.
+    #: Of every whole cycle, relative to the smallest, by which these were chosen, ∞ of one that
+    #: lies in a gap; None where they were given. (cycles,)
+    residuals: Array | None
+
+    @property
+    def drawn(self) -> tuple[int, ...]:
+        """Those that are laid under the others: all, or `MOST_LAID` from the first to the last.
+
+        Every cycle more costs a pass over the whole log, and takes little off the error.
+        """
+        if len(self.numbers) <= MOST_LAID:
+            return self.numbers
+        at = np.linspace(0, len(self.numbers) - 1, MOST_LAID).round().astype(int)
+        return tuple(self.numbers[k] for k in at)
+
+    def remarks(self, whole: int) -> list[Remark]:
+        """Their numbers among so many whole cycles, and which are laid under the others if few."""
+        count = len(self.numbers)
+        code = "free-cycle" if count == 1 else "free-cycles"
+        named, drawn = ([k + 1 for k in numbers] for numbers in (self.numbers, self.drawn))
+        if self.residuals is None:
+            found = fact(f"{code}-given", cycles=named, whole=whole)
+        else:
+            residuals = self.residuals[np.isfinite(self.residuals)].tolist()
+            found = fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
+        if count <= MOST_LAID:
+            return [found]
+        # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
+        wider = float(np.sqrt((1.0 + 1.0 / MOST_LAID) / (1.0 + 1.0 / count)) - 1.0)
+        return [found, fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider)]
+
+
+def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
+    """The cycle of smallest residual, and those that differ by noise alone.
+
+    The residual of a cycle is the root mean square of torque minus the model's, low-passed, of
+    each joint relative to that joint's smallest, averaged over the joints.
+    """
+    number = cycles.number(motion.t)
+    if cycles.whole < 1:
+        raise ReferenceTorqueError(
+            f"{motion.name}: no whole cycle of {cycles.period:.4g} s is in the log; give a free "
+            "run with --free"
+        )
+    residual = residuals(motion, cycles)
+    freest = int(np.argmin(residual))
+    times = pair_with_cycle(motion, cycles, freest, cycles.period).times
+    first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
+    free = motion.part(slice(int(first), int(last)))
+    also = []
+    for cycle in np.flatnonzero(np.isfinite(residual)).tolist():
+        inside = np.flatnonzero(number == cycle)
+        span = slice(int(inside[0]), int(inside[-1]) + 1)
+        if cycle != freest:
+            pair = PairedRuns(motion=motion.part(span), pairings=[Pairing(free, times[span])])
+            found = difference(pair, "model", band(pair.motion.step, None)[0])
+            shown = found.error.rms_moving(found.tau)
+            if not np.all(shown <= ALIKE * found.error.floor_moving):
+                continue
+        also.append(cycle)
+    if len(also) == cycles.whole > 1:
+        # Something must be left that the free cycles can be laid under.
+        also.pop()
+    return FreeCycles(tuple(also), residual)
+
+
+def residuals(motion: Run, cycles: Cycles) -> Array:
+    """Mean over joints of each cycle's residual relative to the smallest. (cycles,)
+
+    A cycle of which a gap takes more than half has none: ∞.
+    """
+    # Below 5 Hz a push exceeds the drives' ripple.
+    cutoff = min(5.0, band(motion.step, None)[0])
+    gap = low_pass(motion.t, motion.drive_torque - motion.model_torque, cutoff)
+    number = cycles.number(motion.t)
+    held = np.bincount(number[(number >= 0) & (number < cycles.whole)], minlength=cycles.whole)
+    square = np.full((cycles.whole, gap.shape[1]), np.inf)
+    for cycle in np.flatnonzero(2 * held >= held.max()).tolist():
+        square[cycle] = np.mean(gap[number == cycle] ** 2, axis=0)
+    relative = np.sqrt(square / np.maximum(square.min(axis=0), 1e-12))
+    return np.asarray(relative.mean(axis=1))

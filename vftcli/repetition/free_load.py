@@ -11,7 +11,6 @@ with friction and offset held to what a model usually misses of them.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
@@ -56,12 +55,8 @@ class FreeLoad:
     @property
     def remark(self) -> Remark:
         """The free part's load, and its remedy."""
-        return caution(
-            "free-part-loaded",
-            load_kg=self.mass,
-            sd_kg=self.sd,
-            left_percent=100.0 * self.share,
-        )
+        left = 100.0 * self.share
+        return caution("free-part-loaded", load_kg=self.mass, sd_kg=self.sd, left_percent=left)
 
     @property
     def weights(self) -> Array:
@@ -73,14 +68,9 @@ class FreeLoad:
         return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
 
     def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
-        """Wrench of its weight, and the covariance of that. (N, 6), (N, 6, 6)
+        """Wrench of its weight at positions (N, n) [rad], and its covariance. (N, 6), (N, 6, 6)
 
-        Args:
-            chain: The arm.
-            q: Joint positions. (N, n) [rad]
-
-        Returns:
-            In base axes, the moment about the flange point. [N, N·m]
+        In base axes, the moment about the flange point. [N, N·m]
         """
         each = load_wrench(chain, q)
         spread = each * np.concatenate([[self.sd], self.moment_sd])
@@ -92,38 +82,28 @@ def without_load(run: Run, load: FreeLoad | None) -> Run:
     return run if load is None else run.less(load.torque(run))
 
 
-class Weighing(NamedTuple):
-    """A fit of the free part."""
-
-    weights: Array  #: Of the columns. (m,)
-    sd: Array  #: Their standard deviations. (m,)
-    left: Array  #: Root mean square of what is left, joint by joint. (n,) [N·m]
-
-
 def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     """The load behind much of the free part's disturbance, or None."""
     parts = [part for piece in pieces if (part := columns(piece)) is not None]
     if not parts:
         return None
     robot = pieces[0].run.robot
-    d = np.concatenate([part[0] for part in parts])
-    A = np.concatenate([part[1] for part in parts])
+    d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(d) < 2 * A.shape[2] or not np.any(d):
         return None
     friction = dry_friction(robot.friction, robot.joints)
     prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
-    loaded = weigh(d, A, prior)
-    bare = weigh(d, A[:, :, 4:], prior[4:])
-    mass, sd = float(loaded.weights[0]), float(loaded.sd[0])
-    moved = bare.left > 0.0  # a simulation without noise leaves nothing on a joint at rest
-    share = float(np.sqrt(np.mean((loaded.left[moved] / bare.left[moved]) ** 2)))
-    if mass < max(LEAST, SURE * sd) or share > PARTLY:
+    weights, sd, loaded = weigh(d, A, prior)
+    _, _, bare = weigh(d, A[:, :, 4:], prior[4:])
+    moved = bare > 0.0  # a simulation without noise leaves nothing on a joint at rest
+    share = float(np.sqrt(np.mean((loaded[moved] / bare[moved]) ** 2)))
+    mass = float(weights[0])
+    if mass < max(LEAST, SURE * float(sd[0])) or share > PARTLY:
         return None
-    gain = gain_sd(pieces[0].run.recording, robot)
-    whole = np.hypot(loaded.sd[:4], gain * loaded.weights[:4])
+    whole = np.hypot(sd[:4], gain_sd(pieces[0].run.recording, robot) * weights[:4])
     return FreeLoad(
         mass=mass,
-        moment=loaded.weights[1:4].copy(),
+        moment=weights[1:4].copy(),
         sd=float(whole[0]),
         moment_sd=whole[1:],
         share=share,
@@ -137,28 +117,16 @@ def weighed(piece: RunSamples) -> Indices:
 
 
 def columns(piece: RunSamples) -> tuple[Array, Array] | None:
-    """Disturbance of a piece, and its columns; None of a short piece.
-
-    Returns:
-        (S, n) [N·m] and (S, n, 4 + 2n).
-    """
+    """Disturbance and its columns, None of a short piece. (S, n) [N·m], (S, n, 4 + 2n)"""
     run, inside = piece.run, np.flatnonzero(piece.inside)
     if inside.size == 0:
         return None
-    n = run.robot.joints
+    n, j = run.robot.joints, np.arange(run.robot.joints)
     # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
     near = round(HEARD / median_step(run.t))
     first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
-    t, p, mu, q, dq = (
-        values[first:stop]
-        for values in (
-            run.t,
-            run.terms.p,
-            run.terms.mu,
-            run.q,
-            run.dq,
-        )
-    )
+    series = (run.t, run.terms.p, run.terms.mu, run.q, run.dq)
+    t, p, mu, q, dq = (values[first:stop] for values in series)
     try:
         smooth = zero_phase(t, np.hstack([derivative(t, p) - mu, dq]), CUTOFF)
     except (ClockError, ValueError):
@@ -166,14 +134,15 @@ def columns(piece: RunSamples) -> tuple[Array, Array] | None:
     used = weighed(piece) - first
     A = np.zeros((len(used), n, 4 + 2 * n))
     A[:, :, :4] = load_regressor(run.robot.chain, q[used])
-    j = np.arange(n)
     A[:, j, 4 + j] = np.tanh(smooth[used][:, n:] / SIGN_SPEED)
     A[:, j, 4 + n + j] = 1.0
     return smooth[used][:, :n], A
 
 
-def weigh(d: Array, A: Array, prior: Array) -> Weighing:
-    """Regularised least squares, each joint weighed by what the fit leaves of it.
+def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
+    """Weights of columns (m,), their standard deviations, and the rms that is left (n,) [N·m].
+
+    Regularised least squares, each joint weighed by what the fit leaves of it.
 
     Args:
         d: Disturbance. (S, n) [N·m]
@@ -190,4 +159,4 @@ def weigh(d: Array, A: Array, prior: Array) -> Weighing:
         weights = covariance @ right
         left = np.sqrt(np.mean((d - A @ weights) ** 2, axis=0))
         spread = np.maximum(left, 1e-3 * np.max(left) + 1e-6)
-    return Weighing(weights, np.sqrt(np.diag(covariance)), left)
+    return weights, np.sqrt(np.diag(covariance)), left

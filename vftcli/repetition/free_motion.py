@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_run import FreeRun
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.parsing import interval_text
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.shown import Shown
 
 # A plain estimate asks for no free motion: what finds it is loaded when it is asked for.
 if TYPE_CHECKING:
-    from vftcli.repetition.cycles import Cycles
-    from vftcli.repetition.free_cycles import FreeCycles
-    from vftcli.repetition.periodicity import Period
+    from vftcli.repetition.alignment import Alignment
+    from vftcli.repetition.cycles import Cycles, FreeCycles, Period
+    from vftcli.repetition.paired_runs import Pairing
 
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
@@ -34,6 +34,52 @@ class FreePart(NamedTuple):
     remarks: tuple[Remark, ...]  #: What it is and how it was found.
     #: Whether it was found, not named, so that it may be touched after all.
     doubted: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FreeRun:
+    """A motion in another recording that nobody touched, beside the log it serves.
+
+    Everything that is asked of it, by references, zero and bands, is made once.
+    """
+
+    run: Run  #: The free run.
+    log: Run  #: The log.
+
+    @cached_property
+    def _alignment(self) -> "Alignment | ReferenceTorqueError":
+        from vftcli.repetition.alignment import align
+
+        try:
+            return align(self.log.recording, self.recording)
+        except ReferenceTorqueError as error:
+            return error
+
+    @property
+    def recording(self) -> Recording:
+        """The free run as it was read."""
+        return self.run.recording
+
+    @property
+    def is_same_motion(self) -> bool:
+        """Whether it follows the log's trajectory, or a part of it."""
+        return not isinstance(self._alignment, ReferenceTorqueError)
+
+    @property
+    def alignment(self) -> "Alignment":
+        """Its alignment with the log."""
+        if isinstance(self._alignment, ReferenceTorqueError):
+            raise self._alignment
+        return self._alignment
+
+    @cached_property
+    def pairing(self) -> "Pairing":
+        """Instant in the free run of each sample of the log."""
+        from vftcli.repetition.paired_runs import pair_with_run
+
+        found = self.alignment
+        pairing = pair_with_run(self.log.t, self.run, found.shift, found.rate)
+        return pairing._replace(times=np.where(found.overlap, pairing.times, np.nan))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -59,7 +105,7 @@ class FreeMotion(Shown):
     @cached_property
     def period(self) -> "Period":
         """The period of the log's motion."""
-        from vftcli.repetition.periodicity import find_period
+        from vftcli.repetition.cycles import find_period
 
         return find_period(self.log.recording, self.choice.period)
 
@@ -80,19 +126,17 @@ class FreeMotion(Shown):
                     f"{self.log.recording.name}: there is no cycle {number}; the log holds {whole} "
                     f"whole cycles of {cycles.period:.4g} s from {cycles.begin:.4g} s on"
                 )
-        slack = SLACK * cycles.period
-        within = {
-            number
-            for number in range(whole)
-            for a, b in self.choice.spans
-            if cycles.span(number)[0] >= a - slack and cycles.span(number)[1] <= b + slack
-        }
-        return tuple(sorted(within | {number - 1 for number in self.choice.cycles}))
+        slack, found = SLACK * cycles.period, {number - 1 for number in self.choice.cycles}
+        for number in range(whole):
+            begin, end = cycles.span(number)
+            if any(begin >= a - slack and end <= b + slack for a, b in self.choice.spans):
+                found.add(number)
+        return tuple(sorted(found))
 
     @cached_property
     def free_cycles(self) -> "FreeCycles":
         """Free cycles of the log: the user's, else those found."""
-        from vftcli.repetition.free_cycles import FreeCycles, find_free_cycles
+        from vftcli.repetition.cycles import FreeCycles, find_free_cycles
 
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
@@ -114,7 +158,7 @@ class FreeMotion(Shown):
         if choice.cycles or not given:
             found = self.free_cycles
             own = own | np.isin(self.cycles.number(t), found.numbers)
-            remarks.append(found.remark(self.cycles.whole))
+            remarks += found.remarks(self.cycles.whole)[:1]
         pieces = [RunSamples(log, own)] if own.any() else []
         whole = (RunSamples(r.run, np.ones(r.recording.samples, dtype=bool)) for r in self.runs)
         return FreePart((*pieces, *whole), own, tuple(remarks), doubted=not given)
@@ -140,8 +184,7 @@ class FreeMotion(Shown):
     @property
     def within_spans(self) -> Mask:
         """RunSamples of the log inside the spans that are given as free. (T,)"""
-        recording, spans = self.log.recording, self.choice.spans
-        t = recording.t
+        recording, spans, t = self.log.recording, self.choice.spans, self.log.t
         inside = np.zeros(len(t), dtype=bool)
         for first, last in spans:
             inside |= (t >= first) & (t <= last)

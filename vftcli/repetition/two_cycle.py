@@ -7,11 +7,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.repetition.choice import AUTOMATIC, FreeChoice
-from vftcli.repetition.error_model import TRUSTED_SHARE, rms
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.free_run import FreeRun
-from vftcli.repetition.ladder import LOW_PASS, RUNGS, Difference, differences, most_certain
-from vftcli.repetition.pairing import Pairing, pair_with_cycle, pair_with_run
+from vftcli.repetition.cycles import pair_with_cycle
+from vftcli.repetition.difference import (
+    LOW_PASS,
+    RUNGS,
+    TRUSTED_SHARE,
+    Difference,
+    differences,
+    most_certain,
+    rms,
+)
+from vftcli.repetition.free_motion import FreeMotion, FreeRun
+from vftcli.repetition.paired_runs import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
@@ -27,7 +34,7 @@ SURE = 3.0
 
 
 class Partners(NamedTuple):
-    """A log's free motion, laid under it."""
+    """A log's free motion, paired with it."""
 
     #: "found" and, where a period is stated, "commanded" → one pairing a free run.
     clocks: Mapping[str, Sequence[Pairing]]
@@ -73,7 +80,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     cutoffs = cutoffs_for(choice.low_pass, log.recording.median_step)
     chosen, floors = most_certain(differences(log, partners.clocks, rungs, cutoffs))
     measured = measured_scale(partners, chosen)
-    scale = measured if measured is not None else np.ones(chosen.tau.shape[1])
+    scale = np.ones(log.robot.joints) if measured is None else measured
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
     # Cycles of one log lie too close in time for friction to change between them.
     change = friction_change(log, chosen.tau, moving) if motion.runs else np.zeros(len(scale))
@@ -94,14 +101,13 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
                 "alignment-chosen" if len(floors) > 1 else "alignment-asked",
                 title=RUNGS[chosen.rung].title,
             ),
-            *floor_remarks(chosen, measured),
-            *change_remarks(change),
+            *floor_remarks(chosen, measured, change),
         ),
     )
 
 
 def partners_in_log(motion: FreeMotion) -> Partners:
-    """The free cycles of a log, laid under the others."""
+    """The free cycles of a log, paired with the others."""
     period, cycles, stated = motion.period, motion.cycles, motion.choice.period
     free = motion.free_cycles
     clocks = {"found": cycles.period}
@@ -120,16 +126,15 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     if len(free.numbers) == 1:
         remarks.append(fact("free-cycle-without-reference"))
     inside = np.isin(cycles.number(motion.log.t), free.numbers)
-    drive = motion.log
-    laid = {
-        clock: [pair_with_cycle(drive, cycles, number, seconds) for number in free.drawn]
+    pairings = {
+        clock: [pair_with_cycle(motion.log, cycles, number, seconds) for number in free.drawn]
         for clock, seconds in clocks.items()
     }
-    return Partners(laid, tuple(remarks), inside)
+    return Partners(pairings, tuple(remarks), inside)
 
 
 def partners_in_logs(motion: FreeMotion) -> Partners:
-    """Free runs in other logs, laid under a log."""
+    """Free runs in other logs, paired with a log."""
     if motion.choice.cycles or motion.choice.period is not None:
         raise ReferenceTorqueError(
             "two-cycle.period and two-cycle.free-cycles are for cycles of one log; leave them "
@@ -138,17 +143,15 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
     recording = motion.log.recording
     remarks = []
     for run in motion.runs:
-        found = run.alignment
+        found, code = run.alignment, "free-run-aligned"
         values: dict[str, Any] = {
             "shift_s": found.shift,
             "deviation_mrad": 1e3 * found.deviation,
             "covered_s": float(np.count_nonzero(run.pairing.known)) * recording.median_step,
         }
-        about = Where(about=run.recording.name)
         if abs(found.rate - 1.0) > 1e-4:
-            remarks.append(fact("free-run-on-another-clock", about, rate=found.rate, **values))
-        else:
-            remarks.append(fact("free-run-aligned", about, **values))
+            code, values["rate"] = "free-run-on-another-clock", found.rate
+        remarks.append(fact(code, Where(about=run.recording.name), **values))
     pairings = [run.pairing for run in motion.runs]
     return Partners({"found": pairings}, tuple(remarks), np.zeros(recording.samples, dtype=bool))
 
@@ -177,23 +180,19 @@ def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
     ratios = []
     # Every pair both ways round: which run is named first must not decide the floor.
     for first, second in permutations(pairings, 2):
-        shared = [pair_runs(first, second)]
-        both = {"found": shared, "commanded": shared}
+        shared = first.known & second.known
+        if np.count_nonzero(shared) < 2:
+            raise ReferenceTorqueError(
+                f"{first.free.name} and {second.free.name} do not overlap, so they measure no "
+                "floor; give two free runs of the same part of the motion"
+            )
+        # One free run with another by way of the log both are paired with.
+        rate, shift = np.polyfit(first.times[shared], second.times[shared], 1)
+        pair = [pair_with_run(first.free.t, second.free, float(shift), float(rate))]
+        both = {"found": pair, "commanded": pair}
         spread = next(differences(first.free, both, (chosen.rung,), (chosen.cutoff,)))
         ratios.append(error_ratio(spread, spread.error.known))
     return np.asarray(np.sqrt(np.mean(np.square(ratios), axis=0)))
-
-
-def pair_runs(first: Pairing, second: Pairing) -> Pairing:
-    """Pair one free run with another by way of the log both are laid under."""
-    both = first.known & second.known
-    if np.count_nonzero(both) < 2:
-        raise ReferenceTorqueError(
-            f"{first.free.name} and {second.free.name} do not overlap, so they measure no floor; "
-            "give two free runs of the same part of the motion"
-        )
-    rate, shift = np.polyfit(first.times[both], second.times[both], 1)
-    return pair_with_run(first.free.t, second.free, float(shift), float(rate))
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:
@@ -236,30 +235,18 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     return change
 
 
-def floor_remarks(chosen: Difference, measured: Array | None) -> tuple[Remark, ...]:
-    """Origin of the floor, and joints without one."""
-    origin = fact("floor-propagated")
+def floor_remarks(chosen: Difference, measured: Array | None, change: Array) -> list[Remark]:
+    """Origin of the floor, joints without one, and joints with changed friction."""
+    remarks = [fact("floor-propagated")]
     if measured is not None:
-        origin = fact("floor-measured", ratio=measured.tolist())
+        remarks = [fact("floor-measured", ratio=measured.tolist())]
     share, error = chosen.error.standing_share, chosen.error
-    return (
-        origin,
-        *(
-            caution(
-                "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times",
-                Where(joints=(int(j) + 1,)),
-                share=float(share[j]),
-                stiction_Nm=float(error.floor_standing[j]),
-            )
-            for j in np.flatnonzero(share > 0.02)
-        ),
-    )
-
-
-def change_remarks(change: Array) -> tuple[Remark, ...]:
-    """Joints with a change of friction between the free run and the log."""
-    found = np.flatnonzero(change)
-    if not len(found):
-        return ()
-    where = Where(joints=tuple(int(j) + 1 for j in found))
-    return (caution("friction-changed", where, change_Nm=change[found].tolist()),)
+    for j in np.flatnonzero(share > 0.02):
+        code = "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times"
+        stiction = float(error.floor_standing[j])
+        where = Where(joints=(int(j) + 1,))
+        remarks.append(caution(code, where, share=float(share[j]), stiction_Nm=stiction))
+    if len(changed := np.flatnonzero(change)):
+        where = Where(joints=tuple(int(j) + 1 for j in changed))
+        remarks.append(caution("friction-changed", where, change_Nm=change[changed].tolist()))
+    return remarks

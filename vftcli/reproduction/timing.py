@@ -250,7 +250,7 @@ def dense_kalman_loop(
     With `rebuild` its matrices are made anew at every sample.
     """
     n = p.shape[1]
-    model, prior = kalman.model(step, n), kalman.steady(step, n).prior
+    model, prior = kalman.model(step, n), kalman.first_prior(step, n)
     densities = kalman.densities(n)
     one, none, identity = np.ones(n), np.zeros(n), np.eye(2 * n)
     A = in_pairs((one, model.a12), (none, model.a22))

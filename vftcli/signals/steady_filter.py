@@ -1,18 +1,22 @@
-"""Filters whose coefficients do not change along the log, as products with short Toeplitz matrices.
+"""Recursive filters over a whole log, block by block: s_t = F s_{t−1} + g d_t, F (m, m) a joint.
 
-s_t = F s_{t−1} + g d_t, with a scalar input d and a small state for each joint of which one
-combination is wanted. Within a block of samples that is a triangular Toeplitz matrix of its impulse
-response times the block's inputs, plus what the state at the block's start still contributes; BLAS
-does that for all blocks at once. The states x_b at the blocks' starts obey the same kind of
-recursion with R = F^BLOCK, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R² x_{b−2}, …
-until the filter has forgotten. It is the plain loop's sum in another order, to rounding.
+The states x_b at the blocks' starts obey the same kind of recursion with R, the product of a
+block's transitions, summed by doubling: x_b ← x_b + R x_{b−1}, then x_b + R² x_{b−2}, … until the
+filter has forgotten. It is the plain loop's sum in another order, to rounding.
+
+Where coefficients do not change along the log, a block is a triangular Toeplitz matrix of its
+impulse response times the block's inputs, plus what the state at its start still contributes; BLAS
+does that for all blocks at once. Where they do (`recursion`), the blocks are run side by side, each
+from zero; what enters a block is then run through it and added.
 """
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, empty_series
+from vftcli.signals.arrays import Array, Indices, empty_series
 
 #: Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
 #: at multiples of it give the numbers of the whole log to the last bit.
@@ -21,6 +25,37 @@ PIECE = 1 << 14
 FORGOTTEN = 1e-20
 #: Samples in a block, a power of two: the work grows with it, the number of blocks shrinks.
 BLOCK = 32
+#: Samples in a block of `recursion` at most, the length of its Python loops; from 32 to 64 all take
+#: as long.
+LENGTH = 36
+
+
+def filtered(
+    F: Array, g: Array, d: Array, start: Array, wanted: Sequence[Array]
+) -> tuple[list[Array], Array]:
+    """Run s_t = F_t s_{t−1} + g_t d_t with coefficients that are one a log or one a sample.
+
+    Args:
+        F: Transition. (m, m, n) or (m, m, T, n)
+        g: What the input adds to the state. (m, n) or (m, T, n)
+        d: Input. (T, n)
+        start: State before the first sample. (m, n)
+        wanted: Weights of the state's entries. (m, n), (m, 1) or (m, T, n) each
+
+    Returns:
+        Each combination wanted·s_t (T, n), and the state after the last sample (m, n).
+    """
+    if F.ndim == 3:
+        each = [steady_filter(F, g, d, start, weights) for weights in wanted]
+        return [found for found, _ in each], each[0][1]
+    states = recursion(F, g * d, start)
+    found = []
+    for weights in wanted:
+        total = weights[0] * states[0]
+        for weight, state in zip(weights[1:], states[1:], strict=True):
+            total += weight * state
+        found.append(total)
+    return found, states[:, -1]
 
 
 class BlockFilter(NamedTuple):
@@ -105,3 +140,99 @@ def sum_by_doubling(x: Array, R: Array) -> None:
         x[:, apart:] += x[:, :-apart] * reach if len(R[0]) == 1 else x[:, :-apart] @ reach
         reach = reach @ reach
         apart *= 2
+
+
+class Fold(NamedTuple):
+    """A piece of a log laid out as position in block × joint × block.
+
+    Every operation then runs along many blocks at once.
+    """
+
+    length: int  #: Samples in a block; the last one is filled up with its last sample.
+    samples: int  #: Samples of the piece.
+
+    @classmethod
+    def of(cls, samples: int) -> "Fold":
+        """The layout of a piece: of short ones as many blocks as samples in a block."""
+        return cls(min(LENGTH, int(np.ceil(np.sqrt(samples)))), samples)
+
+    def fold(self, x: Array) -> Array:
+        """Samples in blocks: (…, N, k) → (…, length, k, blocks)."""
+        *entries, _, k = x.shape
+        whole, left = divmod(self.samples, self.length)
+        out = np.empty((*entries, self.length, k, whole + (left > 0)))
+        inside = x[..., : self.samples - left, :].reshape(*entries, whole, self.length, k)
+        out[..., :whole] = np.moveaxis(inside, -3, -1)
+        if left:
+            out[..., -1] = x[..., -1:, :]
+            out[..., :left, :, -1] = x[..., self.samples - left :, :]
+        return out
+
+    def unfold(self, y: Array) -> Array:
+        """Samples in their order: (…, length, k, blocks) → (…, N, k), columns whole."""
+        columns = np.moveaxis(y, -3, -1).reshape(*y.shape[:-3], y.shape[-2], -1)
+        return columns[..., : self.samples].swapaxes(-1, -2)
+
+    def last(self, y: Array) -> Array:
+        """The last sample of what is in blocks: (…, length, k, blocks) → (…, k)."""
+        return y[..., (self.samples - 1) % self.length, :, -1]
+
+
+def spans(samples: int, *, begins: bool) -> list[slice]:
+    """Pieces of a log's block: they end at multiples of their length."""
+    edges = [int(begins), *range(PIECE, samples, PIECE), samples]
+    return [slice(a, b) for a, b in pairwise(edges) if a < b]
+
+
+def recursion(F: Array, x: Array, start: Array) -> Array:
+    """y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces with a state.
+
+    Args:
+        F: Transitions of an m-state filter for each of n joints. (m, m, T, n)
+        x: Input. (m, T, n)
+        start: State before the first sample. (m, n)
+
+    Returns:
+        The states y. (m, T, n)
+    """
+    y = np.empty((len(x), x.shape[2], x.shape[1])).swapaxes(1, 2)
+    for span in spans(x.shape[1], begins=False):
+        fold = Fold.of(span.stop - span.start)
+        states = run_blocks(fold.fold(F[:, :, span]), fold.fold(x[:, span]), start)
+        y[:, span], start = fold.unfold(states), fold.last(states)
+    return y
+
+
+def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(None)) -> Array:
+    """One piece of `recursion`, everything in blocks.
+
+    Args:
+        F: Transitions of each kind of joint. (m, m, length, kinds, blocks)
+        y: The input x, over which the states are written. (m, length, n, blocks)
+        start: State before the first sample. (m, n)
+        kind: Which of the kinds each joint is. (n,)
+    """
+    steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
+    columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ
+    for step, before, sample in zip(steps[1:], samples, samples[1:], strict=False):
+        np.add(sample, moved(step[:, :, kind], before), out=sample)
+        columns = moved(step, columns)
+    ends, reach, apart = samples[-1].copy(), columns.swapaxes(0, 1), 1
+    ends[..., :1] += moved(reach[:, :, kind, :1], start[..., None])
+    while apart < ends.shape[-1] and np.max(np.abs(reach[..., apart:])) > FORGOTTEN:
+        ends[..., apart:] += moved(reach[:, :, kind, apart:], ends[..., :-apart])
+        columns[..., apart:] = moved(reach[..., apart:], columns[..., :-apart])
+        apart *= 2
+    entering = np.concatenate([start[..., None], ends[..., :-1]], axis=-1)
+    for step, sample in zip(steps, samples, strict=True):
+        entering = moved(step[:, :, kind], entering)
+        np.add(sample, entering, out=sample)
+    return y
+
+
+def moved(F: Array, state: Array) -> Array:
+    """F·state for every joint and block: (m, m, n, B), (…, m, n, B) → (…, m, n, B)."""
+    total: Array = F[:, 0] * state[..., :1, :, :]
+    for k in range(1, len(F)):
+        total += F[:, k] * state[..., k : k + 1, :, :]
+    return total

@@ -1,6 +1,6 @@
 """The joint torque error that a wrench's band starts from: stated, or measured on the log.
 
-What is measured is the one model of every band, `vftcli.observers.error_band`: what the estimator
+What is measured is the one model of every band, `vftcli.observers.spectra`: what the estimator
 reads while nothing touches the arm, at rest and in motion apart, and what its lag leaves out of the
 contacts there are. Where neither a free part nor an unloaded span is known there is no band: the
 observers' own covariance assumes a torque that wanders as fast as Q_τ says and a model without
@@ -12,9 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vftcli.observers.error_band import error_band, free_error
 from vftcli.observers.observer import Observer
-from vftcli.observers.spectra import spectra_of
+from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask

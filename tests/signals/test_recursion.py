@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from vftcli.observers import uneven as module
-from vftcli.observers.uneven import Fold, recursion, spans
+from vftcli.signals import steady_filter as module
+from vftcli.signals.steady_filter import Fold, recursion, spans
 
 
 def loop(F: np.ndarray, x: np.ndarray, start: np.ndarray) -> np.ndarray:

@@ -1,0 +1,337 @@
+"""The two-cycle difference: ways to align a free run with a log, best last, and what each errs.
+
+The error of a difference follows from the logs themselves, by sample and joint.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from vftcli.repetition.paired_runs import PairedRuns, Pairing, by_phase
+from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
+from vftcli.robots.run import Run, band
+from vftcli.signals.arrays import Array, Mask, at, empty_series
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.filters import band_pass, low_pass, noise_passed
+from vftcli.signals.remarks import Remark, fact
+
+LOW_PASS = 12.0  #: Default cutoff of the zero-phase low-pass. [Hz]
+#: A rung further up, or the low-pass, must bring the expected error down to this share.
+WORTH = 0.97
+#: Least band of a noise estimate: contacts fill lower ones. [Hz]
+LEAST_BAND = 12.0
+#: Share of the correction that is wrong even with the best model.
+LEAST_SHARE = 0.05
+PIECE = 0.4  #: Length of pieces that separate noise from slow loads. [s]
+#: Fewest pieces for a noise estimate: a short cycle may hold contact throughout.
+LEAST_PIECES = 20
+QUIET = 0.1  #: Share of the pieces without a fast contact.
+SEED = 15  #: Of the white noise beside the quietest pieces.
+TRUSTED_SHARE = 0.5  #: Least share of samples in motion of a joint to trust.
+
+
+class ErrorModel(NamedTuple):
+    """Expected error of a difference, from the logs themselves."""
+
+    sd: Array  #: Deviation of each sample, NaN without a reference. (T, n) [N·m]
+    standing: Mask  #: Where the joint rests in either log. (T, n)
+
+    @property
+    def standing_share(self) -> Array:
+        """Share of paired samples at rest. (n,)"""
+        return np.asarray(np.mean(self.standing[self.known], axis=0))
+
+    @property
+    def known(self) -> Mask:
+        """Samples with a reference. (T,)"""
+        return np.asarray(np.isfinite(self.sd).all(axis=1))
+
+    @property
+    def trusted_joints(self) -> Mask:
+        """Joints with motion enough to cancel friction; all if none has. (n,)"""
+        trusted = np.asarray(self.standing_share <= 1.0 - TRUSTED_SHARE)
+        return trusted if np.any(trusted) else np.ones_like(trusted)
+
+    @property
+    def floor(self) -> Array:
+        """Root mean square of `sd` over samples with a reference. (n,) [N·m]"""
+        return rms(self.sd[self.known], np.ones_like(self.standing[self.known]))
+
+    @property
+    def floor_moving(self) -> Array:
+        """Root mean square of `sd` in motion; of all samples if mostly at rest. (n,) [N·m]"""
+        return self.rms_moving(self.sd)
+
+    def rms_moving(self, x: Array) -> Array:
+        """Root mean square of a signal over `floor_moving`'s samples. (n,)"""
+        moving = ~self.standing[self.known]
+        used = np.where(self.standing_share <= 1.0 - TRUSTED_SHARE, moving, True)
+        return rms(x[self.known], used)
+
+    @property
+    def floor_standing(self) -> Array:
+        """Root mean square of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
+        standing = self.standing[self.known]
+        return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
+
+
+class Rung(NamedTuple):
+    """One way of alignment."""
+
+    clock: str  #: The pairing it starts from: "commanded" or "found".
+    phase: bool  #: Whether partners are moved to the nearest place on the joint-space path.
+    corrected: bool  #: Whether the motion difference's model torque is subtracted.
+    title: str  #: What it does, in words.
+
+
+#: Name at the command line → rung, from the lowest.
+RUNGS: dict[str, Rung] = {
+    "commanded": Rung("commanded", False, False, "the stated period as it is"),
+    "period": Rung("found", False, False, "the period (or shift) found on the joint positions"),
+    "phase": Rung("found", True, False, "joint-space phase"),
+    "model": Rung(
+        "found", True, True, "joint-space phase and the model's torque of the motion difference"
+    ),
+}
+
+
+class Difference(NamedTuple):
+    """A two-cycle difference made on one rung."""
+
+    rung: str  #: Its name in `RUNGS`.
+    cutoff: float | None  #: Cutoff of the zero-phase low-pass, None without. [Hz]
+    tau: Array  #: τ_ext, NaN where there is no partner. (T, n) [N·m]
+    error: ErrorModel  #: What is known of its own error.
+
+    def remark(self, code: str, **values: Any) -> Remark:  # noqa: ANN401 - any value
+        """A remark on this rung, by another code, -filtered, where it is low-passed."""
+        if self.cutoff is None:
+            return fact(code, rung=self.rung, **values)
+        return fact(f"{code}-filtered", rung=self.rung, cutoff_Hz=self.cutoff, **values)
+
+    def floor_remark(self) -> Remark:
+        """The floor on this rung."""
+        return self.remark("alignment-floor", floor_Nm=self.error.floor.tolist())
+
+
+def differences(
+    motion: Run,
+    clocks: Mapping[str, Sequence[Pairing]],
+    rungs: Sequence[str],
+    cutoffs: Sequence[float | None],
+) -> Iterator[Difference]:
+    """The difference on every rung, with and without the low-pass, one by one.
+
+    Args:
+        motion: The log.
+        clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
+        rungs: Names in `RUNGS`; those without their clock are left out.
+        cutoffs: Cutoffs of the low-pass to try, None for none. [Hz]
+    """
+    way, pair = None, None
+    for name in rungs:
+        rung = RUNGS[name]
+        if rung.clock not in clocks:
+            continue
+        if pair is None or way != (rung.clock, rung.phase):
+            # One way of pairing after the other: of a long log two have no room at once.
+            pair, way = None, (rung.clock, rung.phase)
+            pairings = clocks[rung.clock]
+            if rung.phase:
+                pairings = [by_phase(motion, pairing) for pairing in pairings]
+            pair = PairedRuns(motion=motion, pairings=pairings)
+        for cutoff in cutoffs:
+            yield difference(pair, name, cutoff)
+
+
+def difference(pair: PairedRuns, name: str, cutoff: float | None) -> Difference:
+    """τ_ext = τ_free − τ (+ model − model_free) at pairs, low-passed if asked.
+
+    With Mq̈ + Cq̇ + g + F_f = τ + τ_ext for both motions and τ_ext = 0 in the free one, the
+    bracket is exact; without it the two motions are assumed equal.
+    """
+    motion, known = pair.motion, pair.known
+    if np.count_nonzero(known) < 16:
+        raise ReferenceTorqueError(
+            f"{motion.name}: only {np.count_nonzero(known)} samples have a partner in the free "
+            "run; record a longer one, or choose other cycles: --set two-cycle.free-cycles=…"
+        )
+    corrected = RUNGS[name].corrected
+    signal = at(known, pair.torque)
+    if corrected:
+        signal += at(known, pair.model_difference)
+    smooth = signal if cutoff is None else low_pass(motion.t[known], signal, cutoff)
+    error = error_model(pair, signal, smooth, corrected=corrected, cutoff=cutoff)
+    tau = np.full_like(pair.torque, np.nan)
+    for column, found in zip(tau.T, smooth.T, strict=True):
+        column[known] = found
+    return Difference(name, cutoff, tau, error)
+
+
+def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
+    """The difference with the least expected error, the simpler of equals; the floor of each.
+
+    Compared is the mean over trusted joints of expected error in motion, relative to the lowest
+    rung's. Only the best so far is kept: of a long log not all have room at once.
+    """
+    steps = iter(made)
+    chosen = next(steps)
+    lowest, trusted, least = chosen.error.floor_moving, chosen.error.trusted_joints, 1.0
+    floors = [chosen.floor_remark()]
+    for candidate in steps:
+        floors.append(candidate.floor_remark())
+        share = float(np.mean((candidate.error.floor_moving / lowest)[trusted]))
+        if share < WORTH * least:
+            chosen, least = candidate, share
+        del candidate  # it has no room beside the next
+    return chosen, floors
+
+
+def error_model(
+    pair: PairedRuns, signal: Array, smooth: Array, *, corrected: bool, cutoff: float | None
+) -> ErrorModel:
+    """The error of a difference.
+
+    Its square is the sum of
+    - noise: √2·K·σ_i without repetition, measured on the difference itself: ripple that repeats
+      does not count, the correction's noise does; the larger of the band about the cutoff, as if
+      white, and the quietest seconds;
+    - motion: the model's torque of the motion difference, with Coulomb friction that reverses at
+      another instant; all of it without the correction, else the model's relative error on
+      the free run's own torque;
+    - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
+      a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
+
+    Args:
+        pair: The log and its free runs.
+        signal: The difference where known. (S, n) [N·m]
+        smooth: The low-passed difference. (S, n) [N·m]
+        corrected: Whether the model's torque corrects it.
+        cutoff: Cutoff of its low-pass, None without. [Hz]
+    """
+    motion, known = pair.motion, pair.known
+    t, step = motion.t[known], motion.step
+    moving = ~pair.standing[known]
+    noise = np.maximum(
+        noise_of(t, signal, moving, step, cutoff), noise_when_quiet(t, smooth, moving, step, cutoff)
+    )
+    low, high = band(step, cutoff)
+
+    def motion_torque() -> Array:
+        return local_rms(low_pass(t, at(known, pair.model_difference), low), step)
+
+    def slope_noise() -> Array:
+        momentum = at(known, motion.momentum - pair.of_free("momentum"))
+        return noise_below(t, momentum, moving, step, (low, high), low, slope=1)
+
+    motion_error = pair.cached("motion", low, motion_torque)
+    missed, own = np.maximum(LEAST_SHARE, pair.misfit), np.zeros(len(noise))
+    if not corrected:
+        # The model's torque differentiates momenta: their noise is no motion.
+        missed, own = np.ones(len(noise)), pair.cached("slope", low, slope_noise)
+    at_rest = pair.standing.all(axis=1)
+    sd = np.full_like(pair.stopped, np.nan)
+    for j, stopped in enumerate(pair.stopped.T):
+        left = np.maximum((motion_error[:, j] * missed[j]) ** 2 - own[j] ** 2, 0.0)
+        share = np.where(at_rest, REPEATED_STOP, TWO_STOPS * stopped)[known]
+        sd[known, j] = np.sqrt(noise[j] ** 2 + left + (motion.dry_friction[j] * share) ** 2)
+    return ErrorModel(sd, pair.standing)
+
+
+def noise_of(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
+    """Noise of a difference. (n,) [N·m]
+
+    Without a low-pass from second differences: for white noise of deviation σ on a smooth signal
+    x_{k−1} − 2x_k + x_{k+1} has √6·σ. With one, from the band about its cutoff, at least
+    `LEAST_BAND`, as contacts fill lower ones; assumed as dense throughout.
+    """
+    if cutoff is None:
+        return np.asarray(rms(x[:-2] - 2.0 * x[1:-1] + x[2:], moving[1:-1]) / np.sqrt(6.0))
+    middle = max(cutoff, min(LEAST_BAND, 0.2 / step))
+    limits = (0.7 * middle, min(1.3 * middle, 0.45 / step))
+    return noise_below(t, x, moving, step, limits, cutoff)
+
+
+def noise_below(
+    t: Array,
+    x: Array,
+    moving: Mask,
+    step: float,
+    limits: tuple[float, float],
+    cutoff: float,
+    slope: int = 0,
+) -> Array:
+    """Noise below a cutoff, as dense as in a band [Hz], differentiated by `slope`. (n,)"""
+    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits, "bandpass"))
+    return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, "lowpass", slope=slope)))
+
+
+def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
+    """Coloured noise of a difference from its quietest pieces. (n,) [N·m]
+
+    Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it is the
+    deviation from a straight line, a slow load's course; `QUIET` of the pieces are assumed without
+    a fast contact. Slower wander does not count: this errs low. Zero for fewer than
+    `LEAST_PIECES`.
+
+    Args:
+        t: Clock of the paired samples. (S,) [s]
+        x: The difference behind its low-pass. (S, n) [N·m]
+        moving: Whether the joint moves. (S, n)
+        step: Sample time. [s]
+        cutoff: Cutoff of its low-pass, None without. [Hz]
+    """
+    size = round(PIECE / step)
+    count = len(t) // size
+    found = np.zeros(x.shape[1])
+    if size < 8 or count < LEAST_PIECES:
+        return found
+    left = off_line(x, size)
+    moves = moving[: count * size].reshape(count, size, -1).mean(axis=1) > 0.5
+    whole = t[size - 1 : count * size : size] - t[: count * size : size] < 1.5 * PIECE
+    for j in range(x.shape[1]):
+        pieces = left[whole & moves[:, j], j]
+        if len(pieces) >= LEAST_PIECES:
+            found[j] = np.sqrt(np.quantile(pieces, QUIET) / white_when_quiet(size, step, cutoff))
+    return found
+
+
+def off_line(x: Array, size: int) -> Array:
+    """Mean square deviation from a line in pieces of so many samples. (pieces, n)"""
+    count = len(x) // size
+    pieces = x[: count * size].reshape(count, size, -1)
+    along = np.linspace(-1.0, 1.0, size)
+    line = np.column_stack([np.ones(size) / np.sqrt(size), along / np.linalg.norm(along)])
+    share = np.einsum("sk,psn->pkn", line, pieces)
+    square = np.sum(pieces**2, axis=1) - np.sum(share**2, axis=1)
+    return np.asarray(np.maximum(square, 0.0) / size)
+
+
+@cache
+def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
+    """Square of `noise_when_quiet` for white noise over its variance, drawn once."""
+    noise: Array = np.random.default_rng(SEED).standard_normal((400 * size, 1))
+    clock = step * np.arange(len(noise), dtype=np.float64)
+    smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
+    return float(np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2))
+
+
+def rms(x: Array, where: Mask) -> Array:
+    """Root mean square per column over chosen samples, over all if none. (n,)"""
+    # Column by column: copies of a long log take longer.
+    chosen = (c[w] if w.any() else c for c, w in zip(x.T, where.T, strict=True))
+    return np.asarray(np.sqrt([np.dot(column, column) / len(column) for column in chosen]))
+
+
+def local_rms(x: Array, step: float) -> Array:
+    """Root mean square over a tenth of a second around each sample. (T, n)"""
+    width = max(1, round(0.05 / step))
+    here = np.arange(len(x))
+    first, last = np.maximum(here - width, 0), np.minimum(here + width + 1, len(x))
+    out, total = empty_series(*x.shape), np.zeros(len(x) + 1)
+    for column, mean in zip(x.T, out.T, strict=True):
+        np.cumsum(column**2, out=total[1:])
+        np.sqrt((total[last] - total[first]) / (last - first), out=mean)
+    return out
