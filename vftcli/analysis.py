@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from vftcli.repetition.free_motion import FreeMotion
     from vftcli.robots.run import Run
     from vftcli.signals.wrench import Wrench
+    from vftcli.virtual_sensor.sensing import FreeLog
     from vftcli.virtual_sensor.sensor_reading import SensorReading
-    from vftcli.virtual_sensor.smoother.observer_wrench import FreeLog
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -121,7 +121,7 @@ class Analysis(Shown):
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
         from vftcli.repetition.free_load import without_load
-        from vftcli.virtual_sensor.smoother.observer_wrench import FreeLog, as_modelled
+        from vftcli.virtual_sensor.sensing import FreeLog, as_modelled
 
         if self.refinement is None:
             return as_modelled(self.motion)

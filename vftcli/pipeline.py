@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from vftcli.evaluation.reference_choice import ReferenceChoice
     from vftcli.refinement.baseline import Baselines
     from vftcli.virtual_sensor.choice import WrenchChoice
-    from vftcli.virtual_sensor.detection import ToldContacts
-    from vftcli.virtual_sensor.smoother.observer_wrench import Gate
+    from vftcli.virtual_sensor.detection import KnownContacts
+    from vftcli.virtual_sensor.sensing import Gate
 
 WRITING = 0.7  # share of a log's work that is done before its files are written
 
@@ -342,7 +342,7 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     for the smoother by its name.
     """
     from vftcli.contacts.rows import loosened
-    from vftcli.virtual_sensor.smoother.observer_wrench import Gate
+    from vftcli.virtual_sensor.sensing import Gate
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
@@ -352,22 +352,22 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
-def told_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "ToldContacts":
+def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContacts":
     """What is known of the log's contacts: its list, and where nothing touches the arm."""
     from vftcli.contacts.untouched import free_part
-    from vftcli.virtual_sensor.detection import ToldContacts, read_in_free_runs
+    from vftcli.virtual_sensor.detection import KnownContacts, read_in_free_runs
 
     motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts
     part = free_part(motion)
     listed = {} if rows is None else {BEST: rows.contacts}
     if part is None:
-        return ToldContacts(untouched=np.zeros(motion.log.recording.samples, bool), listed=listed)
+        return KnownContacts(untouched=np.zeros(motion.log.recording.samples, bool), listed=listed)
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
     others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]
     own = [o for o in analysis.observers if o.name not in listed]
     sensor = None if sensed is None else sensed.sensor
     beside = read_in_free_runs(others, own, analysis.run_of, sensor)
-    return ToldContacts(untouched=part.own, beside=beside, listed=listed)
+    return KnownContacts(untouched=part.own, beside=beside, listed=listed)
 
 
 def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
@@ -377,7 +377,7 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     from vftcli.evaluation import judgement
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
-    told = told_contacts(analysis, choice) if choice.reference.contacts else None
+    told = known_contacts(analysis, choice) if choice.reference.contacts else None
     found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference, told)
     if sensed is None:
         found = found._replace(virtual_sensor=analysis.virtual_sensor)

@@ -15,6 +15,7 @@ from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.robots.run import Run, Runs
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
 from vftcli.signals.wrench import ExternalTorque
@@ -72,9 +73,8 @@ def analysed_in_blocks(
         yield replace(made, motion=motion, estimates=tuple(estimates), virtual_sensor=sensed), every
     if sensed is not None:
         from vftcli.virtual_sensor.sensing import mask_remark
-        from vftcli.virtual_sensor.torque_error import unknown_error
 
         hidden = np.concatenate(masked)
-        more = (*mask_remark(hidden, np.array([least])), *unknown_error().remarks)
+        more = (*mask_remark(hidden, np.array([least])), caution("no-wrench-band"))
         sensed = replace(sensed, wrenches=(), masked=hidden, remarks=(*sensed.remarks, *more))
     yield replace(made, estimates=tuple(estimates), virtual_sensor=sensed), None

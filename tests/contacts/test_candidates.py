@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_model_error import B, blocks, drawn, noise
+from test_error_process import B, blocks, drawn, noise
 
 from vftcli.contacts.candidates import (
     STRETCH,
@@ -12,11 +12,11 @@ from vftcli.contacts.candidates import (
     threshold_contacts,
     two_state_odds,
 )
-from vftcli.contacts.model_error import error_course
 from vftcli.contacts.search import turned_round
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import runs_of
+from vftcli.signals.intervals import runs_of
+from vftcli.virtual_sensor.model_error import error_process
 
 
 def joints_of(d: Array) -> tuple[Blocks, Array]:
@@ -28,7 +28,7 @@ def joints_of(d: Array) -> tuple[Blocks, Array]:
 
 def taken(log: Blocks, jacobian: Array) -> Mask:
     """Blocks that the two-state filter takes for contact."""
-    courses = error_course(noise(), log), error_course(noise(), turned_round(log))
+    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
     return filtered_contacts(log, courses, jacobian)
 
 
@@ -67,7 +67,7 @@ def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch: pytest.Mo
     d = pushed(2000, 5)
     d[1200:1300] += 5.0
     log, _ = joints_of(d)
-    courses = error_course(noise(), log), error_course(noise(), turned_round(log))
+    courses = error_process(noise(), log), error_process(noise(), turned_round(log))
     size = np.full((2000, 1), 15.0)
     apart = two_state_odds(log, courses, size)
     monkeypatch.setattr("vftcli.contacts.candidates.STRETCH", 1000.0)

@@ -5,10 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
-from test_model_error import blocks, drawn, noise
+from test_error_process import blocks, drawn, noise
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.contacts.model_error import error_course
 from vftcli.contacts.places import PointFit, arm_parts
 from vftcli.contacts.rows import (
     Site,
@@ -24,14 +23,15 @@ from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.smoother.smoothing import hidden_by_blocks
+from vftcli.virtual_sensor.model_error import error_process
+from vftcli.virtual_sensor.smoother import hidden_by_blocks
 
 
 def test_the_error_is_bridged_across_a_contact_as_a_dense_solve_does() -> None:
     d = drawn(60, np.random.default_rng(8))
     log = blocks(d, np.full_like(d, 0.5))
     hidden = (np.arange(60) > 20) & (np.arange(60) < 30)
-    mean, variance = quiet_error(d, error_course(noise(), log), hidden)
+    mean, variance = quiet_error(d, error_process(noise(), log), hidden)
     known = ~hidden
     prior = 0.25 * np.exp(-np.abs(log.t[:, None] - log.t) / 0.4)
     S = prior[known][:, known] + 0.01 * np.eye(known.sum())

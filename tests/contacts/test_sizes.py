@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from test_model_error import B
+from test_error_process import B
 
-from vftcli.contacts.model_error import error_course
 from vftcli.contacts.sizes import (
     START,
     learn_prior,
@@ -15,7 +14,7 @@ from vftcli.contacts.sizes import (
 )
 from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.disturbance import Blocks
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
+from vftcli.virtual_sensor.model_error import TorqueNoise, error_process
 
 
 def wrench(size: list[float], sd: float) -> WindowWrench:
@@ -80,7 +79,7 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         dry=np.ones(6), seen=np.ones(6, dtype=bool),
         at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
     )  # fmt: skip
-    log = BlockLog.of(blocks, error_course(noise, blocks))
+    log = BlockLog.of(blocks, error_process(noise, blocks))
     prior = learn_prior(log, jacobian, runs, START, rounds=2)
     assert prior.time == 0.3
     # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.contacts.caught import CheckedContact, ContactCheck
 from vftcli.contacts.tail import tail_of
+from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
 from vftcli.outputs.grid import terminal
 from vftcli.outputs.log.run_record import jsonable
@@ -119,8 +119,8 @@ def test_the_toml_reads_back() -> None:
     assert (found["rate_per_h"], found["force_size_N"]) == (1.0, 30.01)
 
 
-def check(reference: str | None = "sensor") -> ContactCheck:
-    return ContactCheck(
+def check(reference: str | None = "sensor") -> ThresholdDetection:
+    return ThresholdDetection(
         log="pushed.csv",
         reference=reference,
         contacts=(

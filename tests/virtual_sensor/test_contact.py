@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import ExternalTorque
-from vftcli.virtual_sensor.contact import (
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.virtual_sensor.detection import (
     ContactInterval,
-    credits,
+    assignment,
     departure,
     find_contacts,
+    judge_contacts,
+    learned_free,
     match_contacts,
 )
-from vftcli.virtual_sensor.detection import judge_contacts, learned_free
 
 T = np.arange(0.0, 20.0, 0.01)
 
@@ -55,17 +56,17 @@ def test_a_found_contact_is_credited_to_one_true_one() -> None:
     told = match_contacts(found, true, 20.0)
     assert (told.contacts, told.listed, told.found, told.missed) == (4, 3, 2, 2)
     assert (told.merged, told.split, told.false_alarms) == (2, 1, 0)
-    assert credits(found, true)[3] == 2  # the longer piece
+    assert assignment(found, true)[3] == 2  # the longer piece
 
 
 def test_as_many_contacts_as_possible_are_credited() -> None:
     """The first interval overlaps the second contact more, but the second has nothing else."""
     true = [ContactInterval(1.0, 2.0), ContactInterval(3.0, 6.0)]
     found = [ContactInterval(1.9, 4.0), ContactInterval(4.5, 5.0)]
-    assert credits(found, true) == [0, 1]
-    assert credits([], true) == [None, None]
+    assert assignment(found, true) == [0, 1]
+    assert assignment([], true) == [None, None]
     # Within a tenth of a second of its end a contact is still met, later no more.
-    assert credits([ContactInterval(2.05, 2.5)], true[:1]) == [0]
+    assert assignment([ContactInterval(2.05, 2.5)], true[:1]) == [0]
     late = match_contacts([ContactInterval(2.15, 2.5)], true[:1], 10.0)
     assert (late.missed, late.split, late.false_alarms) == (1, 1, 0)
 

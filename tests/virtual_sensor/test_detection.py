@@ -10,21 +10,22 @@ from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import ExternalTorque, Wrench
-from vftcli.virtual_sensor.contact import ContactInterval, find_contacts
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import (
     LEAST_TORQUE,
     WRENCH_LIMITS,
-    ToldContacts,
+    ContactInterval,
+    KnownContacts,
+    find_contacts,
     floor_in_motion,
     judge_contacts,
     learned_free,
     read_in_free_runs,
     true_intervals,
 )
-from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.sensor_reading import SensorReading, zero_drift
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import zero_drift
 
 T = np.arange(0.0, 20.0, 0.01)
 
@@ -130,7 +131,7 @@ def test_false_alarms_count_by_the_hour_of_the_whole_log() -> None:
 
 def test_what_is_listed_is_judged_as_it_stands() -> None:
     """Two rows for one push: one is credited, the other a piece."""
-    told = ToldContacts(
+    told = KnownContacts(
         untouched=np.zeros(len(T), dtype=bool),
         listed={"best": (ContactInterval(5.0, 5.8), ContactInterval(6.0, 7.0))},
     )
@@ -145,17 +146,17 @@ def test_the_band_is_learned_where_the_arm_is_known_to_be_free() -> None:
     tau = reference(8.0).tau + np.column_stack([push(5.0, 12.0, 13.0), np.zeros(len(T))])
     estimate = [ExternalTorque(name="gmo", t=T, tau=tau)]
 
-    def alarms(told: ToldContacts | None) -> int:
+    def alarms(told: KnownContacts | None) -> int:
         (score,) = judge_contacts(estimate, None, reference(8.0), told)
         assert score.detection.missed == 0
         return score.detection.false_alarms
 
     nothing = np.zeros(len(T), dtype=bool)
     assert alarms(None) == 1
-    assert alarms(ToldContacts(untouched=nothing)) == 1
-    assert alarms(ToldContacts(untouched=(T > 11.0) & (T < 14.0))) == 0
+    assert alarms(KnownContacts(untouched=nothing)) == 1
+    assert alarms(KnownContacts(untouched=(T > 11.0) & (T < 14.0))) == 0
     beside = np.outer(np.linspace(-5.0, 5.0, 50), [1.0, 0.1])
-    assert alarms(ToldContacts(untouched=nothing, beside={"gmo": beside})) == 0
+    assert alarms(KnownContacts(untouched=nothing, beside={"gmo": beside})) == 0
 
 
 def test_observers_are_run_along_free_runs() -> None:

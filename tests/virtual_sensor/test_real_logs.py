@@ -14,8 +14,8 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.virtual_sensor.choice import WrenchChoice
+from vftcli.virtual_sensor.sensor import fit_axes
 from vftcli.virtual_sensor.solvers import wrench_of
-from vftcli.virtual_sensor.vendor import fit_axes
 
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 MUJOCO = "t=time,q=q{i},dq=qd{i},tau=tau{i},tau_ext=tau_ext{i},wrench[base]=Fx|Fy|Fz|Mx|My|Mz"

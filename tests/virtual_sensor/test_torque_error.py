@@ -20,11 +20,10 @@ from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.torque_error import (
-    from_band,
     from_free_part,
     given_error,
     missed_torque,
-    unknown_error,
+    torque_error,
 )
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -56,13 +55,13 @@ def test_what_is_no_error(text: str) -> None:
 
 def test_a_measured_band_is_taken_as_it_is() -> None:
     varying = torque(error_sd=np.linspace(0.1, 0.2, 2 * len(T)).reshape(-1, 2))
-    found = from_band([varying])
+    found = torque_error(None, log_run(np.zeros((len(T), 6))), (), [varying], T < 0.0)
     np.testing.assert_array_equal(found.sd["gmo"], varying.error_sd)
     assert [r.code for r in found.remarks] == ["band-from-torques"]
 
 
 def test_where_nothing_is_known_there_is_no_band() -> None:
-    found = unknown_error()
+    found = torque_error(None, log_run(np.zeros((len(T), 6))), (), [torque()], T < 0.0)
     assert found.sd == {}
     assert [r.code for r in found.remarks] == ["no-wrench-band"]
 

@@ -7,7 +7,7 @@ from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import Wrench, WrenchFrame
-from vftcli.virtual_sensor.vendor import AxesFit, check_vendor, fit_axes
+from vftcli.virtual_sensor.sensor import AxesFit, check_vendor, fit_axes
 
 
 def pushes(samples: int = 400, seed: int = 1) -> np.ndarray:

@@ -8,7 +8,7 @@ import pytest
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import ZeroChoice
-from vftcli.virtual_sensor.zero import (
+from vftcli.virtual_sensor.sensor_reading import (
     unloaded_start,
     without_drift,
     without_zero,

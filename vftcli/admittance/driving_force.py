@@ -11,9 +11,8 @@ from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
 from vftcli.virtual_sensor.log_wrench import logged_wrench
-from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import without_zero
 
 
 class DrivingForce(NamedTuple):

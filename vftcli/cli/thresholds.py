@@ -39,7 +39,7 @@ def contact_thresholds(
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
     from vftcli.cli.console import say, say_json, say_recording, say_robots
-    from vftcli.contacts.caught import check_contacts
+    from vftcli.contacts.threshold_check import check_contacts
     from vftcli.contacts.thresholds import check_alike, compared_signals, find_thresholds, left_out
     from vftcli.notebook import modelled, touched
     from vftcli.outputs.examination import health_record

@@ -18,12 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.model_error import ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
-from vftcli.signals.series import covered, intervals
-from vftcli.virtual_sensor.smoother.noise import steps
+from vftcli.virtual_sensor.model_error import ErrorProcess, steps
 
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
 PUSH = np.repeat([30.0, 3.0], 3)
@@ -53,7 +51,7 @@ class Search(NamedTuple):
     odds: Array  #: ln P(contact)/P(free). (S,)
 
 
-def filtered_contacts(blocks: Blocks, courses: tuple[ErrorCourse, ErrorCourse], J: Array) -> Mask:
+def filtered_contacts(blocks: Blocks, courses: tuple[ErrorProcess, ErrorProcess], J: Array) -> Mask:
     """Blocks that the two-state filter takes for contact. (K,)
 
     Args:
@@ -79,7 +77,7 @@ def sure_runs(blocks: Blocks, forward: Array, backward: Array) -> Mask:
 
 
 def two_state_odds(
-    blocks: Blocks, courses: tuple[ErrorCourse, ErrorCourse], size: Array
+    blocks: Blocks, courses: tuple[ErrorProcess, ErrorProcess], size: Array
 ) -> list[tuple[Array, Array]]:
     """Log odds of contact of the search for taps and of that for leans, forward and backward.
 

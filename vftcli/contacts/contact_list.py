@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from vftcli.contacts.places import ArmPart
     from vftcli.contacts.untouched import Basis
-    from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+    from vftcli.virtual_sensor.smoother import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.

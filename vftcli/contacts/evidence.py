@@ -10,7 +10,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vftcli.contacts.model_error import ErrorCourse, error_model, innovations
 from vftcli.contacts.places import ContactPlace
 from vftcli.contacts.windows import (
     BlockLog,
@@ -24,8 +23,8 @@ from vftcli.contacts.windows import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.linear_model import SPIKE
-from vftcli.signals.series import covered
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, innovations
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 #: Nats that a contact must be ahead of nothing, which may spike. In 299 s of real free motion one
 #: reversal of friction reached 15, everything else but abrupt stops stayed below 6.
@@ -86,7 +85,7 @@ def untouched(log: BlockLog, lanes: Sequence[Lane]) -> Array:
             span = slice(*lane.window)
             inside = lane.gate[span, None] & log.blocks.known[span, None]
             often[: span.stop - span.start, place] = inside * log.course.spikes[span]
-        course = ErrorCourse(model.decay[..., 6:], model.added[..., 6:], model.white, often)
+        course = ErrorProcess(model.decay[..., 6:], model.added[..., 6:], model.white, often)
         square, S = innovations(error_model(model.d, course), often)
         with np.errstate(divide="ignore"):
             usual, spiked = np.log1p(-often), np.log(often) - 0.5 * np.log(SPIKE)

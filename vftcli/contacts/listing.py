@@ -14,7 +14,6 @@ from vftcli.contacts.contact_list import (
 )
 from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
 from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
-from vftcli.contacts.model_error import UNKNOWN, error_course
 from vftcli.contacts.places import places
 from vftcli.contacts.rows import NORMAL, SHORT, Measurer
 from vftcli.contacts.search import Found, search
@@ -39,8 +38,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
-from vftcli.signals.series import covered
-from vftcli.virtual_sensor.smoother.noise import UNSEEN_SHARE
+from vftcli.virtual_sensor.model_error import UNKNOWN, UNSEEN_SHARE, error_process
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
 SHORTEST = 0.5  #: A log shorter than this tells no contact. [s]
@@ -224,7 +222,7 @@ def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict
     edges = found.log.blocks.t - 0.5 * found.log.blocks.length
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
     spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
-    course = error_course(fine.noise, blocks)
+    course = error_process(fine.noise, blocks)
     others = covered([spans[k] for k in range(len(spans)) if k not in set(brief)], len(blocks.t), 1)
     white = np.where(others[:, None], UNKNOWN, course.white)
     some = found.kept(brief)._replace(

@@ -15,7 +15,7 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import MOVES, REST, faster
-from vftcli.virtual_sensor.smoother.smoothing import (
+from vftcli.virtual_sensor.smoother import (
     DRIVES,
     SmoothedWrench,
     hidden_by_blocks,

@@ -8,7 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
-from vftcli.contacts.model_error import UNKNOWN, ErrorCourse, error_course, error_model
 from vftcli.contacts.places import (
     MORE_THAN_A_FORCE,
     ArmPart,
@@ -27,9 +26,9 @@ from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import covered, median_step
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
-from vftcli.virtual_sensor.smoother.smoothing import BENT, hidden_by_blocks
+from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, error_model, error_process
+from vftcli.virtual_sensor.smoother import BENT, WrenchPrior, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the error of the
 #: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
@@ -73,7 +72,7 @@ class Measurer:
         """Learn what the contacts' wrench is like, and how well free motion lets it be told."""
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
-        course = error_course(free.noise, blocks, gate)._replace(white=found.log.course.white)
+        course = error_process(free.noise, blocks, gate)._replace(white=found.log.course.white)
         log = BlockLog.of(blocks, course)
         bent = BENT
         if like is not None:
@@ -273,7 +272,7 @@ class Site(NamedTuple):
         return max(low, 0.0), high
 
 
-def quiet_error(d: Array, course: ErrorCourse, hidden: Mask) -> tuple[Array, Array]:
+def quiet_error(d: Array, course: ErrorProcess, hidden: Mask) -> tuple[Array, Array]:
     """Mean and variance of the model error b from the blocks outside of contacts. (K, n) each
 
     Args:

@@ -7,7 +7,6 @@ import numpy as np
 
 from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
 from vftcli.contacts.evidence import evidence
-from vftcli.contacts.model_error import UNKNOWN, error_course, spiked_white
 from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
 from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
@@ -15,9 +14,9 @@ from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
-from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.signals.intervals import runs_of
+from vftcli.virtual_sensor.model_error import UNKNOWN, TorqueNoise, error_process, spiked_white
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
 #: observer's lag is over, friction has turned. [s]
@@ -70,7 +69,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Found:
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     there = places(run.robot.loaded_chain, blocks.q)
     J = there[0].jacobian
-    ahead, back = error_course(noise, blocks), error_course(noise, turned_round(blocks))
+    ahead, back = error_process(noise, blocks), error_process(noise, turned_round(blocks))
     taken = filtered_contacts(blocks, (ahead, back), J)
     beyond = beyond_threshold(run, level, blocks)
     struck = taken.copy()

@@ -20,8 +20,8 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.series import covered, runs_of
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.signals.intervals import covered, runs_of
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.
 TIMES = 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0  #: Correlation times that are tried. [s]

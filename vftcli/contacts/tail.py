@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.series import median_step
-from vftcli.virtual_sensor.contact import ContactInterval
+from vftcli.virtual_sensor.detection import ContactInterval, contact_intervals
 
 SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
 BLOCK = 1.0  #: Length of the blocks whose maxima are taken. [s]
@@ -25,12 +25,7 @@ NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
 
 
 def block_maxima(t: Array, level: Array) -> Array:
-    """The largest value of every 1 s block that is known, the settling left out. (B,)
-
-    Args:
-        t: Time. (T,) [s]
-        level: A size, NaN where it is not known. (T,)
-    """
+    """The largest value of every known 1 s block, the settling left out, NaN ignored. (B,)"""
     used = t >= t[0] + SETTLING
     if np.count_nonzero(used) < 2:
         return np.zeros(0)
@@ -44,17 +39,9 @@ def block_maxima(t: Array, level: Array) -> Array:
 
 
 def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
-    """When a level exceeds 1, the settling left out; passages less than `APART` apart are one.
-
-    Args:
-        t: Time. (T,) [s]
-        level: A size in multiples of its threshold, NaN where it is not known. (T,)
-    """
-    above = np.flatnonzero((np.nan_to_num(level, nan=0.0) > 1.0) & (t >= t[0] + SETTLING))
-    if not len(above):
-        return ()
-    parts = np.split(above, np.flatnonzero(np.diff(t[above]) >= APART) + 1)
-    return tuple(ContactInterval(float(t[part[0]]), float(t[part[-1]])) for part in parts)
+    """When a level (T,) exceeds 1, the settling left out; NaN, where it is not known, does not."""
+    above = (np.nan_to_num(level, nan=0.0) > 1.0) & (t >= t[0] + SETTLING)
+    return contact_intervals(t, above, gap=APART)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -88,21 +75,17 @@ class Tail:
         return self.count / self.hours
 
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
-        """The level that is passed at a rate, u + e ln(λ/rate), and the ends of its 95 %.
+        """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
 
-        They are those of e, (1 ± 1.96/√k) e: where a level of this rate may lie.
-
-        Its lower end is u at the least. What happens more often than λ is no matter of the tail:
-        of m times in all it is the m-th largest maximum, of m its 95 %, m ± 1.96 √m.
-
-        Args:
-            rate: False alarms. [1/h]
+        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. What happens more often
+        than λ is no matter of the tail: of m times in all it is the m-th largest maximum, of m its
+        95 %, m ± 1.96 √m.
         """
         if rate <= self.rate:
             step = self.excess * float(np.log(self.rate / rate))
-            spread = NORMAL / np.sqrt(self.count) * step
+            spread = float(NORMAL / np.sqrt(self.count) * step)
             value = self.start + step
-            return value, (max(float(value - spread), self.start), float(value + spread))
+            return value, (max(value - spread, self.start), value + spread)
         due = rate * self.hours
         if due > 0.5 * len(self.maxima):
             most = 0.5 * 3600.0 / BLOCK
@@ -126,8 +109,3 @@ def tail_of(maxima: Array) -> Tail | None:
     if count < 1:
         return None
     return Tail(maxima=np.sort(maxima)[::-1], count=count)
-
-
-def blocks_for(count: float) -> float:
-    """How many blocks there must be for a tail of so many readings."""
-    return SHARE * count if count <= LEAST_READINGS else count / AN_HOUR * 3600.0 / BLOCK

@@ -4,19 +4,21 @@ A robot compares its own estimate with the thresholds it is given, so that one i
 log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a robot needs it.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from vftcli.contacts.tail import (
+    AN_HOUR,
     BLOCK,
     ENOUGH,
+    LEAST_READINGS,
     SETTLING,
+    SHARE,
     Tail,
     block_maxima,
-    blocks_for,
     events,
     tail_of,
 )
@@ -109,13 +111,13 @@ def check_alike(signals: Sequence[ComparedSignals]) -> None:
     """Raise unless all logs hold the same estimates of the same arm."""
     first = signals[0]
     for other in signals[1:]:
-        for what in ("of_vendor", "logged_wrench", "frame"):
-            if getattr(other, what) != getattr(first, what):
-                raise ParameterError(
-                    f"{other.recording.name} and {first.recording.name} do not hold the same "
-                    "estimates of the robot's own, and one set of thresholds serves one of them; "
-                    "give logs recorded alike"
-                )
+        kinds = ((one.of_vendor, one.logged_wrench, one.frame) for one in (first, other))
+        if len(set(kinds)) > 1:
+            raise ParameterError(
+                f"{other.recording.name} and {first.recording.name} do not hold the same "
+                "estimates of the robot's own, and one set of thresholds serves one of them; "
+                "give logs recorded alike"
+            )
         if other.torque.shape[1] != first.torque.shape[1]:
             raise ParameterError(
                 f"{other.recording.name} has {other.torque.shape[1]} joints and "
@@ -123,13 +125,8 @@ def check_alike(signals: Sequence[ComparedSignals]) -> None:
             )
 
 
-Select = Callable[[ComparedSignals], Array]  #: A set of signals that share a rate. (T, k)
-#: Name of a set → its signals: false alarms are counted over all signals of a set.
-SETS: dict[str, Select] = {
-    "joints": lambda signals: signals.torque,
-    "axes": lambda signals: signals.wrench,
-    "force": lambda signals: signals.force,
-}
+#: Set of signals that share a rate → its field of `ComparedSignals`.
+SETS = {"joints": "torque", "axes": "wrench", "force": "force"}
 
 
 class SignalThreshold(NamedTuple):
@@ -149,6 +146,11 @@ class SignalThreshold(NamedTuple):
         return self.interval[1] - self.interval[0] > self.value
 
     @property
+    def level(self) -> float:
+        """The threshold of an axis or of the force's size, NaN of one that is wide. [N, N·m]"""
+        return float("nan") if self.is_wide else self.value
+
+    @property
     def more_share(self) -> float:
         """How much more of its log's motion would narrow the interval to the value, of its length.
 
@@ -157,7 +159,9 @@ class SignalThreshold(NamedTuple):
         if self.tail is None or not self.is_wide:
             return 0.0
         width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
-        return max(blocks_for(self.tail.count * width**2) / len(self.tail.maxima) - 1.0, 0.0)
+        count = self.tail.count * width**2
+        blocks = SHARE * count if count <= LEAST_READINGS else count / AN_HOUR * 3600.0 / BLOCK
+        return max(blocks / len(self.tail.maxima) - 1.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -187,14 +191,9 @@ class Thresholds(Shown):
         """
         return (
             *((f"J{j}", "N·m", one.value, one) for j, one in enumerate(self.joints, start=1)),
-            *((n, unit_of(n) if n in AXES else "N", level_of(x), x) for n, x in self.of_wrench),
+            *((n, unit_of(n), x.level, x) for n, x in zip(AXES, self.axes, strict=False)),
+            *(("|F|", "N", one.level, one) for one in self.force),
         )
-
-    @property
-    def of_wrench(self) -> tuple[tuple[str, SignalThreshold], ...]:
-        """Name and threshold of every axis, and of the force's size."""
-        size = (("|F|", one) for one in self.force)
-        return (*zip(AXES, self.axes, strict=False), *size)
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "signal", "threshold", "unit", "95 %", "needed by"
@@ -213,19 +212,14 @@ class Thresholds(Shown):
 
     def level(self, name: str, signals: ComparedSignals) -> Array:
         """A set's signals in multiples of their thresholds, no column without thresholds. (T, k)"""
-        values = [one.value if name == "joints" else level_of(one) for one in getattr(self, name)]
+        values = [one.value if name == "joints" else one.level for one in getattr(self, name)]
         if not values:
             return np.zeros((len(signals.t), 0))
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
         # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
-        share: Array = np.abs(SETS[name](signals)) / np.maximum(limits, LEAST)
+        share: Array = np.abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST)
         return share
-
-
-def level_of(one: SignalThreshold) -> float:
-    """The threshold of an axis or of the force's size, NaN of one that is wide. [N, N·m]"""
-    return float("nan") if one.is_wide else one.value
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
@@ -242,46 +236,44 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")
     check_alike(free)
-    found = {name: thresholds_of_set(free, select, rate) for name, select in SETS.items()}
-    if not found["joints"]:
+    joints, axes, force = (thresholds_of_set(free, field, rate) for field in SETS.values())
+    if not joints:
         longest = max(signals.recording.duration for signals in free)
         raise ParameterError(
             f"the longest free log has {longest:.3g} s: too few to tell how often a level is "
             f"passed; record at least {LONG_ENOUGH:g} s, better an hour"
         )
-    untold = (caution("axes-untold"),) if free[0].wrench.shape[1] and not found["axes"] else ()
-    remarks = (*remarks_on(free, len(found["joints"]), rate), *untold)
     made = Thresholds(
         rate=rate,
-        **found,
+        joints=joints,
+        axes=axes,
+        force=force,
         of_vendor=free[0].of_vendor,
         logged_wrench=free[0].logged_wrench,
-        remarks=remarks,
     )
-    return replace(made, remarks=(*remarks, *wide_remarks(made, free)))
-
-
-def wide_remarks(made: Thresholds, free: Sequence[ComparedSignals]) -> list[Remark]:
-    """Which axes have no threshold, and how much more free motion would give them one."""
-    wide = [(name, one) for name, one in made.of_wrench if one.is_wide]
-    lengths = {signals.recording.name: signals.recording.duration for signals in free}
-    more = [one.more_share * lengths[one.log] / 60.0 for _, one in wide]
-    names = [name for name, _ in wide]
-    return [caution("axes-too-wide", axes=", ".join(names), more_min=max(more))] if wide else []
+    remarks = remarks_on(free, len(made.joints), rate)
+    if free[0].wrench.shape[1] and not made.axes:
+        remarks.append(caution("axes-untold"))
+    wide = {name: one for name, *_, one in made.named[len(made.joints) :] if one.is_wide}
+    if wide:
+        lengths = {signals.recording.name: signals.recording.duration for signals in free}
+        more = max(one.more_share * lengths[one.log] / 60.0 for one in wide.values())
+        remarks.append(caution("axes-too-wide", axes=", ".join(wide), more_min=more))
+    return replace(made, remarks=tuple(remarks))
 
 
 def thresholds_of_set(
-    free: Sequence[ComparedSignals], select: Select, rate: float
+    free: Sequence[ComparedSignals], field: str, rate: float
 ) -> tuple[SignalThreshold, ...]:
     """The threshold of every signal of a set, none if no log tells one; see `find_thresholds`."""
-    maxima = [
-        [block_maxima(signals.t, size) for size in np.abs(select(signals)).T] for signals in free
-    ]
-    count = len(maxima[0])
-    names = [signals.recording.name for signals in free]
+    maxima = {
+        log.recording.name: [block_maxima(log.t, x) for x in np.abs(getattr(log, field)).T]
+        for log in free
+    }
+    count = getattr(free[0], field).shape[1]
     found = []
     for k in range(count):
-        each = {name: own[k] for name, own in zip(names, maxima, strict=True) if len(own[k])}
+        each = {name: own[k] for name, own in maxima.items() if len(own[k])}
         tails = {name: tail for name, own in each.items() if (tail := tail_of(own)) is not None}
         if not tails:
             return ()
@@ -298,9 +290,9 @@ def thresholds_of_set(
     return tuple(found)
 
 
-def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tuple[Remark, ...]:
+def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> list[Remark]:
     """What the logs can bear: whose estimate it is, how far it is extrapolated, what is missing."""
-    first, own_rate = free[0], rate / joints
+    first = free[0]
     remarks = [
         fact("thresholds-of-vendor") if first.of_vendor else caution("thresholds-of-observer")
     ]
@@ -319,7 +311,7 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tup
                 hours=longest.hours,
                 maxima=longest.count,
                 tail_rate_per_h=longest.rate,
-                own_rate_per_h=own_rate,
+                own_rate_per_h=rate / joints,
             )
         )
     if longest.count < ENOUGH:
@@ -332,7 +324,7 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> tup
             continue
         if (share := float(np.mean(np.isfinite(signals.wrench[:, 0])))) < SELDOM:
             remarks.append(caution("wrench-seldom-known", where, share=share))
-    return tuple(remarks)
+    return remarks
 
 
 class CountedAlarms(NamedTuple):

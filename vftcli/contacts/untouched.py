@@ -7,13 +7,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.contacts.candidates import threshold_contacts
-from vftcli.contacts.model_error import (
-    DRY_SHARE,
-    LEAST_ERROR,
-    error_course,
-    infer_noise,
-    learn_noise,
-)
 from vftcli.contacts.places import places
 from vftcli.contacts.windows import (
     BlockLog,
@@ -35,9 +28,16 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
-from vftcli.signals.series import covered, median_step, near, runs_of
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.model_error import (
+    DRY_SHARE,
+    LEAST_ERROR,
+    TorqueNoise,
+    error_process,
+    infer_noise,
+    learn_noise,
+)
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 #: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
@@ -273,7 +273,7 @@ def self_test(free: Untouched, robot: Robot, prior: WrenchPrior) -> SelfTest:
         made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
         if not made_up:
             continue
-        course = error_course(free.noise, blocks, covered(made_up, count, 1))
+        course = error_process(free.noise, blocks, covered(made_up, count, 1))
         J = places(robot.loaded_chain, blocks.q)[0].jacobian
         nowhere = np.zeros(count, dtype=bool)
         lanes = [

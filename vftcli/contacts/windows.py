@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.model_error import UNKNOWN, ErrorCourse
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import (
@@ -14,8 +13,8 @@ from vftcli.signals.linear_model import (
     log_likelihood,
     smoothed,
 )
-from vftcli.virtual_sensor.smoother.noise import steps
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, steps
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
 MOST_LANES = 96  #: Lanes that are worked on at once.
@@ -26,11 +25,11 @@ class BlockLog(NamedTuple):
     """A log in blocks, with what its model errs by."""
 
     blocks: Blocks  #: The blocks.
-    course: ErrorCourse  #: How b goes along them.
+    course: ErrorProcess  #: How b goes along them.
     step: Array  #: Time from the block before. (K,) [s]
 
     @classmethod
-    def of(cls, blocks: Blocks, course: ErrorCourse) -> "BlockLog":
+    def of(cls, blocks: Blocks, course: ErrorProcess) -> "BlockLog":
         """The log of these blocks."""
         return cls(blocks, course, steps(blocks))
 
@@ -89,7 +88,7 @@ def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
         if lane.prior is None:
             continue
         jacobian[:count, i] = lane.jacobian[span]
-        course = lane.prior.course(lane.gate[span], log.step[span])
+        course = lane.prior.process(lane.gate[span], log.step[span])
         decay[:count, i, :6], added[:count, i, :6] = course
     return LinearModel(d, beside_errors(jacobian), white, decay, added)
 

@@ -20,8 +20,8 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.errors import VftError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.wrench import ExternalTorque, Wrench
-from vftcli.virtual_sensor.detection import ToldContacts, judge_contacts
+from vftcli.signals.wrench import Wrench
+from vftcli.virtual_sensor.detection import KnownContacts, judge_contacts
 from vftcli.virtual_sensor.frames import NOTHING, from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -55,7 +55,7 @@ def judge(
     estimates: Sequence[ExternalTorque],
     sensed: SensorReading | None,
     choice: ReferenceChoice,
-    told: ToldContacts | None = None,
+    told: KnownContacts | None = None,
 ) -> Judgement:
     """Make the reference and compare with it.
 

@@ -15,8 +15,8 @@ from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
+from vftcli.virtual_sensor.sensor import RESEMBLES, fit_axes
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wrench_of
-from vftcli.virtual_sensor.vendor import RESEMBLES, fit_axes
 
 VENDOR, SENSOR = "vendor", "sensor"
 #: The frame of such a wrench: axes and point of the log's Jacobian.

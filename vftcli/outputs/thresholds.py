@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from math import ceil, isnan
 from typing import Any
 
-from vftcli.contacts.caught import CheckedContact, ContactCheck
+from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
 from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
 from vftcli.outputs.quantity import DASH, counted, significant
@@ -15,7 +15,7 @@ SHARES = 100
 
 
 def thresholds_text(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ContactCheck]
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> str:
     """All of it for the terminal: the tables, and the calls by the names of their interfaces."""
     parts = [terminal(thresholds_grid(thresholds))]
@@ -83,7 +83,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
     )
 
 
-def check_grid(check: ContactCheck) -> Grid:
+def check_grid(check: ThresholdDetection) -> Grid:
     """The contacts of a log, and their evidence."""
     return Grid(
         title=f"{check.log}: what they would have detected",
@@ -104,25 +104,25 @@ def check_grid(check: ContactCheck) -> Grid:
 
 def verdict(contact: CheckedContact) -> str:
     """Cause of the alarm, or reason for none."""
-    return contact.by or ("on already" if contact.was_on else "missed")
+    return contact.by or ("on already" if contact.already_above else "missed")
 
 
-def check_line(check: ContactCheck) -> str:
+def check_line(check: ThresholdDetection) -> str:
     """A check in a sentence."""
     if check.reference is None:
         count = len(check.contacts)
-        least = f", the weakest at {significant(check.smallest_caught)} N" if count else ""
+        least = f", the weakest at {significant(check.smallest_detected)} N" if count else ""
         return f"{check.log}: {counted(count, 'alarm')}{least}"
-    caught, all_of_them = len(check.caught), len(check.contacts)
-    words = [f"{check.log}: {caught} of {all_of_them} contacts detected"]
-    if caught:
+    detected, all_of_them = len(check.detected), len(check.contacts)
+    words = [f"{check.log}: {detected} of {all_of_them} contacts detected"]
+    if detected:
         words.append(f"{1e3 * check.median_delay:.0f} ms after they begin (median)")
         words.append(f"at most {1e3 * check.longest_delay:.0f} ms")
-    if not isnan(check.smallest_caught):
-        words.append(f"the weakest detected {significant(check.smallest_caught)} N")
+    if not isnan(check.smallest_detected):
+        words.append(f"the weakest detected {significant(check.smallest_detected)} N")
     if not isnan(check.largest_missed):
         words.append(f"the hardest missed {significant(check.largest_missed)} N")
-    if on := sum(contact.was_on for contact in check.contacts):
+    if on := sum(contact.already_above for contact in check.contacts):
         words.append(f"{on} while an alarm was on already")
     words.append(f"{check.false_alarms} false in {significant(check.untouched_h)} h untouched")
     return ", ".join(words)
@@ -154,7 +154,7 @@ def threshold_rows(
 
 
 def thresholds_record(
-    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ContactCheck]
+    thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> dict[str, Any]:
     """All of it for machines."""
     count = len(thresholds.joints)
@@ -172,15 +172,15 @@ def thresholds_record(
     }
 
 
-def check_record(check: ContactCheck) -> dict[str, Any]:
+def check_record(check: ThresholdDetection) -> dict[str, Any]:
     """A check for machines."""
     return {
         "log": check.log,
         "reference": check.reference,
-        "caught": None if check.reference is None else len(check.caught),
+        "caught": None if check.reference is None else len(check.detected),
         "median_delay_s": check.median_delay,
         "longest_delay_s": check.longest_delay,
-        "smallest_caught_N": check.smallest_caught,
+        "smallest_caught_N": check.smallest_detected,
         "largest_missed_N": check.largest_missed,
         "false_alarms": check.false_alarms,
         "untouched_h": check.untouched_h,
@@ -192,7 +192,7 @@ def check_record(check: ContactCheck) -> dict[str, Any]:
                 "peak_force_N": contact.peak_force,
                 "delay_s": contact.delay,
                 "by": contact.by or None,
-                "alarm_was_on": contact.was_on,
+                "alarm_was_on": contact.already_above,
             }
             for number, contact in enumerate(check.contacts, start=1)
         ],

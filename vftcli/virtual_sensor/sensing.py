@@ -1,52 +1,82 @@
 """From a log, its free motion and the estimates to what the virtual sensor says of it."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import chain as chained
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from vftcli.observers.observer import Observer
+from vftcli.repetition.free_load import FreeLoad, without_load
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.disturbance import disturbance_impulse
+from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
-from vftcli.virtual_sensor.sensor import find_mounting
-from vftcli.virtual_sensor.sensor_reading import SensorReading, contact_elsewhere
-from vftcli.virtual_sensor.smoother.observer_wrench import (
-    FreeLog,
-    Gate,
-    as_modelled,
-    smooth_all,
-    smoothed_wrench,
-)
-from vftcli.virtual_sensor.torque_error import (
-    TorqueError,
-    from_band,
-    from_free_part,
-    given_error,
-    missed_torque,
-    unknown_error,
-)
-from vftcli.virtual_sensor.vendor import check_vendor
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import (
+from vftcli.virtual_sensor.frames import from_base
+from vftcli.virtual_sensor.sensor import check_vendor, find_mounting
+from vftcli.virtual_sensor.sensor_reading import (
+    SensorReading,
+    contact_elsewhere,
     without_drift,
     zero_drift,
     zero_moved,
     zero_spans,
     zero_warning,
 )
+from vftcli.virtual_sensor.smoother import (
+    SmoothedWrench,
+    WrenchPrior,
+    deviations,
+    prior_of,
+    smooth_wrench,
+)
+from vftcli.virtual_sensor.torque_error import torque_error
+from vftcli.virtual_sensor.virtual_sensor import CHUNK, VirtualSensor
 
 HALF = 0.05  #: Half the time it is averaged over: noise of 2 mrad/s in q̇ leaves some .05 N·m. [s]
 PAYLOAD_SLACK = 0.05  #: Difference of payloads that is not worth a remark. [kg]
+
+
+class Gate(NamedTuple):
+    """The contacts of a log, outside of which nothing touches the arm."""
+
+    spans: Sequence[tuple[float, float]]  #: From and to of every contact. [s]
+    #: How their wrench moves, as the contacts themselves show it; None to choose it.
+    prior: WrenchPrior | None = None
+
+
+class FreeLog(NamedTuple):
+    """A log as an observer has it, and what nobody touched."""
+
+    run: Run  #: The log.
+    #: Samples that nobody touched, less a load that they carry; none where nothing is known.
+    free: tuple[RunSamples, ...]
+    #: A load that the free samples carry, and with them the whole log; None without one.
+    load: FreeLoad | None = None
+
+    def known_free(self, unloaded: Mask) -> tuple[RunSamples, ...]:
+        """The free samples; without any, the samples (T,) that a zero says are unloaded."""
+        if self.free or np.count_nonzero(unloaded) < 2:
+            return self.free
+        return (RunSamples(self.run, unloaded),)
+
+
+def as_modelled(motion: FreeMotion) -> FreeLog:
+    """The log as the robot's model explains it, with the free part that is given or found."""
+    try:
+        return FreeLog(motion.log, motion.known.pieces)
+    except ReferenceTorqueError:
+        return FreeLog(motion.log, ())
 
 
 def sense(
@@ -61,7 +91,7 @@ def sense(
     """Turn estimates into wrenches, remove the zero, and judge them.
 
     What is asked of the log rather than of an observer (its unloaded start, its sensor's pose, its
-    vendor's convention) is read off the mean disturbance, so that it is the same whichever
+    vendor's convention) is read off the mean disturbance, so that it does not depend on which
     observers run.
 
     Args:
@@ -70,7 +100,7 @@ def sense(
         estimates: Their torques, in the same order.
         choice: What is asked of the virtual sensor.
         plain: The log and its free samples as the robot's model alone has them; None to find them.
-        own: The same as an observer has them that has others, by its name.
+        own: Those of an observer that has others, by its name.
         gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
             is one.
 
@@ -83,37 +113,42 @@ def sense(
     t, chain = recording.t, robot.chain
     disturbance = mean_disturbance(terms)
     raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
-    mounting, found = find_mounting(recording, robot, disturbance, choice)
+    mounting, fitted = find_mounting(recording, robot, disturbance, choice)
     # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
     zero = zero_spans(choice.zero, raw)
-    error = torque_error(choice, motion, observers, estimates, zero.chosen(t))
+    chosen = zero.chosen(t)
+    error = torque_error(choice.torque_sd, motion.log, observers, estimates, chosen)
     wrenches = sensor.wrenches(estimates, recording.q, chain, dict(error.sd))
     smoothed = smooth_all(
         [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
         plain or as_modelled(motion),
         own or {},
-        unloaded=zero.chosen(t),
+        unloaded=chosen,
         gate=gate,
     )
     wrenches = tuple(
         smoothed_wrench(smoothed[w.name], w, sensor, motion) if w.name in smoothed else w
         for w in wrenches
     )
-    bands = band_remarks(error, wrenches, smoothed)
+    # Beside a smoothed wrench, what is said of the torques' error names those that it is said of.
+    bands = [r for w in wrenches if w.name in smoothed for r in w.remarks]
+    if others := [w.name for w in wrenches if w.name not in smoothed]:
+        where = Where(", ".join(others)) if smoothed else Where()
+        bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in error.remarks]
     # Drifts span by span: the first of each observer is its zero.
     drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
-    warnings = tuple(
+    warnings = [
         remark
         for row in drifts
         for wrench, drift in zip(wrenches, row, strict=True)
         for remark in zero_warning(wrench, drift)
-    )
-    moved = tuple(
+    ]
+    moved = [
         zero_moved(first, last)
         for row in drifts[1:]
         for first, last in zip(drifts[0], row, strict=True)
-    )
+    ]
     # Only now: the band and the warnings are about the wrench as it was read.
     if drifts:
         drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
@@ -121,6 +156,7 @@ def sense(
     free = zero.unloaded(t)
     vendor = check_vendor(recording, raw, chain)
     elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
+    hides = any(w.hidden.any() for w in wrenches)
     return SensorReading(
         sensor=sensor,
         wrenches=wrenches,
@@ -132,19 +168,89 @@ def sense(
         elsewhere=elsewhere,
         remarks=(
             *warnings,
-            *found,
+            *fitted,
             *(() if drifts else payload_remark(recording, robot)),
-            *(
-                mask_remark(raw.hidden, raw.sigma_min)
-                if any(w.hidden.any() for w in wrenches)
-                else ()
-            ),
+            *(mask_remark(raw.hidden, raw.sigma_min) if hides else ()),
             *moved,
             *bands,
             *(() if vendor is None else vendor.remarks),
             *(remark for e in elsewhere for remark in e.remarks),
         ),
     )
+
+
+def smoothed_wrench(
+    smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, motion: FreeMotion
+) -> Wrench:
+    """A wrench with the smoother's values and band in place of its own, nothing of it masked."""
+    chain, q, t = motion.log.robot.chain, motion.log.q, wrench.t
+    values, sd = np.empty((len(t), 6)), np.empty((len(t), 6))
+    for start in range(0, len(t), CHUNK):
+        span = slice(start, min(start + CHUNK, len(t)))
+        flange = link_poses(chain, q[span]).rotation[:, -1]
+        X = from_base(sensor.frame, flange, sensor.mounting)
+        there = smoothed.at(t[span])
+        values[span] = np.squeeze(X @ there.values[:, :, None], axis=2)
+        sd[span] = deviations(X @ there.covariance @ np.swapaxes(X, 1, 2))
+    return replace(
+        wrench,
+        values=handed_over(values),
+        sd=handed_over(sd),
+        masked=None,
+        remarks=smoothed.remarks(wrench.name),
+    )
+
+
+def smooth_all(
+    names: Sequence[str],
+    plain: FreeLog,
+    own: Mapping[str, FreeLog],
+    *,
+    unloaded: Mask,
+    gate: Gate | None = None,
+) -> dict[str, SmoothedWrench]:
+    """The smoothed wrench of each observer, computed once for all that have the same log.
+
+    Args:
+        names: The observers.
+        plain: The log as the robot's model alone has it.
+        own: The log as an observer has it that has another.
+        unloaded: Samples of the log that its zero says are unloaded. (T,)
+        gate: The contacts, outside of which there is no wrench; None where the log is one.
+    """
+    logs = {name: own.get(name, plain) for name in names}
+    each = {log.run: log for log in reversed(logs.values())}
+    wrenches = {run: smooth_log(log, plain, unloaded, gate) for run, log in each.items()}
+    return {name: wrenches[log.run] for name, log in logs.items()}
+
+
+def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) -> SmoothedWrench:
+    """The smoothed wrench of one log; the arguments as of `smooth_all`.
+
+    A correction of the model's error is used where the wrench comes and goes. Where the uncorrected
+    log calls for one steady load it is left out, since a load and an error of the model look alike.
+    """
+    free = log.known_free(unloaded)
+    if gate is not None:
+        bare = without_load(log.run, log.load)
+        found = smooth_wrench(bare, free, gate.spans, gate.prior)
+        if log.load is None:
+            return found
+        q = resample_columns(found.t, log.run.t, log.run.q)
+        values, covariance = log.load.wrench(log.run.robot.chain, q)
+        return replace(
+            found,
+            values=found.values + values,
+            covariance=found.covariance + covariance,
+            load=log.load,
+        )
+    if log.run is not plain.run:
+        modelled = plain.known_free(unloaded)
+        prior = prior_of(plain.run, modelled)
+        if prior.is_steady:
+            found = smooth_wrench(plain.run, modelled, prior=prior)
+            return replace(found, uncorrected=True)
+    return smooth_wrench(log.run, free)
 
 
 def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
@@ -164,67 +270,18 @@ def mean_disturbance(terms: DynamicsTerms) -> ExternalTorque:
     return ExternalTorque(name="disturbance", t=t, tau=handed_over(mean))
 
 
-def band_remarks(
-    error: TorqueError, wrenches: Sequence[Wrench], smoothed: Collection[str]
-) -> tuple[Remark, ...]:
-    """Where the wrenches' bands come from: the error of the torques, and each smoother's own.
-
-    Beside a smoothed wrench, what is said of the torques' error names those that it is said of.
-    """
-    own = [r for w in wrenches if w.name in smoothed for r in w.remarks]
-    others = [w.name for w in wrenches if w.name not in smoothed]
-    if not others:
-        return tuple(own)
-    names = Where(", ".join(others))
-    common = error.remarks
-    if smoothed:
-        common = tuple(replace(r, where=names) if r.where == Where() else r for r in common)
-    return (*common, *own)
-
-
-def torque_error(
-    choice: WrenchChoice,
-    motion: FreeMotion,
-    observers: Sequence[Observer],
-    torques: Sequence[ExternalTorque],
-    free: Mask,
-) -> TorqueError:
-    """The torque error behind the band: what was given, else measured, else unknown.
-
-    Args:
-        choice: What is asked.
-        motion: The log.
-        observers: The observers.
-        torques: Their estimates.
-        free: Samples of the zero spans; none if no zero was given. (T,)
-    """
-    if choice.torque_sd is not None:
-        return given_error(choice.torque_sd, torques)
-    if torques and all(torque.error_sd is not None for torque in torques):
-        return from_band(torques)
-    if np.count_nonzero(free) < 2:
-        return unknown_error()
-    missed = missed_torque(motion.log, observers, free)
-    return from_free_part(motion.log, torques, free, missed)
-
-
 def payload_remark(recording: Recording, robot: Robot) -> tuple[Remark, ...]:
-    """A remark where the controller was told of another load than the robot's file mounts."""
-    told = recording.payload_mass
+    """A remark where the controller has another load than the robot's file mounts."""
+    stated = recording.payload_mass
     mounted = robot.payload.mass if robot.payload is not None else 0.0
-    if told is None or abs(told - mounted) < PAYLOAD_SLACK:
+    if stated is None or abs(stated - mounted) < PAYLOAD_SLACK:
         return ()
-    weight = float(np.linalg.norm(robot.chain.gravity)) * (told - mounted)
-    return (caution("payload-differs", told_kg=told, mounted_kg=mounted, weight_N=weight),)
+    weight = float(np.linalg.norm(robot.chain.gravity)) * (stated - mounted)
+    return (caution("payload-differs", told_kg=stated, mounted_kg=mounted, weight_N=weight),)
 
 
 def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
-    """How many samples are masked, and how near to a singularity the arm comes.
-
-    Args:
-        hidden: Samples in which the pose cannot tell a wrench. (T,)
-        sigma: Smallest singular value of the Jacobian, if it was looked at, somewhere. [m]
-    """
+    """Count of the samples (T,) in which the pose hides the wrench, and the smallest σ_min [m]."""
     count = int(np.count_nonzero(hidden))
     if not count or sigma is None:
         return ()

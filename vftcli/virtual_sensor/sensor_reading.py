@@ -1,27 +1,65 @@
-"""What a log's virtual sensor measured: wrenches, zero drift, masks, contacts, and remarks."""
+"""Reading of a log's virtual sensor: wrenches, zero drift and its removal, masks, remarks."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Mask
+from vftcli.signals.arrays import Array, Mask, seal
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.lag import time_offset
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.least_squares import robust_sd
+from vftcli.signals.parsing import interval_text
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.shown import Shown
-from vftcli.signals.wrench import Wrench
-from vftcli.virtual_sensor.choice import SMOOTHER
-from vftcli.virtual_sensor.smoother.smoothing import SmoothedWrench
+from vftcli.signals.wrench import AXES, Wrench, unit_of
+from vftcli.virtual_sensor.choice import SMOOTHER, ZeroChoice
+from vftcli.virtual_sensor.sensor import VendorCheck
+from vftcli.virtual_sensor.smoother import SmoothedWrench
 from vftcli.virtual_sensor.solvers import SCALE
-from vftcli.virtual_sensor.vendor import VendorCheck
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
-from vftcli.virtual_sensor.zero import Drift, without_drift, zero_drift
 
 #: The threshold of the null-space torque is so far above the largest value of the free part.
 MARGIN = 1.25
 #: Share of samples above the threshold up to which nothing is said: chance reaches it.
 LEAST_SHARE = 0.001
+Span = tuple[float, float]  #: First and last time. [s]
+#: Start of a log that is left out of an unloaded start: observers rise from zero. [s]
+SETTLING = 1.0
+LEAST_SPAN = 0.5  #: Shortest unloaded start. [s]
+#: A departure from the start's own level that counts as load whatever the noise. [N, N·m]
+STEPS = np.repeat([3.0, 0.6], 3)
+BACK = 0.3  #: An unloaded start ends this long before the load shows: it began to rise earlier. [s]
+SPREADS = 6.0  #: A departure of so many robust standard deviations counts as load.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drift:
+    """What one virtual sensor reads over one unloaded span."""
+
+    name: str  #: The observer.
+    span: Span  #: First and last time. [s]
+    mean: Array  #: Mean wrench, the zero drift. (6,) [N, N·m]
+    sd: Array  #: Standard deviation about it. (6,) [N, N·m]
+    samples: int  #: Known samples in the span.
+    frame: str  #: Frame of the numbers.
+    removed: bool = False  #: Whether it was subtracted.
+
+    def __post_init__(self) -> None:
+        seal(self, "mean", "sd")
+
+    @property
+    def remark(self) -> Remark:
+        """The drift as a remark."""
+        return fact(
+            "zero-removed" if self.removed else "zero-left-in",
+            Where(self.name, span=self.span),
+            frame=self.frame,
+            force_N=self.mean[:3].tolist(),
+            moment_Nm=self.mean[3:].tolist(),
+        )
 
 
 class NullSpaceVerdict(NamedTuple):
@@ -112,13 +150,162 @@ def with_reference(
     """The reading with a reference beside it."""
     if not of_sensor:
         return replace(reading, reference=reference)
-    told: list[Remark] = []
+    remarks = list(reading.remarks)
     if reading.zero_span is not None:
         drift = replace(zero_drift(reference, reading.zero_span), removed=True)
         reference = without_drift(reference, drift)
-        told.append(drift.remark)
+        remarks.append(drift.remark)
     for wrench in reading.wrenches:
         offset = time_offset(reference.t, wrench.known / SCALE, reference.known / SCALE)
         where, values = Where(wrench.name), {"correlation": offset.correlation}
-        told.append(fact("lag-behind-sensor", where, lag_ms=offset.lag * 1e3, **values))
-    return replace(reading, reference=reference, remarks=(*reading.remarks, *told))
+        remarks.append(fact("lag-behind-sensor", where, lag_ms=offset.lag * 1e3, **values))
+    return replace(reading, reference=reference, remarks=tuple(remarks))
+
+
+def zero_drift(wrench: Wrench, span: Span) -> Drift:
+    """Mean and spread of the known samples in a span."""
+    start, stop = max(span[0], float(wrench.t[0])), min(span[1], float(wrench.t[-1]))
+    where = f"zero interval {interval_text(*span)}"
+    if not start < stop:
+        raise ParameterError(
+            f"{where} lies outside the log, which runs from {wrench.t[0]:g} to {wrench.t[-1]:g} s"
+        )
+    inside = wrench.between(start, stop)
+    if len(inside) < 2:
+        raise ParameterError(
+            f"{where}: the pose cannot tell the wrench in any two of its samples (σ_min too "
+            "small); choose a span in a regular pose"
+        )
+    return Drift(
+        name=wrench.name,
+        span=(start, stop),
+        mean=inside.mean(axis=0),
+        sd=inside.std(axis=0),
+        samples=len(inside),
+        frame=wrench.frame,
+    )
+
+
+def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
+    """The wrench with the drift subtracted, as a constant in the wrench's own frame."""
+    removed = replace(drift, removed=True)
+    return replace(
+        wrench, values=wrench.values - drift.mean, remarks=(*wrench.remarks, removed.remark)
+    )
+
+
+def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
+    """A wrench less its mean over the first span of a choice, or over its own unloaded start."""
+    chosen = zero_spans(choice, wrench)
+    return without_drift(wrench, zero_drift(wrench, chosen.zero)) if chosen.zero else wrench
+
+
+def zero_moved(first: Drift, last: Drift) -> Remark:
+    """How far the zero moved between two unloaded spans."""
+    moved = last.mean - first.mean
+    return fact(
+        "zero-moved",
+        Where(first.name, span=last.span),
+        first_s=list(first.span),
+        force_N=moved[:3].tolist(),
+        moment_Nm=moved[3:].tolist(),
+    )
+
+
+class ZeroSpans(NamedTuple):
+    """The unloaded parts of a log."""
+
+    #: Those that were chosen: the first is the zero, further ones show its drift. [s]
+    spans: tuple[Span, ...]
+    start: Span | None  #: The unloaded start that was found where none was chosen. [s]
+
+    @property
+    def zero(self) -> Span | None:
+        """The span whose mean is removed."""
+        return self.spans[0] if self.spans else None
+
+    def chosen(self, t: Array) -> Mask:
+        """Samples of the chosen spans. (T,)"""
+        return samples_of(t, self.spans)
+
+    def unloaded(self, t: Array) -> Mask:
+        """Samples that are known to be unloaded: of the chosen spans, else of the start. (T,)"""
+        start = () if self.start is None else (self.start,)
+        return samples_of(t, self.spans or start)
+
+
+def zero_spans(choice: ZeroChoice, wrench: Wrench) -> ZeroSpans:
+    """The spans of a choice, and the unloaded start of a wrench where it names none."""
+    if choice.spans:
+        return ZeroSpans(choice.spans, None)
+    start = unloaded_start(wrench)
+    if not choice.start:
+        return ZeroSpans((), start)
+    if start is None:
+        raise ParameterError(
+            "--zero start: the log has no unloaded start of half a second in a regular pose; give "
+            "the unloaded span as --zero A:B"
+        )
+    return ZeroSpans((start,), None)
+
+
+def samples_of(t: Array, spans: Sequence[Span]) -> Mask:
+    """Samples that lie in any of the spans. (T,)"""
+    inside: Mask = np.zeros(len(t), dtype=bool)
+    for start, stop in spans:
+        inside |= (t >= start) & (t <= stop)
+    return inside
+
+
+def unloaded_start(wrench: Wrench) -> Span | None:
+    """The span from the start over which the wrench keeps its first level, None if too short. [s]
+
+    That level is the median of the first half second after `SETTLING`; the span ends where a
+    median over 0.1 s leaves it by `SPREADS` robust standard deviations and by at least
+    `STEPS`. A load that hangs from the first sample on cannot be told from drift.
+    """
+    t = wrench.t - wrench.t[0]
+    known = np.all(np.isfinite(wrench.known), axis=1)
+    first = known & (t >= SETTLING) & (t <= SETTLING + LEAST_SPAN)
+    if np.count_nonzero(first) < 3:
+        return None
+    # Medians, since a knock in the first half second must move neither level nor spread.
+    level = np.median(wrench.values[first], axis=0)
+    spread = robust_sd(wrench.values[first] - level)
+    away = np.any(np.abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
+    last = len(t) - 1
+    runs = [(a, b) for a, b in runs_of(away & known) if t[min(b, last)] - t[a] >= 0.1]
+    loaded = covered(runs, len(t)) & (t >= SETTLING)
+    stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
+    if stop - SETTLING < LEAST_SPAN:
+        return None
+    start = float(wrench.t[0])
+    return start + SETTLING, start + stop
+
+
+def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
+    """A warning if a zero interval looks like a contact; none if it does not.
+
+    It does where the wrench changes within it, or lies far from the level of the log's start.
+    """
+    where = Where(wrench.name, span=drift.span)
+    start = unloaded_start(wrench)
+    if start is not None:
+        level = zero_drift(wrench, start)
+        away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
+        if worst := largest_excess(away, STEPS):
+            return (warning("zero-far-from-start", where, start_s=list(start), **worst),)
+    inside = wrench.between(*drift.span)
+    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
+    if worst := largest_excess(swing, 4.0 * STEPS):
+        return (warning("zero-swings", where, **worst),)
+    return ()
+
+
+def largest_excess(value: Array, limit: Array) -> dict[str, object]:
+    """The axis that exceeds its limit most, with its value and unit; empty if none does."""
+    share = value / limit
+    if not np.any(share > 1.0):
+        return {}
+    k = int(np.argmax(share))
+    return {"axis": AXES[k], "size": float(value[k]), "unit": unit_of(k)}

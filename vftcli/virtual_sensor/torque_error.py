@@ -25,27 +25,6 @@ from vftcli.signals.wrench import ExternalTorque
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
 
 
-def missed_torque(
-    log: Run, observers: Sequence[Observer], free: Mask
-) -> Mapping[str, Array] | None:
-    """What each observer's lag leaves out of the contacts, mean square. (n,) [(N·m)²]
-
-    Args:
-        log: The log.
-        observers: The observers.
-        free: Unloaded samples of the log. (T,)
-
-    Returns:
-        Observer → mean square; None where a part is too short for a spectrum.
-    """
-    try:
-        spectra = spectra_of(RunSamples(log, ~free), [RunSamples(log, free)])
-    except ParameterError:
-        return None
-    f, step, n = spectra.frequency, spectra.step, log.robot.joints
-    return {o.name: spectra.missed(o.frequency_response(f, step, n)) for o in observers}
-
-
 @dataclass(frozen=True, kw_only=True)
 class TorqueError:
     """Joint torque error per observer."""
@@ -53,6 +32,32 @@ class TorqueError:
     #: Observer → standard deviation, (n,) or (T, n); those without one have no band. [N·m]
     sd: Mapping[str, Array]
     remarks: tuple[Remark, ...]  #: Where it comes from, or why there is none.
+
+
+def torque_error(
+    stated: str | None,
+    log: Run,
+    observers: Sequence[Observer],
+    torques: Sequence[ExternalTorque],
+    free: Mask,
+) -> TorqueError:
+    """The torque error behind the band: what is stated, else measured, else none.
+
+    Args:
+        stated: ``virtual-sensor.torque-sd``, None where it is not given.
+        log: The log.
+        observers: The observers.
+        torques: Their estimates.
+        free: Samples of the zero spans; none if no zero was given. (T,)
+    """
+    if stated is not None:
+        return given_error(stated, torques)
+    known = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
+    if torques and len(known) == len(torques):
+        return TorqueError(sd=known, remarks=(fact("band-from-torques"),))
+    if np.count_nonzero(free) < 2:
+        return TorqueError(sd={}, remarks=(caution("no-wrench-band"),))
+    return from_free_part(log, torques, free, missed_torque(log, observers, free))
 
 
 def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
@@ -75,32 +80,13 @@ def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     return TorqueError(sd=sd, remarks=tuple(fact("band-given", Where(name)) for name in sd))
 
 
-def from_band(torques: Sequence[ExternalTorque]) -> TorqueError:
-    """The band that each estimate brings along, measured on the log's free part."""
-    sd = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
-    return TorqueError(sd=sd, remarks=(fact("band-from-torques"),))
-
-
-def unknown_error() -> TorqueError:
-    """No error, and so no band, where nothing of the log is known to be free of contact."""
-    return TorqueError(sd={}, remarks=(caution("no-wrench-band"),))
-
-
 def from_free_part(
     run: Run,
     torques: Sequence[ExternalTorque],
     free: Mask,
     missed: Mapping[str, Array] | None,
 ) -> TorqueError:
-    """The error of the free part and of the lag, as the module's equation has it.
-
-    Args:
-        run: The log.
-        torques: The estimates.
-        free: Unloaded samples. (T,)
-        missed: What each observer's lag leaves out of the contacts; None where that is not known.
-            (n,) [(N·m)²]
-    """
+    """The error of the free samples (T,) and of what the lag misses, where that is known."""
     friction = dry_friction(run.robot.friction, run.robot.joints)
     rests, sd, seen = run.rests, {}, True
     for torque in torques:
@@ -115,3 +101,18 @@ def from_free_part(
     if not seen:
         remarks.append(caution("band-of-free-rest"))
     return TorqueError(sd=sd, remarks=tuple(remarks))
+
+
+def missed_torque(
+    log: Run, observers: Sequence[Observer], free: Mask
+) -> Mapping[str, Array] | None:
+    """Observer → mean square that its lag leaves out of the contacts. (n,) [(N·m)²]
+
+    None where the part that is free, or the rest, is too short for a spectrum.
+    """
+    try:
+        spectra = spectra_of(RunSamples(log, ~free), [RunSamples(log, free)])
+    except ParameterError:
+        return None
+    f, step, n = spectra.frequency, spectra.step, log.robot.joints
+    return {o.name: spectra.missed(o.frequency_response(f, step, n)) for o in observers}

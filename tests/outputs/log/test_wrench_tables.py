@@ -15,7 +15,7 @@ from vftcli.outputs.log.rmse_tables import (
     paper_bounds,
 )
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.zero import Drift
+from vftcli.virtual_sensor.sensor_reading import Drift
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from vftcli.virtual_sensor.solvers import LEAST_SIGMA
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.virtual_sensor.zero import Drift
+    from vftcli.virtual_sensor.sensor_reading import Drift
 
 #: An RMSE within this factor of the reference's floor may be the reference's own.
 AT_FLOOR = 1.2

@@ -2,20 +2,20 @@
 
 import numpy as np
 
-from vftcli.contacts.model_error import (
+from vftcli.robots.disturbance import Blocks
+from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import SPIKE
+from vftcli.virtual_sensor.model_error import (
     UNKNOWN,
-    error_course,
+    TorqueNoise,
     error_model,
+    error_process,
     innovations,
     learn_noise,
     spiked_white,
     without_reversals,
 )
-from vftcli.robots.disturbance import Blocks
-from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.linear_model import SPIKE
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
 
 B = 0.024
 
@@ -88,7 +88,7 @@ def test_reversals_are_bridged_in_a_straight_line() -> None:
 def test_the_filter_of_the_error_agrees_with_a_dense_solve() -> None:
     """Σ ν²/S is dᵀ C⁻¹ d with the dense covariance of the model."""
     log = blocks(drawn(40, np.random.default_rng(3)), np.full((40, 1), 0.5))
-    model = error_model(log.d, error_course(noise(), log))
+    model = error_model(log.d, error_process(noise(), log))
     squares = innovations(model, np.full((40, 1), 1e-300))[0]
     lag = np.abs(log.t[:, None] - log.t)
     covariance = 0.25 * np.exp(-lag / 0.4) + 0.01 * np.eye(40)
@@ -102,7 +102,7 @@ def test_a_bad_sample_is_a_spike() -> None:
     d = np.zeros((50, 1))
     d[25] = 20.0
     log = blocks(d, np.full((50, 1), 0.5))
-    course = error_course(noise(), log)
+    course = error_process(noise(), log)
     white = spiked_white(d, course)
     assert white[25, 0] > (SPIKE - 1.0) * course.white[25, 0]
     assert np.all(np.delete(white, 25) == np.delete(course.white, 25))
@@ -110,11 +110,11 @@ def test_a_bad_sample_is_a_spike() -> None:
 
 def test_a_joint_that_stops_draws_its_stiction() -> None:
     velocity = np.concatenate([np.full(20, 0.5), np.zeros(20)])[:, None]
-    course = error_course(noise(), blocks(np.zeros((40, 1)), velocity))
+    course = error_process(noise(), blocks(np.zeros((40, 1)), velocity))
     assert course.added[20, 0] == (STOP_SHARE * 10.0) ** 2
     assert course.decay[20, 0] < 0.01
     # It moves away again: b may change at once.
-    back = error_course(noise(), blocks(np.zeros((40, 1)), velocity[::-1]))
+    back = error_process(noise(), blocks(np.zeros((40, 1)), velocity[::-1]))
     assert back.decay[20, 0] < course.decay[30, 0]
 
 
@@ -123,7 +123,7 @@ def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
     log = blocks(np.zeros((20, 2)), velocity)
     both = noise(2)
     pushed = np.arange(20) >= 10
-    strict, free = error_course(both, log), error_course(both, log, pushed)
+    strict, free = error_process(both, log), error_process(both, log, pushed)
     stationary = free.added[15] / (1.0 - free.decay[15] ** 2)
     np.testing.assert_allclose(stationary, [0.25 + (PUSHED_SHARE * 10.0) ** 2, 0.25])
     np.testing.assert_array_equal(free.added[5], strict.added[5])
@@ -131,12 +131,12 @@ def test_a_push_frees_the_stiction_of_joints_at_rest_only() -> None:
 
 def test_a_joint_that_the_free_part_never_moved_errs_by_its_friction() -> None:
     log = blocks(np.zeros((20, 1)), np.full((20, 1), 0.5))
-    course = error_course(noise(seen=False), log)
+    course = error_process(noise(seen=False), log)
     stationary = course.added[10, 0] / (1.0 - course.decay[10, 0] ** 2)
     np.testing.assert_allclose(stationary, 0.25 + 4.0)
 
 
 def test_a_gap_says_nothing() -> None:
     known = np.arange(20) != 7
-    course = error_course(noise(), blocks(np.zeros((20, 1)), np.full((20, 1), 0.5), known))
+    course = error_process(noise(), blocks(np.zeros((20, 1)), np.full((20, 1), 0.5), known))
     assert course.white[7, 0] == UNKNOWN

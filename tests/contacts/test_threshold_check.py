@@ -1,9 +1,9 @@
-"""What thresholds would have caught, on steps whose times and sizes are known."""
+"""What thresholds would have detected, on steps whose times and sizes are known."""
 
 import numpy as np
 import pytest
 
-from vftcli.contacts.caught import check_contacts
+from vftcli.contacts.threshold_check import check_contacts
 from vftcli.contacts.thresholds import ComparedSignals, SignalThreshold, Thresholds
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording, Source
@@ -61,13 +61,13 @@ def truth() -> tuple[ExternalTorque, Wrench]:
     )
 
 
-def test_every_contact_is_caught_or_missed_with_its_delay_and_force() -> None:
+def test_every_contact_is_detected_or_missed_with_its_delay_and_force() -> None:
     """J2 at 10 N·m tells 20 and 12.5 N·m and not 5; each begins a lag of .1 s after the truth."""
     check = check_contacts(estimated(), limits(10.0, 1e3), *truth())
     assert [c.by for c in check.contacts] == ["J2", "", "J2"]
     # Half a sample for the rounding of edges.
-    assert [c.delay for c in check.caught] == pytest.approx([LAG, LAG], abs=0.006)
-    assert (check.smallest_caught, check.largest_missed) == (25.0, 10.0)
+    assert [c.delay for c in check.detected] == pytest.approx([LAG, LAG], abs=0.006)
+    assert (check.smallest_detected, check.largest_missed) == (25.0, 10.0)
     assert check.median_delay == pytest.approx(LAG, abs=0.006)
     assert check.longest_delay == pytest.approx(LAG, abs=0.006)
     assert check.false_alarms == 0
@@ -91,8 +91,8 @@ def test_an_alarm_where_nothing_touches_is_false() -> None:
 def test_without_a_wrench_the_force_is_not_known() -> None:
     torque, _ = truth()
     check = check_contacts(estimated(), limits(10.0, 1e3), torque, None)
-    assert np.isnan(check.smallest_caught)
-    assert len(check.caught) == 2
+    assert np.isnan(check.smallest_detected)
+    assert len(check.detected) == 2
 
 
 def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated() -> None:
@@ -101,23 +101,27 @@ def test_without_a_truth_the_alarms_are_listed_with_what_is_estimated() -> None:
     assert [c.peak_force for c in check.contacts] == [40.0, 25.0]
     assert (check.reference, check.false_alarms) == (None, None)
     assert np.isnan(check.median_delay)
-    assert check.smallest_caught == 25.0
+    assert check.smallest_detected == 25.0
     assert [remark.code for remark in check.remarks] == ["check-without-truth"]
 
 
-def test_nothing_caught_and_nothing_there() -> None:
+def test_nothing_detected_and_nothing_there() -> None:
     check = check_contacts(estimated(), limits(1e3, 1e3), *truth())
-    assert check.caught == ()
+    assert check.detected == ()
     assert np.isnan(check.median_delay)
     assert np.isnan(check.longest_delay)
     assert check.largest_missed == 40.0
 
 
-def test_an_alarm_that_stays_on_catches_nothing_new() -> None:
+def test_an_alarm_that_stays_on_detects_nothing_new() -> None:
     """J1 stays at 99 N·m from the first push on, as a joint at rest keeps its stiction."""
     stays = np.where(T >= 5.2, 99.0, 0.0)
     check = check_contacts(estimated(stays), limits(1e2, 1e3), *truth())
-    assert check.caught == ()
+    assert check.detected == ()
     check = check_contacts(estimated(stays), limits(98.0, 1e3), *truth())
-    assert [(c.by, c.was_on) for c in check.contacts] == [("J1", False), ("", True), ("", True)]
+    assert [(c.by, c.already_above) for c in check.contacts] == [
+        ("J1", False),
+        ("", True),
+        ("", True),
+    ]
     assert np.isnan(check.largest_missed)

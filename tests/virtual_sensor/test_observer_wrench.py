@@ -16,18 +16,17 @@ from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs, RunSamples
 from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.sensing import sense
-from vftcli.virtual_sensor.sensor_reading import SensorReading
-from vftcli.virtual_sensor.smoother.observer_wrench import (
+from vftcli.virtual_sensor.sensing import (
     FreeLog,
     Gate,
     as_modelled,
+    sense,
     smooth_all,
 )
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
-from vftcli.virtual_sensor.smoother.smoothing import smooth_wrench
+from vftcli.virtual_sensor.sensor_reading import SensorReading
+from vftcli.virtual_sensor.smoother import WrenchPrior, smooth_wrench
 
-CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
+CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 FREE = FreeChoice.parsed(free=["0.3:4"])
 
 

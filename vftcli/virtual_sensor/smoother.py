@@ -1,6 +1,8 @@
-"""From a log to its smoothed wrench: block averages, noise, prior, filter and smoother in a row.
+"""The wrench smoother: one linear model of wrench and model error along a whole log.
 
-The wrench and the model error are told apart by how they move: the error as the free part shows it,
+    d = Jᵀw + b + n: block averages, noise, prior, filter and smoother in a row.
+
+The wrench and the model error are separated by how they move: the error as the free part shows it,
 the wrench as its prior says. No pose hides anything: where a force turns no joint the estimate
 leans on its past and future, and its band grows.
 """
@@ -17,11 +19,11 @@ from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
-from vftcli.signals.linear_model import LinearModel, smoothed
+from vftcli.signals.intervals import covered, runs_of
+from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step, resample_columns
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise, torque_noise
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior, choose_prior, gated, wrench_model
+from vftcli.virtual_sensor.model_error import TorqueNoise, steps, torque_noise
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
 #: Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples.
@@ -38,6 +40,142 @@ BENT = 0.25
 #: Outside of the listed contacts the band is that of a contact which lasts so long, as long as
 #: those that the list makes up in free motion to find the smallest force it can see. [s]
 UNLISTED = 0.6
+LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
+TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  #: Correlation times of a wrench that are tried. [s]
+FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
+STEADY = 30.0  #: A wrench that keeps for at least this long is a load, … [s]
+LOAD_CHANGE = 5.0  #: … if it changes by no more than this (one standard deviation) in a second. [N]
+
+
+class WrenchPrior(NamedTuple):
+    """An Ornstein–Uhlenbeck prior of the wrench in base axes."""
+
+    time: float  #: Correlation time τ_w. [s]
+    force: float  #: Standard deviation σ_f of each component of the force. [N]
+    #: That of the moment; `LEVER` times the force where none is known. [N·m]
+    moment: float | None = None
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether it is the prior of a load rather than of contacts that come and go."""
+        # What the force changes by in a second, where that is short against τ_w.
+        change = self.force * np.sqrt(2.0 / self.time)
+        return bool(self.time >= STEADY and change <= LOAD_CHANGE)
+
+    @property
+    def variance(self) -> Array:
+        """Stationary variance of force and moment. (6,) [N², (N·m)²]"""
+        moment = LEVER * self.force if self.moment is None else self.moment
+        return np.repeat([self.force**2, moment**2], 3)
+
+    def process(self, inside: Mask, step: Array) -> tuple[Array, Array]:
+        """Share that is kept from the block before, and variance that is added. (K, 1), (K, 6)
+
+        None is kept where the gate opens, and outside, where none is added either.
+
+        Args:
+            inside: Blocks in which there may be a wrench. (K,)
+            step: Time from the block before. (K,) [s]
+        """
+        goes_on = inside & np.concatenate([[False], inside[:-1]])
+        kept = np.where(goes_on, np.exp(-step / self.time), 0.0)[:, None]
+        return kept, np.where(inside[:, None], self.variance * (1.0 - kept**2), 0.0)
+
+
+#: The priors that are tried.
+GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
+
+
+class BlockModel(NamedTuple):
+    """A log in blocks of one length, with its noise and its gate."""
+
+    blocks: Blocks  #: The blocks.
+    jacobian: Array  #: J of the flange. (K, 6, n)
+    noise: TorqueNoise  #: Noise and model error.
+    inside: Mask  #: Blocks in which there may be a wrench. (K,)
+
+    def under(self, priors: Sequence[WrenchPrior]) -> LinearModel:
+        """Wrench w and model error b under each of G priors: d = Jᵀw + b + noise. (K, G, 6 + n)
+
+        Outside the gate the wrench is pinned to zero; the first block inside starts it with the
+        prior's own variance, independent of before. So does the log's first block the model error.
+        """
+        blocks, inside = self.blocks, self.inside
+        count, n = blocks.d.shape
+        decay, added = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
+        step = steps(blocks)
+        for g, prior in enumerate(priors):
+            decay[:, g, :6], added[:, g, :6] = prior.process(inside, step)
+        # Where the whole log may be touched nothing tells a push from what it re-settles.
+        variance, time = self.noise.stationary(blocks, None if inside.all() else inside)
+        kept = np.exp(-step[:, None] / time)
+        kept[0] = 0.0
+        decay[:, :, 6:] = kept[:, None, :]
+        added[:, :, 6:] = (variance * (1.0 - kept**2))[:, None, :]
+        known = blocks.known[:, None, None]
+        return LinearModel(
+            d=np.where(known, blocks.d[:, None], 0.0),
+            observation=(beside_errors(self.jacobian) * known)[:, None],
+            white=np.where(known, self.noise.white, 1.0),
+            decay=decay,
+            added=added,
+        )
+
+
+def block_model(
+    run: Run,
+    free: Sequence[RunSamples],
+    gate: Sequence[tuple[float, float]] | None,
+    seconds: float,
+) -> BlockModel:
+    """A log in blocks of a length [s]; the other arguments as of `smooth_wrench`."""
+    blocks = disturbance_blocks(run.terms, run.q, seconds)
+    noise = torque_noise(blocks, free, run.robot, seconds)
+    jacobian = flange_jacobian(run.robot.chain, blocks.q)
+    return BlockModel(blocks, jacobian, noise, gated(blocks, gate))
+
+
+def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:
+    """Blocks in which there may be a wrench: listed intervals [s] and a block on either side. (K,)
+
+    All of them without a list, where the whole log is one contact.
+    """
+    if intervals is None:
+        return np.ones(len(blocks.t), dtype=bool)
+    inside = np.zeros(len(blocks.t), dtype=bool)
+    half = 0.5 * blocks.length
+    for start, stop in intervals:
+        inside |= (blocks.t + half > start) & (blocks.t - half < stop)
+    return covered(runs_of(inside), len(inside), 1)
+
+
+def block_length(t: Array, *, fine: bool) -> float:
+    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
+    if len(t) < 2:
+        return COARSE
+    step, length = median_step(t), COARSE
+    if fine:
+        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
+    return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
+
+
+class MovedWrench(NamedTuple):
+    """A wrench at some times."""
+
+    values: Array  #: (T, 6) [N, N·m]
+    covariance: Array  #: (T, 6, 6)
+
+    @property
+    def sd(self) -> Array:
+        """Standard deviation. (T, 6) [N, N·m]"""
+        return deviations(self.covariance)
+
+
+def deviations(covariance: Array) -> Array:
+    """Standard deviations of covariances. (T, k)"""
+    # A model error that is known has no variance, which rounding may leave on either side.
+    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
+    return np.asarray(np.sqrt(variances))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +193,7 @@ class SmoothedWrench:
     prior: WrenchPrior  #: How the wrench may move.
     noise: TorqueNoise  #: What counts as noise.
     gate: bool  #: Whether contacts were listed; else the whole log is one.
-    #: Whether a correction of the model's error was left out; see `smooth_log`.
+    #: Whether a correction of the model's error was left out; see `sensing.smooth_log`.
     uncorrected: bool = False
     #: A load that the free motion carries, in the wrench with its weight; None without one.
     load: FreeLoad | None = None
@@ -73,7 +211,7 @@ class SmoothedWrench:
         block = np.searchsorted(self.t + 0.5 * self.seconds, t)
         return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
-    def at(self, t: Array) -> "MovedWrench":
+    def at(self, t: Array) -> MovedWrench:
         """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
         flat = self.covariance.reshape(len(self.t), 36)
         return MovedWrench(
@@ -101,49 +239,25 @@ class SmoothedWrench:
 
     def remarks(self, name: str) -> tuple[Remark, ...]:
         """What a reader of the wrench should know."""
-        where, noise = Where(name), self.noise
-        model = {
-            "block_s": self.seconds,
-            "time_s": self.prior.time,
-            "force_N": self.prior.force,
-            "error_Nm": np.sqrt(noise.moving).tolist(),
-        }
-        found = [fact("wrench-smoothed", where, **model)]
-        if noise.free_seconds:
-            found.append(fact("wrench-noise-learned", where, free_s=noise.free_seconds))
-        else:
-            found.append(caution("wrench-noise-assumed", where))
+        where, free = Where(name), self.noise.free_seconds
+        found = [
+            fact(
+                "wrench-smoothed",
+                where,
+                block_s=self.seconds,
+                time_s=self.prior.time,
+                force_N=self.prior.force,
+                error_Nm=np.sqrt(self.noise.moving).tolist(),
+            ),
+            fact("wrench-noise-learned", where, free_s=free)
+            if free
+            else caution("wrench-noise-assumed", where),
+        ]
         if self.uncorrected:
             found.append(fact("wrench-uncorrected", where))
-        if self.load is not None:
-            found.append(
-                fact("wrench-holds-load", where, load_kg=self.load.mass, sd_kg=self.load.sd)
-            )
+        if (load := self.load) is not None:
+            found.append(fact("wrench-holds-load", where, load_kg=load.mass, sd_kg=load.sd))
         return tuple(found)
-
-
-class MovedWrench(NamedTuple):
-    """A wrench at some times, or in another frame."""
-
-    values: Array  #: (T, 6) [N, N·m]
-    covariance: Array  #: (T, 6, 6)
-
-    def seen_in(self, X: Array) -> "MovedWrench":
-        """The wrench in the frame that matrices X (T, 6, 6) lead to."""
-        values = np.squeeze(X @ self.values[:, :, None], axis=2)
-        return MovedWrench(values, X @ self.covariance @ np.swapaxes(X, 1, 2))
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviation. (T, 6) [N, N·m]"""
-        return deviations(self.covariance)
-
-
-def deviations(covariance: Array) -> Array:
-    """Standard deviations of covariances. (T, k)"""
-    # A model error that is known has no variance, which rounding may leave on either side.
-    variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
-    return np.asarray(np.sqrt(variances))
 
 
 def smooth_wrench(
@@ -152,12 +266,12 @@ def smooth_wrench(
     gate: Sequence[tuple[float, float]] | None = None,
     prior: WrenchPrior | None = None,
 ) -> SmoothedWrench:
-    """The wrench at the flange from the whole log, by `wrench_model`.
+    """The wrench at the flange from the whole log, by `BlockModel`.
 
     Args:
         run: The log, corrected or not.
-        free: Motion that nobody touched, which tells the noise; none to take it from the drives'
-            dry friction.
+        free: Motion that nobody touched, from which the noise is learned; none to take it from the
+            drives' dry friction.
         gate: From and to of every contact [s], outside of which the wrench is zero, as far as the
             pose can show; None where the whole log is one.
         prior: How the wrench may move; None to choose it by the log's likelihood.
@@ -170,28 +284,37 @@ def smooth_wrench(
     if prior is None:
         prior = prior_of(run, free, gate)
     seconds = block_length(run.t, fine=not prior.is_steady)
-    blocks, J, noise, inside = blocks_of(run, free, gate, seconds)
-    model = wrench_model(blocks, J, noise, [prior], inside)
-    mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model)))
-    own = covariance[:, :6, :6]
+    model = block_model(run, free, gate, seconds)
+    mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model.under([prior]))))
+    own, inside = covariance[:, :6, :6], model.inside
     if gate is not None:
-        own = np.where(inside[:, None, None], own, unlisted(blocks, J, noise, prior))
+        own = np.where(inside[:, None, None], own, unlisted(model, prior))
     spread = own * np.outer(WIDENED, WIDENED)
     if gate is not None:
         spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
     return SmoothedWrench(
-        t=blocks.t,
+        t=model.blocks.t,
         values=mean[:, :6],
         covariance=spread,
         inside=inside,
         seconds=seconds,
         prior=prior,
-        noise=noise,
+        noise=model.noise,
         gate=gate is not None,
     )
 
 
-def unlisted(blocks: Blocks, J: Array, noise: TorqueNoise, prior: WrenchPrior) -> Array:
+def prior_of(
+    run: Run,
+    free: Sequence[RunSamples] = (),
+    gate: Sequence[tuple[float, float]] | None = None,
+) -> WrenchPrior:
+    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
+    model = block_model(run, free, gate, block_length(run.t, fine=False))
+    return GRID[int(np.argmax(log_likelihood(model.under(GRID))))]
+
+
+def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     """Covariance that a contact of `UNLISTED` seconds about each block would have. (K, 6, 6)
 
     The quiet blocks before it leave the model error b with the variance of a filter's steady state,
@@ -206,23 +329,18 @@ def unlisted(blocks: Blocks, J: Array, noise: TorqueNoise, prior: WrenchPrior) -
 
     Σ of the prior, c̄ the harmonic mean over the contact's m blocks: what some of them show holds
     for all.
-
-    Args:
-        blocks: The log.
-        J: Jacobian of the wrench's point. (K, 6, n)
-        noise: Noise and model error.
-        prior: How the contacts' wrench moves.
     """
+    blocks, J, noise, _ = model
     # A log of one sample is a block without length.
     R, length = noise.white, float(np.median(blocks.length)) or FINE
     count = len(blocks.t)
     half = round(0.5 * UNLISTED / length - TIE)  # 12.5 blocks of 24 ms: rounding decides nothing
-    variance, time = noise.course(blocks)
+    variance, time = noise.stationary(blocks)
     kept = np.exp(-2.0 * length / time)
     added = variance * (1.0 - kept)
     beta = R * (1.0 - kept) - added
     ahead = 0.5 * (np.sqrt(beta**2 + 4.0 * added * R) - beta)
-    v, time = noise.course(blocks, np.ones(count, dtype=bool))
+    v, time = noise.stationary(blocks, np.ones(count, dtype=bool))
     kept = np.exp(-2.0 * length / time)
     quiet = ahead * R / (ahead + R)
     backward = v[::-1], kept[::-1], half
@@ -256,54 +374,8 @@ def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
 
 
 def hidden_by_blocks(values: Array, bent: float = BENT) -> Array:
-    """Covariance of what the drives' constants and the blocks' length may hide. (K, 6, 6)
-
-    Args:
-        values: A wrench block by block. (K, 6) [N, N·m]
-        bent: Share of the bend that is hidden.
-    """
+    """Covariance of what the drives' constants and a share of the bend may hide. (K, 6, 6)"""
     walled = np.vstack([values[:1], values, values[-1:]])
     bend = bent * (values - 0.5 * (walled[2:] + walled[:-2]))
     drives = DRIVES * values
     return bend[:, :, None] * bend[:, None, :] + drives[:, :, None] * drives[:, None, :]
-
-
-def prior_of(
-    run: Run,
-    free: Sequence[RunSamples] = (),
-    gate: Sequence[tuple[float, float]] | None = None,
-) -> WrenchPrior:
-    """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
-    return choose_prior(*blocks_of(run, free, gate, block_length(run.t, fine=False)))
-
-
-def block_length(t: Array, *, fine: bool) -> float:
-    """Length of a block, fine where the wrench moves and coarse where it is a load. [s]"""
-    if len(t) < 2:
-        return COARSE
-    step, length = median_step(t), COARSE
-    if fine:
-        length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
-    return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
-
-
-class BlockModel(NamedTuple):
-    """A log in blocks of one length, with its noise and its gate."""
-
-    blocks: Blocks  #: The blocks.
-    jacobian: Array  #: J of the flange. (K, 6, n)
-    noise: TorqueNoise  #: Noise and model error.
-    inside: Mask  #: Blocks in which there may be a wrench. (K,)
-
-
-def blocks_of(
-    run: Run,
-    free: Sequence[RunSamples],
-    gate: Sequence[tuple[float, float]] | None,
-    seconds: float,
-) -> BlockModel:
-    """A log in blocks of a length [s]; the other arguments as of `smooth_wrench`."""
-    blocks = disturbance_blocks(run.terms, run.q, seconds)
-    noise = torque_noise(blocks, free, run.robot, seconds)
-    jacobian = flange_jacobian(run.robot.chain, blocks.q)
-    return BlockModel(blocks, jacobian, noise, gated(blocks, gate))

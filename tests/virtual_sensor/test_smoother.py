@@ -18,11 +18,12 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import AXES
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
-from vftcli.virtual_sensor.smoother.smoothing import (
+from vftcli.virtual_sensor.model_error import TorqueNoise
+from vftcli.virtual_sensor.smoother import (
     MOST_BLOCKS,
     UNLISTED,
+    BlockModel,
+    WrenchPrior,
     block_length,
     hidden_by_blocks,
     smooth_wrench,
@@ -30,7 +31,7 @@ from vftcli.virtual_sensor.smoother.smoothing import (
 )
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose
 
-FIXTURES = Path(__file__).parents[3] / "fixtures"
+FIXTURES = Path(__file__).parents[2] / "fixtures"
 UR10E = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
 STEP = 0.01
 
@@ -294,7 +295,9 @@ def test_the_band_where_nothing_is_listed_is_one_around_a_rest_too(near: float) 
         seen=np.ones(n, dtype=bool), at_rest=np.full(n, 9.9), pushed=np.full(n, 14.4), near=near,
     )  # fmt: skip
     J = np.broadcast_to(np.eye(6), (count, 6, n))
-    found = unlisted(blocks, J, noise, WrenchPrior(1.0, 1e3))
+    found = unlisted(
+        BlockModel(blocks, J, noise, np.zeros(count, dtype=bool)), WrenchPrior(1.0, 1e3)
+    )
     variance = np.diagonal(found, axis1=1, axis2=2)[:, :3]
     assert np.all(variance > 0.0)
     assert np.all(variance <= 0.1 + 1.44 * 10.0 + 1e-2)

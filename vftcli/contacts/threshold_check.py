@@ -10,13 +10,18 @@ from vftcli.contacts.tail import SETTLING, events
 from vftcli.contacts.thresholds import ComparedSignals, Thresholds, worst_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.wrench import AXES, ExternalTorque, Wrench
-from vftcli.virtual_sensor.contact import EARLY, ContactInterval, match_contacts
-from vftcli.virtual_sensor.detection import TRUE_TORQUE, true_intervals
+from vftcli.signals.wrench import AXES, Wrench
+from vftcli.virtual_sensor.detection import (
+    EARLY,
+    TRUE_TORQUE,
+    ContactInterval,
+    match_contacts,
+    true_intervals,
+)
 
 
 class CheckedContact(NamedTuple):
-    """A contact of a log, and whether the thresholds tell it."""
+    """A contact of a log, and whether the thresholds detect it."""
 
     start: float  #: When it begins. [s]
     stop: float  #: When it ends. [s]
@@ -24,16 +29,16 @@ class CheckedContact(NamedTuple):
     delay: float  #: From its start to the first alarm; NaN where there is none, or no truth. [s]
     by: str  #: The joint or axis that raises the alarm, "" where there is none.
     #: Whether none begins because one was on already, left over from a contact before.
-    was_on: bool = False
+    already_above: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
-class ContactCheck:
+class ThresholdDetection:
     """What thresholds would have done along a log with contacts."""
 
     log: str  #: The log.
-    #: What says where the contacts are, None where nothing does: then the alarms themselves stand
-    #: for them.
+    #: What says where the contacts are, None where nothing does: then the alarms themselves are
+    #: listed as contacts.
     reference: str | None = None
     contacts: tuple[CheckedContact, ...]  #: The contacts, in the order of time.
     #: Alarms that touch no contact, None where nothing says where they are.
@@ -42,29 +47,29 @@ class ContactCheck:
     remarks: tuple[Remark, ...]  #: What a reader of the numbers should know.
 
     @property
-    def caught(self) -> tuple[CheckedContact, ...]:
-        """Those that an alarm tells."""
+    def detected(self) -> tuple[CheckedContact, ...]:
+        """Those that raise an alarm."""
         return tuple(contact for contact in self.contacts if contact.by)
 
     @property
     def median_delay(self) -> float:
-        """Of those that are caught, NaN if none is. [s]"""
-        return float(np.median([c.delay for c in self.caught])) if self.caught else float("nan")
+        """Of those detected, NaN if none is. [s]"""
+        return float(np.median([c.delay for c in self.detected])) if self.detected else float("nan")
 
     @property
     def longest_delay(self) -> float:
-        """Of those that are caught, NaN if none is. [s]"""
-        return max((c.delay for c in self.caught), default=float("nan"))
+        """Of those detected, NaN if none is. [s]"""
+        return max((c.delay for c in self.detected), default=float("nan"))
 
     @property
-    def smallest_caught(self) -> float:
-        """Peak force of the weakest contact that is caught, NaN if none's is known. [N]"""
-        return float(np.fmin.reduce([c.peak_force for c in self.caught], initial=np.nan))
+    def smallest_detected(self) -> float:
+        """Peak force of the weakest contact that is detected, NaN if none's is known. [N]"""
+        return float(np.fmin.reduce([c.peak_force for c in self.detected], initial=np.nan))
 
     @property
     def largest_missed(self) -> float:
-        """Peak force of the hardest contact that is not caught, NaN if there is none. [N]"""
-        missed = [c.peak_force for c in self.contacts if not (c.by or c.was_on)]
+        """Peak force of the hardest contact that is not detected, NaN if there is none. [N]"""
+        missed = [c.peak_force for c in self.contacts if not (c.by or c.already_above)]
         return float(np.fmax.reduce(missed, initial=np.nan))
 
 
@@ -73,11 +78,12 @@ def check_contacts(
     thresholds: Thresholds,
     reference: ExternalTorque | None,
     wrench: Wrench | None,
-) -> ContactCheck:
+) -> ThresholdDetection:
     """What thresholds would have done along a log: every joint and every axis may raise the alarm.
 
-    A contact is caught if a signal passes its threshold while it lasts; one that has stayed beyond
-    it since before says nothing of it. Contacts that are over before the settling are left out.
+    A contact is detected if a signal passes its threshold while it lasts; one that has stayed
+    beyond it since before says nothing of it. Contacts that are over before the settling are left
+    out.
     """
     t, duration = signals.t, signals.recording.duration - SETTLING
     level = np.column_stack([thresholds.level(name, signals) for name in ("joints", "axes")])
@@ -86,10 +92,10 @@ def check_contacts(
     own = [(n, one) for n, x in zip(names, level.T, strict=False) for one in events(t, x)]
     own.sort(key=lambda alarm: alarm[1].start)
     if reference is None:
-        told = [checked(alarm, t, signals.force, own) for alarm in alarms]
-        return ContactCheck(
+        listed = [checked(alarm, t, signals.force, own) for alarm in alarms]
+        return ThresholdDetection(
             log=signals.recording.name,
-            contacts=tuple(contact._replace(delay=float("nan")) for contact in told),
+            contacts=tuple(contact._replace(delay=float("nan")) for contact in listed),
             remarks=(caution("check-without-truth"),),
         )
     floor = 0.0 if reference.floor is None else np.nan_to_num(reference.floor)
@@ -97,7 +103,7 @@ def check_contacts(
     true = [c for c in true_intervals(t, reference.tau, limits) if c.stop >= t[0] + SETTLING]
     size = np.zeros((len(t), 0)) if wrench is None else np.linalg.norm(wrench.force, axis=1)
     touched = sum(c.stop - max(c.start, float(t[0]) + SETTLING) for c in true)
-    return ContactCheck(
+    return ThresholdDetection(
         log=signals.recording.name,
         reference=reference.name,
         contacts=tuple(checked(c, t, size, own) for c in true),
@@ -113,7 +119,7 @@ def checked(
     size: Array,
     alarms: Sequence[tuple[str, ContactInterval]],
 ) -> CheckedContact:
-    """A contact with its peak force, and who raises the first alarm within it.
+    """A contact with its peak force, and who raises the first of the alarms within it.
 
     Args:
         contact: From and to. [s]
@@ -121,13 +127,13 @@ def checked(
         size: Size of the force, NaN where it is not known. (T, …) [N]
         alarms: Who raises them and when, in the order of time.
     """
-    there = size[(t >= contact.start) & (t <= contact.stop)]
-    peak = float(np.fmax.reduce(there[np.isfinite(there)], initial=np.nan))
+    force = size[(t >= contact.start) & (t <= contact.stop)]
+    peak = float(np.fmax.reduce(force[np.isfinite(force)], initial=np.nan))
     begun = [
         (max(alarm.start - contact.start, 0.0), by)
         for by, alarm in alarms
         if contact.start - EARLY <= alarm.start <= contact.stop
     ]
     delay, by = begun[0] if begun else (float("nan"), "")
-    was_on = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
-    return CheckedContact(*contact, peak, delay, by, was_on)
+    above = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
+    return CheckedContact(*contact, peak, delay, by, above)

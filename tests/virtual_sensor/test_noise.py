@@ -13,7 +13,8 @@ from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
-from vftcli.virtual_sensor.smoother.noise import (
+from vftcli.signals.terms import DynamicsTerms
+from vftcli.virtual_sensor.model_error import (
     ASSUMED_SHARE,
     UNSEEN_SHARE,
     fit_spectrum,
@@ -104,7 +105,7 @@ def test_rest_and_joints_that_never_moved_have_the_drives_share() -> None:
     np.testing.assert_allclose(found.moving[:3], 1.25, rtol=0.4)
     np.testing.assert_array_less((UNSEEN_SHARE * dry[3:]) ** 2 + 0.8, found.moving[3:])
     assert np.all(found.moving_time[3:] >= 1.0)
-    variance, time = found.course(blocks(np.zeros((1, 6))))
+    variance, time = found.stationary(blocks(np.zeros((1, 6))))
     np.testing.assert_array_less((REST_SHARE * dry) ** 2 - 1e-12, variance[0])
     assert np.all(time >= 2.0)
     assert found.free_seconds == pytest.approx(60.0, abs=2.0)  # from first to last motion
@@ -132,7 +133,7 @@ def test_without_free_motion_the_dry_friction_is_taken_and_said() -> None:
         assert found.free_seconds == 0.0
         dry = dry_torques(UR5)
         np.testing.assert_allclose(found.moving, np.maximum(ASSUMED_SHARE * dry, 0.3) ** 2)
-        resting = found.course(blocks(np.zeros((1, 6))))[0][0]
+        resting = found.stationary(blocks(np.zeros((1, 6))))[0][0]
         np.testing.assert_allclose(resting, np.maximum(REST_SHARE * dry, 0.3) ** 2)
         # a median over 48 bends of three blocks each
         np.testing.assert_allclose(found.white, 0.04, rtol=0.7)
@@ -145,7 +146,7 @@ def test_near_a_rest_stiction_counts_where_it_is_assumed() -> None:
     assumed = torque_noise(log, [], UR5, SECONDS)
     assert assumed.near == NEAR_REST
     for near, expected in ((2.5 * SECONDS, range(18, 27)), (0.0, range(20, 25))):
-        variance = replace(assumed, near=near).course(log)[0][:, 2]
+        variance = replace(assumed, near=near).stationary(log)[0][:, 2]
         assert np.flatnonzero(variance > variance[0]).tolist() == list(expected)
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.virtual_sensor.smoother.noise import TorqueNoise
-from vftcli.virtual_sensor.smoother.prior import GRID, LEVER, WrenchPrior, gated, wrench_model
+from vftcli.virtual_sensor.model_error import TorqueNoise
+from vftcli.virtual_sensor.smoother import GRID, LEVER, BlockModel, WrenchPrior, gated
 
 COUNT, SECONDS = 30, 0.1
 T = SECONDS * (np.arange(COUNT) + 0.5)
@@ -27,7 +27,7 @@ PRIOR = WrenchPrior(2.0, 30.0)
 
 def moves(blocks: Blocks, inside: Mask) -> tuple[Array, Array]:
     """Decay and added variance of wrench and model error under `PRIOR`. (K, 12) each"""
-    model = wrench_model(blocks, np.zeros((COUNT, 6, 6)), NOISE, [PRIOR], inside)
+    model = BlockModel(blocks, np.zeros((COUNT, 6, 6)), NOISE, inside).under([PRIOR])
     return model.decay[:, 0], model.added[:, 0]
 
 

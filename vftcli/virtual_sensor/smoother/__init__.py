@@ -1,1 +1,0 @@
-"""The wrench smoother: one linear model of wrench and model error along the whole log."""
