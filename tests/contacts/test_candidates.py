@@ -15,7 +15,7 @@ from vftcli.contacts.candidates import (
 from vftcli.contacts.search import turned_round
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.model_error import error_process
 
 

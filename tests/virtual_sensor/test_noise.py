@@ -13,7 +13,6 @@ from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.run import RunSamples
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
-from vftcli.signals.terms import DynamicsTerms
 from vftcli.virtual_sensor.model_error import (
     ASSUMED_SHARE,
     UNSEEN_SHARE,

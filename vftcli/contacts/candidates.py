@@ -21,6 +21,7 @@ import numpy as np
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.series import covered, intervals
 from vftcli.virtual_sensor.model_error import ErrorProcess, steps
 
 #: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]

@@ -23,6 +23,7 @@ from vftcli.contacts.windows import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.series import covered
 from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, innovations
 from vftcli.virtual_sensor.smoother import WrenchPrior
 

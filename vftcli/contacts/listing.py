@@ -38,6 +38,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
+from vftcli.signals.series import covered
 from vftcli.virtual_sensor.model_error import UNKNOWN, UNSEEN_SHARE, error_process
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]

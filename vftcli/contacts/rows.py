@@ -26,7 +26,7 @@ from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import median_step
+from vftcli.signals.series import covered, median_step
 from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, error_model, error_process
 from vftcli.virtual_sensor.smoother import BENT, WrenchPrior, hidden_by_blocks
 

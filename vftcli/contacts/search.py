@@ -14,7 +14,7 @@ from vftcli.contacts.windows import BlockLog, BlockSpan
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
-from vftcli.signals.intervals import runs_of
+from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.model_error import UNKNOWN, TorqueNoise, error_process, spiked_white
 from vftcli.virtual_sensor.smoother import WrenchPrior
 

@@ -20,7 +20,7 @@ from vftcli.contacts.windows import (
     window_of,
 )
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.intervals import covered, runs_of
+from vftcli.signals.series import covered, runs_of
 from vftcli.virtual_sensor.smoother import WrenchPrior
 
 START = WrenchPrior(0.3, 30.0, 3.0)  #: The prior that learning starts from.

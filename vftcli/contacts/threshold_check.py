@@ -10,7 +10,7 @@ from vftcli.contacts.tail import SETTLING, events
 from vftcli.contacts.thresholds import ComparedSignals, Thresholds, worst_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.wrench import AXES, Wrench
+from vftcli.signals.wrench import AXES, ExternalTorque, Wrench
 from vftcli.virtual_sensor.detection import (
     EARLY,
     TRUE_TORQUE,

@@ -28,7 +28,7 @@ from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
-from vftcli.signals.series import median_step
+from vftcli.signals.series import covered, median_step, near, runs_of
 from vftcli.virtual_sensor.model_error import (
     DRY_SHARE,
     LEAST_ERROR,

@@ -25,7 +25,6 @@ from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import DynamicsTerms, dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
-from vftcli.signals.terms import DynamicsTerms
 from vftcli.virtual_sensor.smoother import smooth_wrench
 
 SAMPLES = 30_060  #: Samples of the paper's Table II.

@@ -10,13 +10,13 @@ import numpy as np
 from vftcli.observers.observer import Observer
 from vftcli.repetition.free_load import FreeLoad, without_load
 from vftcli.repetition.free_motion import FreeMotion
+from vftcli.robots.chain import link_poses
 from vftcli.robots.disturbance import disturbance_impulse
-from vftcli.robots.kinematics import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.series import resample_columns

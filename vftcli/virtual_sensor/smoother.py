@@ -19,10 +19,9 @@ from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
-from vftcli.signals.intervals import covered, runs_of
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.series import median_step, resample_columns
+from vftcli.signals.series import covered, median_step, resample_columns, runs_of
 from vftcli.virtual_sensor.model_error import TorqueNoise, steps, torque_noise
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
