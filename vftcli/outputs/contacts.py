@@ -22,7 +22,7 @@ from vftcli.outputs.quantity import banded
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, Where
-from vftcli.virtual_sensor.smoother.prior import WrenchPrior
+from vftcli.virtual_sensor.smoother import WrenchPrior
 
 MOST_ROWS = 20  #: Rows on the terminal unless all are asked for.
 
