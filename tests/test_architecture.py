@@ -64,7 +64,6 @@ FILES = (
     "robots/writing.py",
     "robots/xml_text.py",
     "signals/remarks.py",  # the catalogue of words
-    "simulation/load.py",
     "simulation/scenario.py",
     "simulation/writers/",
 )

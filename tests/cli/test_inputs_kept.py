@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.cli import options
 from vftcli.robots import PROFILES
-from vftcli.simulation.load import FOLDER
+from vftcli.simulation.scenario import FOLDER
 
 SIMULATE = ("simulate", "ur5-circle", "--as", "rosbag2", "--set", "duration=1", "-o", "bag")
 FIXTURE = Path(__file__).parent.parent.parent / "fixtures" / "ur5_circle.csv"

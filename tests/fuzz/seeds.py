@@ -139,7 +139,7 @@ def jacobian_table(path: Path) -> Path:
 def robot_seeds(folder: Path) -> Iterator[Seed]:
     """Robot files, gains and scenarios."""
     import vftcli.robots
-    import vftcli.simulation.load
+    import vftcli.simulation.scenario
 
     for name in ("ur5", "panda"):
         path = folder / f"{name}.toml"
@@ -155,7 +155,7 @@ def robot_seeds(folder: Path) -> Iterator[Seed]:
     yield Seed("gains", "gains", folder / "gains.toml")
     for name in ("ur5-circle", "panda-bearing", "ur5-sensor"):
         path = folder / f"{name}.scenario.toml"
-        text = (vftcli.simulation.load.FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+        text = (vftcli.simulation.scenario.FOLDER / f"{name}.toml").read_text(encoding="utf-8")
         path.write_text(text, encoding="utf-8")
         yield Seed(f"scenario-{name}", "scenario", path)
 

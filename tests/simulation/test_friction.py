@@ -68,7 +68,7 @@ def test_warmth_changes_all_but_the_offset():
     friction = true_friction(load_robot("ur10e"), FrictionSpec(presliding=0.5))
     friction = replace(friction, offset=np.full(6, 0.3))
     factor = np.linspace(0.7, 1.2, 6)
-    warm, dq = friction.warmed(factor), np.linspace(-1.0, 1.5, 6)
+    warm, dq = friction.times(factor, factor), np.linspace(-1.0, 1.5, 6)
     np.testing.assert_allclose(warm.smooth(dq)[0] - 0.3, factor * (friction.smooth(dq)[0] - 0.3))
     np.testing.assert_allclose(warm.dry(dq, 9.0 * dq), factor * friction.dry(dq, 9.0 * dq))
     np.testing.assert_allclose(warm.presliding, factor * friction.presliding)

@@ -13,8 +13,7 @@ from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot
 from vftcli.signals.errors import OutputError, ParameterError
 from vftcli.simulation import Simulation, load_scenario, simulate
-from vftcli.simulation.writers import WRITERS, vendor_format
-from vftcli.simulation.writers.tables import TRUTH_FRAME
+from vftcli.simulation.writers import TRUTH_FRAME, WRITERS, vendor_format
 
 LOSSY = ["duration=2.0", "sensing.repeated=0.02", "sensing.dropped=0.02"]
 

@@ -6,7 +6,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.arm import build_arm, deviate, perturbed_friction
+from vftcli.simulation.arm import build_arm, deviate
 from vftcli.simulation.scenario import MismatchSpec
 
 UR5 = load_robot("ur5")
@@ -46,8 +46,7 @@ def test_each_size_moves_its_own_parameters():
 
 def test_dry_and_viscous_friction_err_apart():
     friction = arm(*NOTHING).friction
-    sizes = MismatchSpec(friction=0.1)
-    other = perturbed_friction(friction, sizes, np.random.default_rng(4))
+    other = arm(*NOTHING, "mismatch.friction=0.1").friction
     dry = other.coulomb / friction.coulomb
     for wet in other.bend_slopes / friction.bend_slopes:
         assert np.all(np.abs(dry - wet) > 1e-6)

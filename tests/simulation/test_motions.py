@@ -7,9 +7,9 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import load_scenario
-from vftcli.simulation.motion import Command
 from vftcli.simulation.trajectories import (
     CircleSpec,
+    Command,
     HoldSpec,
     JointMovesSpec,
     JointwiseSpec,
@@ -31,7 +31,7 @@ SPECS = [
 ]
 
 
-@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.KIND)
+@pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.kind)
 def test_derivatives_are_those_of_the_positions(spec: object) -> None:
     motion: Command = spec.motion(load_robot("ur5"))  # type: ignore[attr-defined]
     t, h = np.linspace(0.05, min(motion.duration, 6.0) - 0.05, 400), 1e-5

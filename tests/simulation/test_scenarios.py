@@ -9,8 +9,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError, VftError
 from vftcli.simulation import load_scenario, scenario_names, simulate
-from vftcli.simulation.load import section_from, to_toml
-from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.scenario import Scenario, section_from, to_toml
 from vftcli.simulation.trajectories import plan
 
 NAMES = (

@@ -7,9 +7,9 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.motion import Reference
+from vftcli.simulation.arm import Servo, rigid_torque
 from vftcli.simulation.scenario import ServoSpec
-from vftcli.simulation.servo import Servo, rigid_torque
+from vftcli.simulation.trajectories import Reference
 
 ROBOT = load_robot("ur5")
 RNG = np.random.default_rng(0)

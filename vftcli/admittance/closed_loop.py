@@ -26,10 +26,9 @@ from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Progress, Simulation, observe
-from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants, log_rate, noise_sizes, rounded
-from vftcli.simulation.trajectories import plan
+from vftcli.simulation.trajectories import Reference, plan
 from vftcli.virtual_sensor.solvers import wrench_of
 
 FARTHEST = 3.0  #: A flange this far from its start has run away. [m]
@@ -269,7 +268,7 @@ def run_closed_loop(
                 break
             if progress is not None:
                 progress(k, arm.steps)
-        arm.step(reference.q[0], reference.dq[0], reference.ddq[0], forward)
+        arm.command(reference.q[0], reference.dq[0], reference.ddq[0], forward)
     return closed_loop_of(loop, log, zero)
 
 

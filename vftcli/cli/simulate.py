@@ -42,7 +42,7 @@ def simulate_log(
     from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate_pair
-    from vftcli.simulation.load import listing
+    from vftcli.simulation.scenario import listing
     from vftcli.simulation.writers import usual_format
 
     if scenario == "list":

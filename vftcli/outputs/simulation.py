@@ -9,7 +9,7 @@ from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.log.run_record import seal, versions
 from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.load import to_toml
+from vftcli.simulation.scenario import to_toml
 
 
 def free_path(path: Path) -> Path:
@@ -71,8 +71,7 @@ def save(
 
 def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
     """Write one log and its companions into a folder."""
-    from vftcli.simulation.writers import WRITERS
-    from vftcli.simulation.writers.tables import write_truth
+    from vftcli.simulation.writers import WRITERS, write_truth
 
     truth, scenario, record = (file.name for file in companions(path))
     with table_file(folder / path.name) as file:

@@ -2,8 +2,7 @@
 
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.experiment import Simulation, Truth, observe, prepare, simulate
-from vftcli.simulation.load import load_scenario, scenario_names
-from vftcli.simulation.scenario import Scenario
+from vftcli.simulation.scenario import Scenario, load_scenario, scenario_names
 
 __all__ = [
     "Arm",

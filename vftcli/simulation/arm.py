@@ -7,18 +7,22 @@ import numpy as np
 
 from vftcli.robots import Payload, Robot, load_robot
 from vftcli.robots.chain import Chain
-from vftcli.robots.friction import COLDEST, WARMEST, friction_factor
+from vftcli.robots.friction import COLDEST, WARMEST, friction_factor, friction_torque
 from vftcli.robots.robot import REFERENCE
 from vftcli.robots.robot_file import out_of_bounds
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import check_known
 from vftcli.simulation.contacts import Touching
-from vftcli.simulation.friction import DRY, WET, TrueFriction, true_friction
-from vftcli.simulation.motion import Reference
+from vftcli.simulation.friction import TrueFriction, true_friction
 from vftcli.simulation.plant import Plant
-from vftcli.simulation.scenario import MismatchSpec, PayloadSpec, Scenario
-from vftcli.simulation.servo import Servo
+from vftcli.simulation.scenario import PayloadSpec, Scenario, ServoSpec
+from vftcli.simulation.trajectories import Reference
 
+#: Natural frequency of the position loop by name. [rad/s]
+STIFFNESS = {"stiff": 90.0, "soft": 28.0}
+#: Largest natural frequency times step: beyond it the sampled loop is badly damped or unstable.
+FASTEST_LOOP = 0.4
 WARMING_STEPS = 250  #: Inner steps between two updates of the friction's temperature.
 CHECK_STEPS = 10  #: Inner steps between two looks at whether the arm still moves like an arm.
 RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
@@ -26,6 +30,65 @@ RUNAWAY = 200.0  #: Joint velocity no arm reaches. [rad/s]
 LARGEST_SHARE = 0.45
 #: Deviations that are not relative, and their largest. [m, N·m]
 ABSOLUTE = {"com": 1.0, "torque_offset": 1e4}
+
+
+class Servo:
+    """τ = τ_ff + M(q) (ω² (q_d − q) + 2ζω (q̇_d − q̇)), saturated at the drives' limits.
+
+    With the nominal inertia as gain one number sets the stiffness, and every mode of the arm has
+    the same bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
+
+    Attributes:
+        omega: Natural frequency ω of the loop. [rad/s]
+        limit: Torque limits; infinite where unknown. (n,) [N·m]
+        q_min, q_max: Joint limits, likewise. (n,) [rad]
+    """
+
+    def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
+        import pinocchio as pin
+
+        self.inertia = pin.crba
+        omega = spec.stiffness
+        if isinstance(omega, str):
+            check_known(omega, STIFFNESS, f"no servo.stiffness {omega!r}")
+            omega = STIFFNESS[omega]
+        if omega <= 0 or spec.damping < 0:
+            raise ParameterError("servo.stiffness must be positive and damping not negative")
+        if omega * step > FASTEST_LOOP:
+            raise ParameterError(
+                f"servo.stiffness {omega:g} rad/s chatters at a step of {step:g} s; it can be at "
+                f"most {FASTEST_LOOP / step:g}, or choose a smaller step"
+            )
+        self.spec, self.robot = spec, robot
+        self.model, self.data = robot.model, robot.model.createData()
+        self.omega, self.rate = omega, 2.0 * spec.damping * omega
+        limits = robot.limits
+        self.limit = np.fmin(limits.tau_max if spec.torque_limits else np.inf, np.inf)
+        self.q_min, self.q_max = np.fmax(limits.q_min, -np.inf), np.fmin(limits.q_max, np.inf)
+
+    def feed_forward(self, reference: Reference) -> Array:
+        """Nominal torque along a reference; gravity only if so asked. (T, n) [N·m]"""
+        rest = np.zeros_like(reference.q)
+        full = self.spec.feed_forward
+        dq, ddq = (reference.dq, reference.ddq) if full else (rest, rest)
+        rigid = rigid_torque(self.model, Reference(reference.q, dq, ddq))
+        return rigid + friction_torque(self.robot.friction, dq)
+
+    def torque(self, forward: Array, q_d: Array, dq_d: Array, q: Array, dq: Array) -> Array:
+        """The commanded torque at a state (q, dq) for a target, within the limits. (n,) [N·m]"""
+        pull = self.omega**2 * (q_d - q) + self.rate * (dq_d - dq)
+        tau: Array = forward + self.inertia(self.model, self.data, q) @ pull
+        return np.minimum(np.maximum(tau, -self.limit), self.limit)
+
+
+def rigid_torque(model: Any, reference: Reference) -> Array:  # noqa: ANN401
+    """Inverse dynamics of a Pinocchio model along a motion. (T, n) [N·m]"""
+    import pinocchio as pin
+
+    data, out = model.createData(), np.empty_like(reference.q)
+    for k, (q, dq, ddq) in enumerate(zip(*reference, strict=True)):
+        out[k] = pin.rnea(model, data, q, dq, ddq)
+    return out
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +129,7 @@ class History(JointSignals):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `step` and reads `q`, `v` and `mean_torque`.
+    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`.
 
     Attributes:
         scenario: The experiment.
@@ -124,23 +187,28 @@ class Arm:
         """True velocities now. (n,) [rad/s]"""
         return self.plant.v
 
-    def command(self, q_d: Array, dq_d: Array | None = None, ddq_d: Array | None = None) -> None:
-        """Make one inner step with the servo's own feed-forward.
+    def command(
+        self,
+        q_d: Array,
+        dq_d: Array | None = None,
+        ddq_d: Array | None = None,
+        forward: Array | None = None,
+    ) -> None:
+        """Make one inner step.
 
         Args:
-            q_d: Commanded positions, brought to the joint limits. (n,) [rad]
+            q_d: Commanded positions. (n,) [rad]
             dq_d: Commanded velocities, zero if not given. (n,) [rad/s]
             ddq_d: Commanded accelerations, zero if not given. (n,) [rad/s²]
+            forward: Feed-forward torque; if not given the servo's own, the positions brought to the
+                joint limits. (n,) [N·m]
         """
-        rows = np.zeros((3, len(self.q)))
-        rows[0] = np.clip(q_d, self.servo.q_min, self.servo.q_max)
-        rows[1] = 0.0 if dq_d is None else dq_d
-        rows[2] = 0.0 if ddq_d is None else ddq_d
-        forward = self.servo.feed_forward(Reference(*rows[:, None]))[0]
-        self.step(rows[0], rows[1], rows[2], forward)
-
-    def step(self, q_d: Array, dq_d: Array, ddq_d: Array, forward: Array) -> None:
-        """Make one inner step with a feed-forward torque (n,) [N·m]."""
+        rest = np.zeros_like(q_d)
+        dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d
+        if forward is None:
+            q_d = np.clip(q_d, self.servo.q_min, self.servo.q_max)
+            reference = Reference(q_d[None], dq_d[None], ddq_d[None])
+            forward = self.servo.feed_forward(reference)[0]
         history, plant, k = self.history, self.plant, self.made
         if k >= self.steps:
             raise ParameterError(f"the run was prepared for {self.steps} steps and has made them")
@@ -151,7 +219,7 @@ class Arm:
         if k % WARMING_STEPS == 0:
             temperature = self.temperature(np.array([t]))
             if (factor := friction_factor(self.robot.friction, temperature)) is not None:
-                plant.true_friction = self.true.friction.warmed(factor[0])
+                plant.true_friction = self.true.friction.times(factor[0], factor[0])
         # Contacts cost Jacobians; most steps have none.
         if self.touching.anything(t):
             plant.advance(tau, lambda m, data, v: self.touching.torque(t, m, data, v))
@@ -226,13 +294,23 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
         most = ABSOLUTE.get(name, LARGEST_SHARE)
         if not 0 <= size <= most:
             raise ParameterError(f"mismatch.{name} is {size:g}; it lies within 0 to {most:g}")
-    chain = perturbed_chain(robot.loaded_chain, sizes, rng)
-    friction = perturbed_friction(true_friction(robot, scenario.friction), sizes, rng)
+    nominal = chain = robot.loaded_chain
+    mass = 1.0 + deviate(rng, sizes.mass, (n,))
+    com = deviate(rng, sizes.com, (n, 3))
+    rotor = 1.0 + deviate(rng, sizes.rotor_inertia, (n,))
+    chain = replace(
+        chain,
+        mass=chain.mass * mass,
+        com=chain.com + com,
+        inertia=chain.inertia * mass[:, None, None],
+        rotor_inertia=chain.rotor_inertia * rotor,
+    )
+    dry, wet = (1.0 + deviate(rng, sizes.friction, (n,)) for _ in range(2))
+    friction = true_friction(robot, scenario.friction).times(dry, wet)
     gain = 1.0 + deviate(rng, sizes.torque_constant, (n,))
     offset = deviate(rng, sizes.torque_offset, (n,))
     # Drawn whether or not there is a payload, so that other draws do not move.
     scale = 1.0 + float(deviate(rng, sizes.payload, (1,))[0])
-    nominal = robot.loaded_chain
     if scenario.payload is not None:
         chain = chain.with_payload(as_payload(scenario.payload, scale))
         if scenario.payload.known:
@@ -246,28 +324,3 @@ def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> Tru
             nominal = nominal.with_payload(body)
     believed = replace(robot, chain=nominal, payload=None)
     return TrueArm(chain=chain, friction=friction, gain=gain, offset=offset, nominal=believed)
-
-
-def perturbed_chain(chain: Chain, sizes: MismatchSpec, rng: np.random.Generator) -> Chain:
-    """A chain with erring masses, centres of mass and rotor inertias."""
-    n = chain.joints
-    mass = 1.0 + deviate(rng, sizes.mass, (n,))
-    com = deviate(rng, sizes.com, (n, 3))
-    rotor = 1.0 + deviate(rng, sizes.rotor_inertia, (n,))
-    return replace(
-        chain,
-        mass=chain.mass * mass,
-        com=chain.com + com,
-        inertia=chain.inertia * mass[:, None, None],
-        rotor_inertia=chain.rotor_inertia * rotor,
-    )
-
-
-def perturbed_friction(
-    friction: TrueFriction, sizes: MismatchSpec, rng: np.random.Generator
-) -> TrueFriction:
-    """Friction whose dry and viscous levels err independently."""
-    n = len(friction.coulomb)
-    dry, wet = (1.0 + deviate(rng, sizes.friction, (n,)) for _ in range(2))
-    levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}
-    return replace(friction, **{name: getattr(friction, name) * k for name, k in levels.items()})

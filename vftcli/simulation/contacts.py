@@ -4,6 +4,7 @@ A contact acts ON the robot at `point` of a `link` (0: the flange), in base axes
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +14,6 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import cross
-from vftcli.simulation.motion import minimum_jerk
 from vftcli.simulation.scenario import (
     ContactSpec,
     HandSpec,
@@ -23,6 +23,7 @@ from vftcli.simulation.scenario import (
     StopSpec,
     WrenchSpec,
 )
+from vftcli.simulation.trajectories import minimum_jerk
 
 
 class Place(NamedTuple):
@@ -34,23 +35,21 @@ class Place(NamedTuple):
     spin: Array  #: Angular velocity of the link. (3,) [rad/s]
 
 
-def ramp(t: float, start: float, rise: float, stop: float, fall: float) -> float:
-    """A rounded trapezoid: 0, up from `start` within `rise`, down by `stop` within `fall`."""
-    if t <= start or t >= stop:
-        return 0.0
-    up = 1.0 if rise <= 0 else min((t - start) / rise, 1.0)
-    down = 1.0 if fall <= 0 else min((stop - t) / fall, 1.0)
-    return 0.25 * (1.0 - math.cos(math.pi * up)) * (1.0 - math.cos(math.pi * down))
-
-
 class Push(NamedTuple):
-    """One application of a wrench (6,) [N, N·m] from `start` to `stop` [s]."""
+    """One application of a wrench, a rounded trapezoid in time."""
 
-    start: float
-    stop: float
-    rise: float
-    fall: float
-    wrench: Array
+    start: float  #: Where it begins. [s]
+    stop: float  #: Where it ends. [s]
+    rise: float  #: Time to the full wrench. [s]
+    fall: float  #: Time of the release. [s]
+    wrench: Array  #: At its full size. (6,) [N, N·m]
+
+    def at(self, t: float) -> Array:
+        """The wrench at a time between start and stop. (6,) [N, N·m]"""
+        up = 1.0 if self.rise <= 0 else min((t - self.start) / self.rise, 1.0)
+        down = 1.0 if self.fall <= 0 else min((self.stop - t) / self.fall, 1.0)
+        size = 0.25 * (1.0 - math.cos(math.pi * up)) * (1.0 - math.cos(math.pi * down))
+        return size * self.wrench
 
 
 class Segments:
@@ -78,8 +77,7 @@ class Segments:
         push = self.current(t)
         if push is None:
             return np.zeros(6)
-        size = ramp(t, push.start, push.rise, push.stop, push.fall)
-        wrench = size * push.wrench
+        wrench = push.at(t)
         if self.in_link:
             return np.concatenate([place.rotation @ wrench[:3], place.rotation @ wrench[3:]])
         return wrench
@@ -156,8 +154,9 @@ class Hand:
         spec = self.spec
         u = min((t - spec.spans[k][0]) / spec.reach, 1.0) if spec.reach > 0 else 1.0
         way = minimum_jerk(u)
-        move = np.array(spec.moves[k]) if spec.moves else np.zeros(3)
-        turn = np.array(spec.turns[k]) if spec.turns else np.zeros(3)
+        move, turn = (
+            np.array(rows[k]) if rows else np.zeros(3) for rows in (spec.moves, spec.turns)
+        )
         gap = self.held_at + way * move - place.position
         force = spec.stiffness * gap - spec.damping * place.velocity
         torque = -spec.twist_damping * place.spin
@@ -176,14 +175,12 @@ class Stop(NamedTuple):
 
     spec: StopSpec  #: Its plane.
 
-    def active(self, t: float) -> bool:
+    def active(self, _t: float) -> bool:
         """A stop is always there; whether it is met shows in its wrench."""
-        del t
         return True
 
-    def wrench(self, t: float, place: Place) -> Array:
+    def wrench(self, _t: float, place: Place) -> Array:
         """Push along the normal, never a pull. (6,) [N, N·m]"""
-        del t
         spec = self.spec
         normal = np.array(spec.normal) / float(np.linalg.norm(spec.normal))
         depth = float(normal @ (np.array(spec.through) - place.position))
@@ -225,38 +222,15 @@ class Mounted(NamedTuple):
     """A contact and the body it acts on."""
 
     name: str  #: The contact's name.
-    contact: Segments | Hand | Stop  #: What it exerts.
+    contact: Segments | Hand | Stop  #: Its forces.
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
-    on_flange: bool  #: Whether it acts on the flange.
-    lever: Array  #: The point in flange axes from the flange origin, for contacts there. (3,) [m]
-
-
-def mount(
-    spec: WrenchSpec,
-    chain: Chain,
-    rng: np.random.Generator,
-    duration: float,
-) -> Mounted:
-    """Put a contact on its link."""
-    if not 0 <= spec.link <= chain.joints:
-        raise ParameterError(
-            f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
-        )
-    contact, lever = started(spec, rng, duration), np.array(spec.point)
-    if spec.link == 0:
-        point = chain.flange_rotation @ lever + chain.flange_translation
-        return Mounted(spec.name, contact, chain.joints, chain.flange_rotation, point, True, lever)
-    return Mounted(spec.name, contact, spec.link, np.eye(3), lever, False, lever)
+    lever: Array | None  #: The point in flange axes of a contact on the flange. (3,) [m]
 
 
 def draw_walk(
-    spec: RandomWalkSpec,
-    joints: int,
-    steps: int,
-    step: float,
-    rng: np.random.Generator,
+    spec: RandomWalkSpec, joints: int, steps: int, step: float, rng: np.random.Generator
 ) -> Array:
     """A random walk of joint torques over `steps` inner steps of `step` [s]. (N, n) [N·m]"""
     if len(spec.intensity) not in {1, joints} or min(spec.intensity) < 0:
@@ -283,7 +257,7 @@ class Touching:
 
     def __init__(
         self,
-        specs: tuple[ContactSpec, ...],
+        specs: Sequence[ContactSpec],
         chain: Chain,
         steps: int,
         step: float,
@@ -299,8 +273,17 @@ class Touching:
         for spec, rng in zip(specs, rngs, strict=True):
             if isinstance(spec, RandomWalkSpec):
                 self.walks[spec.name] = draw_walk(spec, chain.joints, steps, step, rng)
-            else:
-                self.mounted.append(mount(spec, chain, rng, steps * step))
+                continue
+            if not 0 <= spec.link <= chain.joints:
+                raise ParameterError(
+                    f"contacts.{spec.name}.link is {spec.link}; it is 0 (flange) to {chain.joints}"
+                )
+            contact, point = started(spec, rng, steps * step), np.array(spec.point)
+            joint, turn, lever = spec.link, np.eye(3), None
+            if joint == 0:
+                joint, turn, lever = chain.joints, chain.flange_rotation, point
+                point = turn @ lever + chain.flange_translation
+            self.mounted.append(Mounted(spec.name, contact, joint, turn, point, lever))
         self.wrenches = np.zeros((len(self.mounted), 6))
         self.step = step
 

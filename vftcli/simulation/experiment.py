@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.contacts import joint_jacobian
-from vftcli.simulation.motion import Reference
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import (
     Measured,
@@ -27,7 +25,7 @@ from vftcli.simulation.sensing import (
     sample_run,
     vendor_view,
 )
-from vftcli.simulation.trajectories import plan
+from vftcli.simulation.trajectories import Reference, plan
 
 MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gigabyte of history.
 REPORT_STEPS = 500  #: Inner steps between two reports of progress.
@@ -157,7 +155,7 @@ def simulate(
         arm.seeds["sensing"] = np.random.SeedSequence(noise_seed)
     forward = arm.servo.feed_forward(reference)
     for k in range(arm.steps):
-        arm.step(reference.q[k], reference.dq[k], reference.ddq[k], forward[k])
+        arm.command(reference.q[k], reference.dq[k], reference.ddq[k], forward[k])
         if progress is not None and k % REPORT_STEPS == 0:
             progress(k, arm.steps)
     if progress is not None:
@@ -203,45 +201,32 @@ def simulate_pair(
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
-    touching, made = arm.touching, arm.made
+    import pinocchio as pin
+
+    touching, made, model = arm.touching, arm.made, arm.plant.model
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
     wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
     walk = np.zeros((made, arm.robot.joints))
     for each in touching.walks.values():
         walk += each[:made]
-    data = arm.plant.model.createData()
-    tau_ext, wrench = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
+    data, last = model.createData(), arm.robot.joints
+    tau_ext, flange = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
     for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
-        tau, flange = torque_and_wrench(arm, data, samples.q[k], wrenches[k])
-        tau_ext[k] += tau
-        wrench[k] = flange
-    contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if not m.on_flange}
+        pin.computeJointJacobians(model, data, samples.q[k])
+        tau = np.zeros(last)
+        for contact, wrench in zip(touching.mounted, wrenches[k], strict=True):
+            R = data.oMi[contact.joint].rotation
+            if contact.lever is not None:
+                flange[k] += at_other_point(wrench, R @ contact.turn @ contact.lever)
+            else:
+                J = joint_jacobian(model, data, contact.joint)
+                tau += J.T @ at_other_point(wrench, R @ contact.point)
+        offset = data.oMi[last].rotation @ arm.true.chain.flange_translation
+        J = joint_jacobian(model, data, last)
+        tau_ext[k] += tau + J.T @ at_other_point(flange[k], offset)
+    contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if m.lever is None}
     walks = {k: interpolate(samples.time, middle, w[:made]) for k, w in touching.walks.items()}
-    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=wrench, contacts=contacts, walks=walks)
-
-
-def torque_and_wrench(
-    arm: Arm,
-    data: Any,  # noqa: ANN401 - Pinocchio is untyped
-    q: Array,
-    wrenches: Array,
-) -> tuple[Array, Array]:
-    """Joint torque of all contacts (n,) [N·m] and the wrench of those on the flange (6,)."""
-    import pinocchio as pin
-
-    model, chain = arm.plant.model, arm.true.chain
-    pin.computeJointJacobians(model, data, q)
-    tau, flange = np.zeros(len(q)), np.zeros(6)
-    for contact, wrench in zip(arm.touching.mounted, wrenches, strict=True):
-        R = data.oMi[contact.joint].rotation
-        if contact.on_flange:
-            flange += at_other_point(wrench, R @ contact.turn @ contact.lever)
-        else:
-            J = joint_jacobian(model, data, contact.joint)
-            tau += J.T @ at_other_point(wrench, R @ contact.point)
-    last = len(q)
-    offset = data.oMi[last].rotation @ chain.flange_translation
-    return tau + joint_jacobian(model, data, last).T @ at_other_point(flange, offset), flange
+    return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=flange, contacts=contacts, walks=walks)
 
 
 def at_other_point(wrench: Array, lever: Array) -> Array:

@@ -102,9 +102,10 @@ class TrueFriction:
         """Names of what any joint has; what none has is left out of a step."""
         return frozenset(name for name in SHAPES if getattr(self, name).any())
 
-    def warmed(self, factor: Array) -> "TrueFriction":
-        """The friction, its offset apart, multiplied by a factor of each joint. (n,) [1]"""
-        return replace(self, **{name: getattr(self, name) * factor for name in (*DRY, *WET)})
+    def times(self, dry: Array, wet: Array) -> "TrueFriction":
+        """The friction, its offset apart, with other dry and viscous levels. (n,) each [1]"""
+        levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}
+        return replace(self, **{name: getattr(self, name) * k for name, k in levels.items()})
 
 
 def true_friction(robot: Robot, spec: FrictionSpec) -> TrueFriction:

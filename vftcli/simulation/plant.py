@@ -55,17 +55,12 @@ class Plant:
             raise ParameterError(
                 f"step is {step:g} s; the inner step must be above 0, at most {LARGEST_STEP:g} s"
             )
-        self.pin = pin
-        self.model, self.data = model, model.createData()
-        self.true_friction = friction
-        self.step = step
+        self.pin, self.model, self.data = pin, model, model.createData()
+        self.true_friction, self.step = friction, step
         self.q, self.v = np.array(q, dtype=float), np.array(v, dtype=float)
-        self.q_mid, self.v_mid = self.q.copy(), self.v.copy()
-        self.a = np.zeros_like(self.q)
+        self.q_mid, self.v_mid, self.centre = self.q.copy(), self.v.copy(), self.q.copy()
+        self.a, self.friction, self.external = np.zeros((3, len(self.q)))
         self.moved = False
-        self.centre = self.q.copy()
-        self.friction = np.zeros_like(self.q)
-        self.external = np.zeros_like(self.q)
         sticks = (friction.coulomb > 0.0) & (friction.presliding == 0.0)
         self.signs = np.where(sticks, np.sign(self.v), 1.0)
 
@@ -99,7 +94,11 @@ class Plant:
         dry = true.dry(self.v, load)
         if "presliding" in true.present:
             creeping, steep, dry = true.creep(self.v, dry)
-            smooth, slope = smooth + creeping + self.presliding(q_mid), slope + steep
+            # The play operator's centre follows the positions.
+            reach = true.presliding_length
+            self.centre = np.minimum(np.maximum(self.centre, q_mid - reach), q_mid + reach)
+            given = np.asarray(true.presliding * (q_mid - self.centre) / reach)
+            smooth, slope = smooth + creeping + given, slope + steep
         torque = tau - bias - smooth
         if external is not None:
             pin.computeJointJacobians(model, data, q_mid)
@@ -110,13 +109,6 @@ class Plant:
         self.friction = smooth + 0.5 * slope * (after - self.v) + impulse / h
         self.q_mid, self.v_mid = q_mid, v_mid
         return after
-
-    def presliding(self, q: Array) -> Array:
-        """Presliding friction at positions `q` (n,) [rad], which the play follows. (n,) [N·m]"""
-        true = self.true_friction
-        reach = true.presliding_length
-        self.centre = np.minimum(np.maximum(self.centre, q - reach), q + reach)
-        return np.asarray(true.presliding * (q - self.centre) / reach)
 
 
 def slide_or_stick(
@@ -175,12 +167,7 @@ def step_with_stuck_joints(
     return after, friction, better
 
 
-def gauss_seidel(
-    M: Array,
-    impulse: Array,
-    v: Array,
-    limit: Array,
-) -> tuple[Array, Array, Array]:
+def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
     """The same step by projected Gauss–Seidel, which always converges."""
     A = np.linalg.inv(M)
     free = v + A @ impulse

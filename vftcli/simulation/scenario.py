@@ -1,10 +1,41 @@
-"""Scenario: one simulated experiment, everything a user may set, as in its TOML file."""
+"""Scenarios: everything a user may set of a simulated experiment, from TOML and back."""
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+import types
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import MISSING, asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
+from vftcli.robots.writing import lines_of
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import (
+    LIST,
+    SWITCH,
+    TABLE,
+    TEXT,
+    WHOLE,
+    ValueKind,
+    assignment,
+    check_known,
+    is_finite,
+    toml_tables,
+)
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
+FOLDER = Path(__file__).parent / "scenarios"
+Section = TypeVar("Section")
+#: Largest number of a scenario in any unit; a clock that counts from 1970 begins below it.
+LARGEST = 1e10
+#: Type of a field → its kind.
+KINDS = {
+    bool: SWITCH,
+    float: ValueKind(
+        f"a finite number, {LARGEST:g} at most", lambda v: is_finite(v) and abs(v) <= LARGEST
+    ),
+    int: WHOLE,
+    str: TEXT,
+}
 Vector = tuple[float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -115,6 +146,7 @@ class SensingSpec:
 class OnLink:
     """Where a contact acts with a wrench."""
 
+    kind: str = field(default="", init=False)
     name: str  #: Name of the contact.
     link: int = 0  #: The link it acts on; 0 for the flange.
     point: Vector = ORIGIN  #: The point in the link's frame. (3,) [m]
@@ -124,7 +156,7 @@ class OnLink:
 class ProfileSpec(OnLink):
     """A stated wrench, switched on and off smoothly at stated times."""
 
-    KIND: ClassVar[str] = "profile"
+    kind: str = field(default="profile", init=False)
     spans: tuple[tuple[float, float], ...]  #: Start and end of each application. (K, 2) [s]
     force: Vector = ORIGIN  #: Force ON the robot. (3,) [N]
     torque: Vector = ORIGIN  #: Moment ON the robot about the point. (3,) [N·m]
@@ -137,7 +169,7 @@ class ProfileSpec(OnLink):
 class LoadSpec(OnLink):
     """A load hung on a string: its weight, pulling straight down at the point."""
 
-    KIND: ClassVar[str] = "load"
+    kind: str = field(default="load", init=False)
     weight: float  #: Weight. [N]
     spans: tuple[tuple[float, float], ...]  #: When it hangs. (K, 2) [s]
     rise: float = 0.5  #: Time in which the string takes the load. [s]
@@ -148,7 +180,7 @@ class LoadSpec(OnLink):
 class PushesSpec(OnLink):
     """Pushes of random strength and direction, as a hand gives them, drawn from the seed."""
 
-    KIND: ClassVar[str] = "pushes"
+    kind: str = field(default="pushes", init=False)
     style: str = "slow"  #: "slow", "taps" or "mixed"; the ranges below override its own.
     begin: float = 0.0  #: No push before this. [s]
     end: float = 0.0  #: No push after this; 0 for the end of the log. [s]
@@ -163,7 +195,7 @@ class PushesSpec(OnLink):
 class HandSpec(OnLink):
     """A hand that grabs the handle, moves, and lets go: a spring and damper to a moving anchor."""
 
-    KIND: ClassVar[str] = "hand"
+    kind: str = field(default="hand", init=False)
     #: When it grabs and when it lets go, one pair a grab. (K, 2) [s]
     spans: tuple[tuple[float, float], ...]
     #: Displacement of the hand's anchor in each grab, in base axes. (K, 3) [m]
@@ -182,7 +214,7 @@ class HandSpec(OnLink):
 class StopSpec(OnLink):
     """A hard stop: a plane that pushes back when the point goes beyond it."""
 
-    KIND: ClassVar[str] = "stop"
+    kind: str = field(default="stop", init=False)
     through: Vector  #: A point of the plane in the base frame. (3,) [m]
     normal: Vector = (0.0, 0.0, 1.0)  #: Its normal, pointing to the free side. (3,)
     stiffness: float = 2e4  #: Stiffness of the plane. [N/m]
@@ -193,7 +225,7 @@ class StopSpec(OnLink):
 class RandomWalkSpec:
     """Joint torques that walk at random, the disturbance model of the Kalman observers."""
 
-    KIND: ClassVar[str] = "random-walk"
+    kind: str = field(default="random-walk", init=False)
     name: str  #: Name of the contact.
     #: Variance gained a second: Q_τ; one number or one a joint. [(N·m)²/s]
     intensity: tuple[float, ...]
@@ -228,3 +260,111 @@ class Scenario:
     force_sensor: ForceSensorSpec | None = None  #: A force/torque sensor on the flange.
     contacts: tuple[ContactSpec, ...] = ()  #: Everything that touches the arm.
     sensing: SensingSpec = field(default_factory=SensingSpec)  #: What the log sees.
+
+
+def scenario_names() -> tuple[str, ...]:
+    """Names of the built-in scenarios, in alphabetical order."""
+    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+
+
+def listing() -> list[tuple[str, str]]:
+    """Name and one-line title of each built-in scenario."""
+    return [(name, load_scenario(name).title) for name in scenario_names()]
+
+
+def load_scenario(name: str | Path, overrides: Sequence[str] = ()) -> Scenario:
+    """Read a built-in scenario or a user's TOML file and apply `key=value` overrides.
+
+    Args:
+        name: Name of a built-in scenario, or a file.
+        overrides: As ``servo.stiffness=soft`` or ``contacts.hand.style=taps``; values are TOML, a
+            bare word is a string.
+
+    Raises:
+        ParameterError: If there is no such scenario, key or kind, or a value has the wrong type.
+    """
+    path = FOLDER / f"{name}.toml"
+    if not path.is_file():
+        path = Path(name)
+        if path.suffix.lower() != ".toml":
+            check_known(str(name), scenario_names(), f"no FILE.toml and no scenario {str(name)!r}")
+    try:
+        table = toml_tables(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text"
+        raise ParameterError(f"{path}: cannot be read as a scenario ({reason})") from None
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from None
+    table.setdefault("name", path.stem)
+    for override in overrides:
+        apply_override(table, override)
+    return section_from(Scenario, table, "")
+
+
+def apply_override(table: dict[str, Any], override: str) -> None:
+    """Put one `key=value` into the parsed file; contacts are addressed by name."""
+    key, text = assignment(override, "--set", "key=value")
+    parts = key.split(".")
+    node: Any = {"": table}
+    for depth, part in enumerate(["", *parts[:-1]]):
+        where = ".".join(parts[:depth])
+        if isinstance(node, list):
+            node = {str(c.get("name")): c for c in reversed(node) if isinstance(c, dict)}
+            check_known(part, [*node][::-1] or ["no contact"], f"no contact {where!r}")
+        node = node.setdefault(part, {})
+        if not isinstance(node, dict if depth == len(parts) - 1 else dict | list):
+            raise ParameterError(f"{where} is a value, not a section")
+    try:
+        node[parts[-1]] = toml_tables(f"x = {text}")["x"]
+    except ParameterError:
+        node[parts[-1]] = text
+
+
+def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Section:
+    """A section's dataclass of its TOML table; complaints name the key that is wrong."""
+    keys = [f for f in fields(cls) if f.init]  # type: ignore[arg-type]
+    paths = {key.name: f"{where}.{key.name}".lstrip(".") for key in keys}
+    for name in table:
+        check_known(name, paths, f"no scenario key {f'{where}.{name}'.lstrip('.')!r}")
+    for key in keys:
+        if key.name not in table and key.default is key.default_factory is MISSING:
+            raise ParameterError(
+                f"the scenario lacks {paths[key.name]}; [{where or 'scenario'}] takes "
+                f"{', '.join(paths)}"
+            )
+    hints = get_type_hints(cls)
+    return cls(**{name: convert(value, hints[name], paths[name]) for name, value in table.items()})
+
+
+def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML values
+    """A TOML value as the type that a field declares, a table as the section its `kind` names."""
+    items = get_args(hint)
+    if get_origin(hint) in {Union, types.UnionType}:
+        if tagged := {o.kind: o for o in items if hasattr(o, "kind")}:
+            TABLE.check(where, value)
+            name = str(value.get("kind", ""))
+            check_known(name, tagged, f"no {where}.kind {name!r}")
+            table = {k: v for k, v in value.items() if k != "kind"}
+            return section_from(tagged[name], table, where)
+        *others, last = (item for item in items if item is not type(None))
+        for other in others:
+            with suppress(ParameterError):
+                return convert(value, other, where)
+        return convert(value, last, where)
+    if get_origin(hint) is tuple:
+        LIST.check(where, value)
+        items = items[:1] * len(value) if items[-1] is Ellipsis else items
+        if len(value) != len(items):
+            raise ParameterError(f"{where} has {len(value)} entries; it must have {len(items)}")
+        pairs = enumerate(zip(value, items, strict=True))
+        return tuple(convert(v, item, f"{where}[{i}]") for i, (v, item) in pairs)
+    KINDS.get(hint, TABLE).check(where, value)
+    if hint in KINDS:
+        return float(value) if hint is float else value
+    return section_from(hint, value, where)
+
+
+def to_toml(scenario: Scenario, seed: int) -> str:
+    """A scenario as a TOML file that makes the same log again."""
+    table = asdict(scenario, dict_factory=lambda pairs: {k: v for k, v in pairs if v is not None})
+    return "".join(lines_of(table | {"seed": seed}))

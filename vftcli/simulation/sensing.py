@@ -3,7 +3,6 @@
 Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +13,9 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
-from vftcli.simulation.arm import Arm, JointSignals
-from vftcli.simulation.motion import Reference
-from vftcli.simulation.scenario import ForceSensorSpec, SensingSpec
-from vftcli.simulation.servo import rigid_torque
+from vftcli.simulation.arm import Arm, JointSignals, rigid_torque
+from vftcli.simulation.scenario import SensingSpec
+from vftcli.simulation.trajectories import Reference
 
 #: Logging rate by kind of drive measurement, for robots that state none. [Hz]
 USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
@@ -97,7 +95,13 @@ def sample_run(arm: Arm) -> Samples:
     for name in ("a", "friction"):
         middle = grid[:-1] + 0.5 * arm.scenario.step
         signals[name] = interpolate(time, middle, getattr(history, name)[:-1])
-    tau = average_torque(history.tau, grid, time, interval if spec.torque == "average" else 0.0)
+    # The mean over the interval, or the last step: exact, for torque is constant over a step.
+    step, total = grid[1], np.zeros_like(history.tau)
+    np.cumsum(history.tau[:-1] * step, axis=0, out=total[1:])
+    span = max(interval if spec.torque == "average" else 0.0, step)
+    begin, stop = np.maximum(time - span, 0.0), np.maximum(time, step)
+    grown = interpolate(stop, grid, total) - interpolate(begin, grid, total)
+    tau = np.asarray(grown / (stop - begin)[:, None])
     return Samples(time=time, stamp=stamp, tau=tau, **signals)
 
 
@@ -110,20 +114,6 @@ def interpolate(time: Array, grid: Array, values: Array) -> Array:
     share[share < 1e-9] = 0.0
     share = share.reshape(-1, *([1] * (values.ndim - 1)))
     return np.asarray(values[left] * (1.0 - share) + values[left + 1] * share)
-
-
-def average_torque(tau: Array, grid: Array, time: Array, interval: float) -> Array:
-    """Drive torque averaged over the `interval` before each sample, or over the last step. (M, n)
-
-    Exact, for it is constant over a step. The first sample reports the first step's.
-    """
-    step, total = grid[1], np.zeros_like(tau)
-    span = max(interval, step)
-    np.cumsum(tau[:-1] * step, axis=0, out=total[1:])
-    begin = np.maximum(time - span, 0.0)
-    end = np.maximum(time, grid[1])
-    grown = interpolate(end, grid, total) - interpolate(begin, grid, total)
-    return np.asarray(grown / (end - begin)[:, None])
 
 
 def noise_sizes(arm: Arm) -> tuple[Array, Array, Array]:
@@ -152,7 +142,17 @@ def measure_run(arm: Arm, samples: Samples) -> Measured:
     seen = samples.tau / arm.true.gain + arm.true.offset
     noise = sizes[2] * rng.standard_normal(shape)
     current = None if K is None else seen / K + noise
-    stamp = with_jitter(samples.stamp, spec.jitter, rng)
+    # Less than half a period to either side: stamps must go on increasing.
+    stamp, count = samples.stamp, len(samples.stamp)
+    draw = spec.jitter * rng.standard_normal(count)
+    if spec.jitter and count > 1:
+        bound = 0.45 * (stamp[1] - stamp[0])
+        stamp = stamp + np.clip(draw, -bound, bound)
+    # The first and the last row always hold their own samples.
+    lost, again = rng.random(count) < spec.dropped, rng.random(count) < spec.repeated
+    inner = np.arange(count) > 0
+    inner[-1] = False
+    source = np.arange(count) - (again & inner)
     return Measured(
         stamp=stamp,
         q=q,
@@ -160,34 +160,13 @@ def measure_run(arm: Arm, samples: Samples) -> Measured:
         torque=seen + noise if K is None or current is None else current * K,
         current=current,
         temperature=arm.temperature(samples.time),
-        rows=rows_logged(len(stamp), spec, rng),
+        rows=tuple(source[~(lost & inner)].tolist()),
     )
 
 
 def rounded(q: Array, step: float) -> Array:
     """Positions quantised to a step, 0 for none. [rad]"""
     return np.round(q / step) * step if step > 0 else q
-
-
-def with_jitter(stamp: Array, size: float, rng: np.random.Generator) -> Array:
-    """Stamps with normal jitter, cut so that they still increase. (M,) [s]"""
-    draw = rng.standard_normal(len(stamp))
-    if size == 0 or len(stamp) < 2:
-        return stamp
-    # Less than half a period to either side: stamps must go on increasing.
-    bound = 0.45 * (stamp[1] - stamp[0])
-    return stamp + np.clip(size * draw, -bound, bound)
-
-
-def rows_logged(count: int, spec: SensingSpec, rng: np.random.Generator) -> tuple[int, ...]:
-    """Which sample each row of the log holds, first and last always."""
-    lost = rng.random(count) < spec.dropped
-    again = rng.random(count) < spec.repeated
-    inner = np.arange(count) > 0
-    inner[-1] = False
-    source = np.arange(count)
-    source[again & inner] -= 1
-    return tuple(int(k) for k in source[~(lost & inner)])
 
 
 def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
@@ -230,41 +209,31 @@ def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None
 
     Contacts, weight and inertia of what is beyond it, offset, drift, noise; None without one.
     """
+    import pinocchio as pin
+
     spec = arm.scenario.force_sensor
     if spec is None:
         return None
     # Its own generator: mounting a sensor leaves the noise of all other signals as it was.
     rng = np.random.default_rng(arm.seeds["sensing"].spawn(1)[0])
-    clean = np.zeros((len(samples.time), 6))
-    turn = rpy_matrix(spec.rpy)
-    for k, (R, specific) in enumerate(tool_motion(arm, samples, spec, turn)):
+    model, data = arm.plant.model, arm.plant.model.createData()
+    frame, axes = model.getFrameId("flange"), pin.LOCAL_WORLD_ALIGNED
+    clean, turn = np.zeros((len(samples.time), 6)), rpy_matrix(spec.rpy)
+    position, tool = np.array(spec.position), np.array(spec.tool_com)
+    for k, motion in enumerate(zip(samples.q, samples.v, samples.a, strict=True)):
+        pin.forwardKinematics(model, data, *motion)
+        flange = pin.updateFramePlacement(model, data, frame).rotation
+        moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
+        spin = pin.getFrameVelocity(model, data, frame, axes).angular
+        R = flange @ turn  # of the sensor in the base
+        arm_of_tool = flange @ position + R @ tool
+        swing = np.cross(moving.angular, arm_of_tool) + np.cross(spin, np.cross(spin, arm_of_tool))
+        weight = spec.tool_mass * (R.T @ (model.gravity.linear - (moving.linear + swing)))
         force = R.T @ wrench[k, :3]
-        lever = turn.T @ np.array(spec.position)
-        moment = R.T @ wrench[k, 3:] - np.cross(lever, force)
-        weight = spec.tool_mass * (R.T @ specific)
+        moment = R.T @ wrench[k, 3:] - np.cross(turn.T @ position, force)
         clean[k, :3] = force + weight
-        clean[k, 3:] = moment + np.cross(spec.tool_com, weight)
+        clean[k, 3:] = moment + np.cross(tool, weight)
     noise = np.repeat([spec.noise_force, spec.noise_torque], 3)
     drift = np.repeat([spec.drift_force, spec.drift_torque], 3)
     reading: Array = clean + np.array(spec.bias) + np.outer(samples.time, drift)
     return reading + noise * rng.standard_normal(clean.shape)
-
-
-def tool_motion(
-    arm: Arm, samples: Samples, spec: ForceSensorSpec, turn: Array
-) -> Iterator[tuple[Array, Array]]:
-    """Orientation of the sensor in the base (3, 3) and g − a of the tool's centre (3,), M times."""
-    import pinocchio as pin
-
-    model, data = arm.plant.model, arm.plant.model.createData()
-    frame = model.getFrameId("flange")
-    for q, v, a in zip(samples.q, samples.v, samples.a, strict=True):
-        pin.forwardKinematics(model, data, q, v, a)
-        pose = pin.updateFramePlacement(model, data, frame)
-        axes = pin.LOCAL_WORLD_ALIGNED
-        moving = pin.getFrameClassicalAcceleration(model, data, frame, axes)
-        spin = pin.getFrameVelocity(model, data, frame, axes).angular
-        R = pose.rotation @ turn
-        lever = pose.rotation @ np.array(spec.position) + R @ np.array(spec.tool_com)
-        swing = np.cross(moving.angular, lever) + np.cross(spin, np.cross(spin, lever))
-        yield R, model.gravity.linear - (moving.linear + swing)

@@ -1,15 +1,15 @@
-"""The kinds of ``[trajectory]`` a scenario can have, and the joints that reach flange poses."""
+"""The kinds of ``[trajectory]``: commanded joint motions with exact derivatives."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any, ClassVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.motion import Command, Periodic, Reference, Stretches, straight_paths
 
 #: Harmonics kept of a periodic path; those of a circle fall below rounding long before.
 HARMONICS = 48
@@ -22,13 +22,97 @@ HOMES: dict[int, tuple[float, ...]] = {
     6: (0.0, -1.35, 1.9, -2.1208, -1.5708, 0.0),
     7: (0.0, -0.7854, 0.0, -2.3562, 0.0, 1.5708, 0.7854),
 }
+Number = TypeVar("Number", float, Array)
+
+
+class Reference(NamedTuple):
+    """Commanded positions, velocities and accelerations. (T, n) each [rad, rad/s, rad/s²]"""
+
+    q: Array
+    dq: Array
+    ddq: Array
+
+
+@dataclass(frozen=True)
+class Periodic:
+    """Joint positions as a Fourier series in the phase 2πt/period."""
+
+    period: float  #: Time of one round. [s]
+    cycles: float  #: Rounds.
+    mean: Array  #: Mean positions. (n,) [rad]
+    cosine: Array  #: Cosine coefficients. (H, n) [rad]
+    sine: Array  #: Sine coefficients. (H, n) [rad]
+
+    @property
+    def duration(self) -> float:
+        """Time of all rounds. [s]"""
+        return self.period * self.cycles
+
+    def at(self, t: Array) -> Reference:
+        """The series and its two derivatives at times `t` (T,) [s]."""
+        order = 2.0 * np.pi / self.period * np.arange(1, len(self.sine) + 1)
+        c, s = np.cos(np.outer(t, order)), np.sin(np.outer(t, order))
+        a, b, w = self.cosine, self.sine, order[:, None]
+        return Reference(
+            self.mean + c @ a + s @ b,
+            c @ (w * b) - s @ (w * a),
+            -(c @ (w**2 * a)) - s @ (w**2 * b),
+        )
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them."""
+
+    times: Array  #: Start and end of each stretch, in order. (K, 2) [s]
+    #: Chebyshev coefficients of q over s in [−1, 1], one a stretch. (D, n) [rad]
+    paths: tuple[Array, ...]
+    duration: float  #: Length with the rest at the end. [s]
+
+    def at(self, t: Array) -> Reference:
+        """Where the stretches lead at times `t` (T,) [s]; between them the motion rests."""
+        from numpy.polynomial import chebyshev
+
+        t = np.asarray(t, dtype=float)
+        which = np.clip(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0, None)
+        n = self.paths[0].shape[1]
+        out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
+        for k, path in enumerate(self.paths):
+            rows = np.flatnonzero(which == k)
+            length = float(self.times[k, 1] - self.times[k, 0])
+            u = np.clip((t[rows] - self.times[k, 0]) / length, 0.0, 1.0)
+            s = minimum_jerk(u)
+            ds = 30.0 * u**2 * (1.0 - u) ** 2 / length
+            dds = 60.0 * u * (1.0 - u) * (1.0 - 2.0 * u) / length**2
+            first, second = chebyshev.chebder(path), chebyshev.chebder(path, 2)
+            x = 2.0 * s - 1.0
+            slope = 2.0 * chebyshev.chebval(x, first).T
+            curve = 4.0 * chebyshev.chebval(x, second).T
+            out.q[rows] = chebyshev.chebval(x, path).T
+            out.dq[rows] = slope * ds[:, None]
+            out.ddq[rows] = slope * dds[:, None] + curve * (ds**2)[:, None]
+        return out
+
+
+#: A commanded motion of known length: what every ``[trajectory]`` becomes.
+Command = Periodic | Stretches
+
+
+def straight_paths(points: Sequence[Array]) -> tuple[Array, ...]:
+    """Paths of `Stretches` that lead from each of the points (n,) [rad] to the next."""
+    return tuple(np.vstack([0.5 * (a + b), 0.5 * (b - a)]) for a, b in pairwise(points))
+
+
+def minimum_jerk(u: Number) -> Number:
+    """The way 10u³ − 15u⁴ + 6u⁵ from 0 to 1 over u in [0, 1]."""
+    return u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CircleSpec:
     """A horizontal circle of the flange at constant speed and orientation."""
 
-    KIND: ClassVar[str] = "circle"
+    kind: str = field(default="circle", init=False)
     #: Joint positions at a point of the circle; empty takes the usual pose. (n,) [rad]
     start: tuple[float, ...] = ()
     radius: float = 0.2  #: Radius. [m]
@@ -60,7 +144,7 @@ class CircleSpec:
 class HoldSpec:
     """A held pose."""
 
-    KIND: ClassVar[str] = "hold"
+    kind: str = field(default="hold", init=False)
     start: tuple[float, ...] = ()  #: Joint positions. (n,) [rad]
     length: float = 10.0  #: How long. [s]
 
@@ -74,7 +158,7 @@ class HoldSpec:
 class OffsetsSpec:
     """Straight lines of the flange at constant orientation between stated points, at rest there."""
 
-    KIND: ClassVar[str] = "offsets"
+    kind: str = field(default="offsets", init=False)
     #: Rows (start time, end time, x, y, z): by the end time the flange is displaced from the start
     #: by (x, y, z) in base axes. [s, m]
     moves: tuple[tuple[float, float, float, float, float], ...]
@@ -105,7 +189,7 @@ class OffsetsSpec:
 class JointMovesSpec:
     """Straight moves in joint space between stated displacements from the start, at rest there."""
 
-    KIND: ClassVar[str] = "joint-moves"
+    kind: str = field(default="joint-moves", init=False)
     #: Rows (start time, end time, one displacement a joint): by the end time the joints are
     #: displaced from the start by these. [s, rad]
     moves: tuple[tuple[float, ...], ...]
@@ -129,25 +213,18 @@ class JointMovesSpec:
 class PosesSpec:
     """Drawn joint poses, approached one after the other and held."""
 
-    KIND: ClassVar[str] = "poses"
+    kind: str = field(default="poses", init=False)
     move: float = 2.5  #: Time of each move. [s]
     dwell: float = 2.0  #: Rest at each pose. [s]
     count: int = 12  #: How many poses are drawn.
     spread: float = 0.7  #: How far they lie from the usual pose, evenly to both sides. [rad]
 
     def motion(self, robot: Robot) -> Command:
-        """Straight joint-space moves between the poses."""
+        """Straight moves between poses inside the limits with the flange above the table."""
         if self.move <= 0 or self.dwell < 0 or self.count < 2:
             raise ParameterError(
                 "trajectory.move must be positive, dwell not negative, and count at least 2"
             )
-        points = self.draw_poses(robot)
-        starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
-        times = np.column_stack([starts, starts + self.move])
-        return Stretches(times, straight_paths(points), float(times[-1, 1] + self.dwell))
-
-    def draw_poses(self, robot: Robot) -> list[Array]:
-        """Poses about the usual one, inside the limits and with the flange above the table."""
         rng, home = np.random.default_rng(1), check_start(robot, ())
         low = np.nan_to_num(robot.limits.q_min + 0.05, nan=-np.pi)
         high = np.nan_to_num(robot.limits.q_max - 0.05, nan=np.pi)
@@ -157,18 +234,22 @@ class PosesSpec:
             if flange_pose(robot.model, pose).translation[2] > TABLE:
                 points.append(pose)
             if len(points) == self.count:
-                return points
-        raise ParameterError(
-            f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} poses "
-            "above the table; make it smaller"
-        )
+                break
+        else:
+            raise ParameterError(
+                f"trajectory.spread {self.spread:g} leaves robot {robot.name!r} no {self.count} "
+                "poses above the table; make it smaller"
+            )
+        starts = self.dwell + np.arange(self.count - 1) * (self.move + self.dwell)
+        times = np.column_stack([starts, starts + self.move])
+        return Stretches(times, straight_paths(points), float(times[-1, 1] + self.dwell))
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointwiseSpec:
     """One joint at a time swept back and forth at several speeds, the others at rest."""
 
-    KIND: ClassVar[str] = "jointwise"
+    kind: str = field(default="jointwise", init=False)
     amplitude: float = 0.4  #: Sweep to each side. [rad]
     speeds: tuple[float, ...] = (0.1, 0.2, 0.4, 0.7)  #: Mean speeds of the sweeps. [rad/s]
     rest: float = 0.3  #: Rest between sweeps. [s]
@@ -194,7 +275,7 @@ class JointwiseSpec:
 class ExcitationSpec:
     """A Fourier series of the joints."""
 
-    KIND: ClassVar[str] = "excitation"
+    kind: str = field(default="excitation", init=False)
     period: float = 10.0  #: Time of one round. [s]
     cycles: float = 2.0  #: Rounds.
     mean: tuple[float, ...]  #: Mean positions. (n,) [rad]
@@ -238,7 +319,7 @@ def check_times(times: Array, length: float) -> None:
 def plan(spec: TrajectorySpec, robot: Robot, t: Array) -> Reference:
     """Return the reference of a trajectory at times `t`, inside the robot's limits."""
     reference = spec.motion(robot).at(t)
-    check_limits(robot, reference.q, reference.dq, f"trajectory {spec.KIND!r}")
+    check_limits(robot, reference.q, reference.dq, f"trajectory {spec.kind!r}")
     return reference
 
 
@@ -295,19 +376,17 @@ def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str
 def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
     """Raise a ParameterError unless a motion (T, n) stays inside the robot's limits."""
     limits = robot.limits
-    for j in range(robot.joints):
-        low, high, fastest = limits.q_min[j], limits.q_max[j], limits.qd_max[j]
-        span = (float(np.min(q[:, j])), float(np.max(q[:, j])))
-        if span[0] < low or span[1] > high:
+    each = zip(q.T, dq.T, limits.q_min, limits.q_max, limits.qd_max, strict=True)
+    for j, (place, speed, low, high, most) in enumerate(each, start=1):
+        if place.min() < low or place.max() > high:
             raise ParameterError(
-                f"{what}: joint {j + 1} of {robot.name!r} would move over {span[0]:.3f} to "
-                f"{span[1]:.3f} rad; its limits are {low:.3f} to {high:.3f}"
+                f"{what}: joint {j} of {robot.name!r} would move over {place.min():.3f} to "
+                f"{place.max():.3f} rad; its limits are {low:.3f} to {high:.3f}"
             )
-        speed = float(np.max(np.abs(dq[:, j])))
-        if speed > fastest:
+        if (fastest := np.max(np.abs(speed))) > most:
             raise ParameterError(
-                f"{what}: joint {j + 1} of {robot.name!r} would move at {speed:.2f} rad/s; "
-                f"its limit is {fastest:.2f}"
+                f"{what}: joint {j} of {robot.name!r} would move at {fastest:.2f} rad/s; "
+                f"its limit is {most:.2f}"
             )
 
 

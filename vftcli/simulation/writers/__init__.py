@@ -1,16 +1,176 @@
-"""Simulated logs in the vendors' own formats."""
+"""Simulated logs in the vendors' own formats, flat Parquet tables, and the truth file.
 
-from collections.abc import Callable
+UR's two RTDE recorders: the official client writes one header row, single spaces and CR LF; SDU's
+ur_rtde commas, LF, every double with six decimals. libfranka's `logToCSV`, the layout of 0.9.1 and
+later: commas, six significant digits.
+"""
+
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
 
 from vftcli.robots import Robot
+from vftcli.signals.arrays import Array
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
-from vftcli.simulation.experiment import Simulation
+from vftcli.simulation.experiment import AXES, Simulation, Truth
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.simulation.writers.tables import LIBFRANKA, RTDE, UR_RTDE, write_parquet
+from vftcli.simulation.writers.signals import joint_signals, vendor_signals
+
+#: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
+#: row that follows, the last repeated: a command is executed one cycle later.
+Columns = Mapping[str, str | tuple[float, ...]]
+#: The default record_configuration.xml of the official client. The constants are of what the
+#: simulation knows nothing of: robot mode RUNNING, joint mode RUNNING, safety NORMAL.
+CLIENT: Columns = {
+    "timestamp": "time",
+    "target_q": "target_q",
+    "target_qd": "target_dq",
+    "target_qdd": "target_ddq",
+    "target_current": "target_current",
+    "target_moment": "target_torque",
+    "actual_q": "q",
+    "actual_qd": "dq",
+    "actual_current": "current",
+    "joint_control_output": "target_current",
+    "actual_TCP_pose": "pose",
+    "actual_TCP_speed": "twist",
+    "actual_TCP_force": "force",
+    "target_TCP_pose": "target_pose",
+    "target_TCP_speed": "target_twist",
+    "actual_digital_input_bits": (0,),
+    "joint_temperatures": "temperature",
+    "actual_execution_time": (0.0,),
+    "robot_mode": (7,),
+    "joint_mode": (253,) * 6,
+    "safety_status": (1,),
+    "actual_tool_accelerometer": "accelerometer",
+    "speed_scaling": (1.0,),
+    "target_speed_fraction": (1.0,),
+    "actual_momentum": "momentum",
+    "actual_main_voltage": (48.0,),
+    "actual_robot_voltage": (48.0,),
+    "actual_robot_current": (0.0,),
+    "actual_joint_voltage": (48.0,) * 6,
+    "actual_digital_output_bits": (0,),
+    "runtime_state": (2,),
+    "joint_position_deviation_ratio": (0.0,),
+}
+#: What ur_rtde's `startFileRecording` writes.
+RECORDER: Columns = {
+    "safety_mode" if name == "safety_status" else name: content
+    for name, content in CLIENT.items()
+    if name != "joint_position_deviation_ratio"
+}
+#: What `franka::logToCSV` writes; tau_ext_hat_filtered is minus the torque ON the arm.
+FRANKA: Columns = {
+    "time": "milliseconds",
+    "success_rate": (1,),
+    "state.q": "q",
+    "state.q_d": "target_q",
+    "state.dq": "dq",
+    "state.dq_d": "target_dq",
+    "state.tau_J": "tau",
+    "state.tau_ext_hat_filtered": "-tau_ext",
+    "cmd.q_d": "next target_q",
+    "cmd.dq_d": "next target_dq",
+    "cmd.O_T_EE_d": "next target_matrix",
+    "cmd.O_dP_EE_d": "next target_twist",
+    "cmd.tau_J_d": "next torque_command",
+}
+#: The short recipe of a UR log: joint motion, currents and the target moment alone.
+SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment", "actual_q",
+         "actual_qd", "actual_current")  # fmt: skip
+TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
+#: Of the wrench of one contact elsewhere on the arm.
+AT_CONTACT = "base axes, moment about the point that is touched"
+
+
+class VendorTable(NamedTuple):
+    """A format: its columns, the mark of an element's number, and how rows and numbers look."""
+
+    columns: Columns
+    element: str
+    separator: str
+    end: str
+    number: str  # of a double
+    decimals: int | None = None  # to which it is rounded before
+
+    def write(self, path: Path, simulation: Simulation) -> None:
+        """Write the columns of the scenario's recipe; a UR log also has a flange sensor's."""
+        recipe = simulation.scenario.columns
+        if recipe not in {"full", "short"}:
+            raise ParameterError(f"columns is {recipe!r}; there is full, short")
+        own = dict(self.columns)
+        if self.columns is not FRANKA:
+            if recipe == "short":
+                own = {name: own[name] for name in SHORT}
+            if simulation.force_sensor is not None:
+                own["ft_raw_wrench"] = "wrench"
+        known, rows = vendor_signals(simulation), np.array(simulation.measured.rows)
+        names, texts = [], []
+        for name, content in own.items():
+            if isinstance(content, str):
+                values = known[content.removeprefix("-").removeprefix("next ")]()
+                if content.startswith("next "):
+                    values = np.concatenate([values[1:], values[-1:]])
+                values = (-values if content.startswith("-") else values)[rows]
+                if self.decimals is not None:
+                    values = np.round(values, self.decimals)
+                columns = (values + values.dtype.type(0)).reshape(len(rows), -1).T.tolist()
+            else:
+                columns = [[value] * len(rows) for value in content]
+            several = len(columns) > 1
+            names += [name + self.element.format(i) * several for i in range(len(columns))]
+            texts += [
+                [str(value) if isinstance(value, int) else self.number % value for value in column]
+                for column in columns
+            ]
+        lines = [self.separator.join(names), *map(self.separator.join, zip(*texts, strict=True))]
+        path.write_bytes((self.end.join(lines) + self.end).encode("ascii"))
+
+
+RTDE = VendorTable(CLIENT, "_{}", " ", "\r\n", "%r", 9)  # the client prints all seventeen digits
+UR_RTDE = VendorTable(RECORDER, "_{}", ",", "\n", "%.6f", 9)
+LIBFRANKA = VendorTable(FRANKA, "[{}]", ",", "\n", "%.6g")
+
+
+def write_parquet(path: Path, simulation: Simulation) -> None:
+    """Write the log as one flat table, `t`, `q/1`, `dq/1` and so on."""
+    rows = np.array(simulation.measured.rows)
+    start = simulation.scenario.sensing.start
+    columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
+    for name, values in joint_signals(simulation).items():
+        labels = AXES if name == "wrench" else tuple(map(str, range(1, values.shape[1] + 1)))
+        columns |= {f"{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+    write_columns(path, {name: values[rows] for name, values in columns.items()})
+
+
+def write_truth(path: Path, truth: Truth, start: float) -> None:
+    """Write the truth beside a log whose first stamp is `start` [s]: the same clock."""
+    columns = truth.columns()
+    touched = {name.rpartition("/")[0] for name in columns if name.startswith("contact/")}
+    frames = {"wrench": StatedFrame(TRUTH_FRAME)} | dict.fromkeys(touched, StatedFrame(AT_CONTACT))
+    write_columns(path, columns | {"t": columns["t"] + start}, frames)
+
+
+def write_columns(
+    path: Path,
+    columns: dict[str, Array],
+    frames: Mapping[str, StatedFrame] | None = None,
+) -> None:
+    """Write named columns (M,) of doubles as one Parquet table; wrenches have these frames."""
+    import polars as pl
+
+    table = pl.DataFrame(columns)
+    schema = described_schema(table, frames)
+    table.write_parquet(path, compression="zstd", arrow_schema=schema)
+
 
 #: Name at ``--as`` → the function that writes it.
 WRITERS: dict[str, Callable[[Path, Simulation], None]] = {

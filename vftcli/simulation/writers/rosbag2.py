@@ -1,7 +1,7 @@
 """rosbag2 (MCAP storage): FrankaRobotState for the Franka arms, JointState for the others."""
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,12 +34,8 @@ Rows = NDArray[np.int64]
 Nanoseconds = NDArray[np.int64]
 
 
-class WrittenTopic(NamedTuple):
-    """Messages of one topic."""
-
-    name: str  #: The topic.
-    type: str  #: The message type, as package/Name.
-    messages: Any  #: One serialised message a row. (R, size) uint8
+#: Messages of one topic: its name, their type as package/Name, one serialised a row (R, size).
+Topic = tuple[str, str, NDArray[np.uint8]]
 
 
 def write_rosbag2(path: Path, simulation: Simulation) -> None:
@@ -49,6 +45,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     second topic, WrenchStamped in the sensor's frame.
     """
     from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     rows = np.array(simulation.measured.rows)
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
@@ -57,30 +54,22 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     topics = [make(simulation, rows, stamps)]
     if simulation.force_sensor is not None:
         topics.append(wrenches(simulation.force_sensor[rows], stamps))
-    store = typestore()
+    # The bag declares the types of ROS 2 Humble, and Franka's.
+    store, types = get_typestore(Stores.ROS2_HUMBLE), dict[str, Any]()
+    for name, text in FRANKA.items():
+        types |= get_types_from_msg(text, long_name(name))
+    store.register(types)
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         ends = [
-            (bag.add_connection(t.name, long_name(t.type), typestore=store), t.messages)
-            for t in topics
+            (bag.add_connection(name, long_name(kind), typestore=store), messages)
+            for name, kind, messages in topics
         ]
         for k, stamp in enumerate(stamps.tolist()):
             for connection, messages in ends:
                 bag.write(connection, stamp + RECEIVED_LATER_NS, messages[k].tobytes())
 
 
-def typestore() -> Any:  # noqa: ANN401 - rosbags builds its types at run time
-    """The message types a bag declares: those of ROS 2 Humble, and Franka's."""
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    types: dict[str, Any] = {}
-    for name, text in FRANKA.items():
-        types |= get_types_from_msg(text, long_name(name))
-    store.register(types)
-    return store
-
-
-def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> WrittenTopic:
+def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
     """`/joint_states`, effort in ampere for a current-driven arm, in N·m for the others."""
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
     seen = simulation.measured
@@ -92,25 +81,21 @@ def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Wri
         "velocity": seen.dq[rows],
         "effort": effort[rows],
     }
-    return WrittenTopic("/joint_states", JOINT_STATE, serialised(JOINT_STATE, values, len(rows)))
+    return "/joint_states", JOINT_STATE, serialised(JOINT_STATE, values, len(rows))
 
 
-def wrenches(readings: Array, stamps: Nanoseconds) -> WrittenTopic:
+def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
     """`/force_torque_sensor_broadcaster/wrench` in the sensor's frame, force ON the robot."""
     values = {**stamped(stamps), "header.frame_id": "ft_sensor", **six("wrench", WRENCH, readings)}
     messages = serialised(WRENCH_STAMPED, values, len(readings))
-    return WrittenTopic("/force_torque_sensor_broadcaster/wrench", WRENCH_STAMPED, messages)
+    return "/force_torque_sensor_broadcaster/wrench", WRENCH_STAMPED, messages
 
 
-def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> WrittenTopic:
-    """`/franka_robot_state_broadcaster/robot_state`; external estimates have libfranka's sign."""
-    values = {**stamped(stamps), **robot_state(simulation, rows)}
-    messages = serialised(ROBOT_STATE, values, len(rows), known_types())
-    return WrittenTopic("/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages)
+def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
+    """`/franka_robot_state_broadcaster/robot_state`; external estimates have libfranka's sign.
 
-
-def robot_state(simulation: Simulation, rows: Rows) -> dict[str, Value]:
-    """The fields of FrankaRobotState that are not zero."""
+    Fields that are not named here are zero.
+    """
     samples, seen, vendor = simulation.samples, simulation.measured, simulation.vendor
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
     measured, desired = "measured_joint_state", "desired_joint_state"
@@ -127,7 +112,8 @@ def robot_state(simulation: Simulation, rows: Rows) -> dict[str, Value]:
     force[~regular] = 0.0
     in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
     about_base = force[:, 3:] + np.cross(actual.position, force[:, :3])
-    return {
+    values: dict[str, Value] = {
+        **stamped(stamps),
         **{f"{joints}.name": names for joints in (measured, desired, motor, external)},
         f"{measured}.position": q,
         f"{measured}.velocity": dq,
@@ -153,6 +139,8 @@ def robot_state(simulation: Simulation, rows: Rows) -> dict[str, Value]:
         "control_command_success_rate": 1.0,
         "robot_mode": MODE_MOVE,
     }
+    messages = serialised(ROBOT_STATE, values, len(rows), known_types())
+    return "/franka_robot_state_broadcaster/robot_state", ROBOT_STATE, messages
 
 
 def quaternions(rotation: Array) -> Array:

@@ -8,9 +8,9 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import log_matrix
+from vftcli.simulation.arm import rigid_torque
 from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.motion import Reference
-from vftcli.simulation.servo import rigid_torque
+from vftcli.simulation.trajectories import Reference
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
 
@@ -63,6 +63,8 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
 
     With no tool set the TCP is the flange.
     """
+    import pinocchio as pin
+
     samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
     time = measured.stamp + simulation.scenario.sensing.start
     still = np.zeros_like(samples.target_q)
@@ -80,6 +82,11 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
         weightless = np.gradient(samples.target_dq, samples.time, axis=0)
         felt = np.einsum("kij,kj->ki", target().jacobian[:, :3], weightless) - model.gravity.linear
         return np.asarray(np.einsum("kji,kj->ki", target().rotation, felt))
+
+    def momentum() -> Array:
+        data, states = model.createData(), zip(measured.q, measured.dq, strict=True)
+        linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
+        return np.array([np.linalg.norm(vector) for vector in linear])
 
     def matrix() -> Array:
         pose = np.zeros((len(samples.time), 4, 4))
@@ -102,7 +109,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
         "target_matrix": matrix,
         "target_twist": lambda: target().twist,
         "accelerometer": accelerometer,
-        "momentum": lambda: linear_momentum(simulation),
+        "momentum": momentum,
         "torque_command": lambda: simulation.vendor.target_torque - rigid_torque(model, resting),
     }
 
@@ -110,17 +117,3 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
 def pose_of(flange: FlangeSignals) -> Array:
     """Positions and rotation vectors. (M, 6) [m, rad]"""
     return np.hstack([flange.position, log_matrix(flange.rotation)])
-
-
-def linear_momentum(simulation: Simulation) -> Array:
-    """Magnitude of the arm's linear momentum. (M,) [kg·m/s]"""
-    import pinocchio as pin
-
-    model, measured = simulation.nominal.model, simulation.measured
-    data = model.createData()
-    return np.array(
-        [
-            np.linalg.norm(pin.computeCentroidalMomentum(model, data, q, dq).linear)
-            for q, dq in zip(measured.q, measured.dq, strict=True)
-        ]
-    )
