@@ -34,11 +34,7 @@ FARTHEST_RELEASE = 0.5
 
 
 def closed_loop(
-    seed: int,
-    *,
-    scenario: str,
-    figures: Sequence[str],
-    alphas: Sequence[float],
+    seed: int, *, scenario: str, figures: Sequence[str], alphas: Sequence[float]
 ) -> RunResult:
     """Latencies of a controller in the loop, and its force through controllers of every α."""
     result = RunResult()
@@ -48,7 +44,13 @@ def closed_loop(
         forces = all(one.axis < 3 for one in held)
         dragged, other = (FORCE, MOMENT) if forces else (MOMENT, FORCE)
         astray = np.linalg.norm(run.moved[:, other], axis=1)
-        result.put(variant, latency_values(held) | {"astray": float(astray.max())})
+        result.put(variant, {"astray": float(astray.max())})
+        for k, one in enumerate(held, start=1):
+            for key in ("detection", "motion", "withdrawal", "reaction"):
+                # Motion says nothing of a contact that found the arm moving.
+                shown = one.rested or key in {"detection", "withdrawal"}
+                result.put(variant, {f"{key}/{k}": getattr(one, key) if shown else None})
+            result.put(variant, {f"stop/{k}": one.turn})
         result.put(variant, return_values(found, held))
         if variant in UNGATED:
             result.put(UNGATED[variant], return_values(ungated(found), held))
@@ -91,17 +93,6 @@ def ungated(found: Replay) -> Replay:
     drags = drags_of(found.phases, found.parameters.period)
     rows = rows_of(found.controllers, motion, drags, force)
     return replace(found, motion=motion, rows=tuple(rows))
-
-
-def latency_values(held: Sequence[Latency]) -> dict[str, float | None]:
-    """Times of each contact, None of one that found the arm moving."""
-    values: dict[str, float | None] = {}
-    for k, one in enumerate(held, start=1):
-        for key in ("detection", "motion", "withdrawal", "reaction"):
-            shown = one.rested or key in {"detection", "withdrawal"}
-            values[f"{key}/{k}"] = getattr(one, key) if shown else None
-        values[f"stop/{k}"] = one.turn
-    return values
 
 
 def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:

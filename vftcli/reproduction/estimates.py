@@ -30,7 +30,7 @@ from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import AXES, Wrench, unit_of
-from vftcli.simulation import Simulation, load_scenario, simulate
+from vftcli.simulation import load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
@@ -77,13 +77,27 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
         for row in rows.iter_rows(named=True):
             force, moment = row["rmse_N"], row["rmse_Nm"]
             result.put(variant, {row["axis"]: moment if force is None else force})
-        put_causes(result, variant, run, made)
+        assert made.virtual_sensor is not None, "a wrench was asked for"
+        real = made.virtual_sensor.reference
+        assert real is not None, "the sensor is the reference"
+        q = made.recording.q
+        true, tau = run.truth.wrench[: len(q)], run.truth.tau_ext[: len(q)]
+        touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
+        error = (made.wrenches[0].known - real.known)[: len(true), 1]
+        # What the observer makes of the true torque and of nothing else: p is 0, μ is −τ_ext.
+        ideal = DynamicsTerms(t=made.recording.t[: len(true)], p=np.zeros_like(tau), mu=-tau)
+        late = made.observers[0].estimate(ideal)
+        missed = replace(late, tau=late.tau - tau)
+        lag = VirtualSensor().wrench(missed, q, made.robot.chain).known
+        causes = {"fy/untouched": error[~touched], "fy/touched": error[touched]}
+        causes |= {f"{axis}/lag": lag[:, AXES.index(axis)] for axis in ("mx", "my")}
+        result.put(variant, {key: rms(values) for key, values in causes.items()})
         if variant == CORRECTED:
             # How far the real sensor itself is from the simulation's truth.
-            turn = link_poses(made.robot.chain, made.recording.q).rotation[:, -1]
-            known = run.truth.wrench[: len(turn)].reshape(-1, 2, 3)
-            true = np.einsum("tji,tkj->tki", turn[: len(known)], known).reshape(-1, 6)
-            off = (real_sensor(made).known[: len(true)] - true).T
+            turn = link_poses(made.robot.chain, q).rotation[: len(true), -1]
+            known = true.reshape(-1, 2, 3)
+            true = np.einsum("tji,tkj->tki", turn, known).reshape(-1, 6)
+            off = (real.known[: len(true)] - true).T
             result.put(FLOOR, {axis: rms(one) for axis, one in zip(AXES, off, strict=True)})
             chart = wrench_chart(made)
             assert chart is not None, "a wrench was asked for"
@@ -91,37 +105,9 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
     return result
 
 
-def put_causes(result: RunResult, variant: str, run: Simulation, made: Analysis) -> None:
-    """Errors of f_y, touched and not, and of m_x, m_y by the observer's lag alone."""
-    true = run.truth.wrench[: len(made.recording.q)]
-    touched = np.linalg.norm(true[:, :3], axis=1) > UNTOUCHED
-    error = (made.wrenches[0].known - real_sensor(made).known)[: len(true)]
-    # What the observer makes of the true torque and of nothing else: p is 0, μ is −τ_ext.
-    tau = run.truth.tau_ext[: len(true)]
-    ideal = DynamicsTerms(t=made.recording.t[: len(true)], p=np.zeros_like(tau), mu=-tau)
-    late = made.observers[0].estimate(ideal)
-    missed = replace(late, tau=late.tau - tau)
-    wrench = VirtualSensor().wrench(missed, made.recording.q[: len(true)], made.robot.chain)
-    causes = {
-        "fy/untouched": error[~touched, 1],
-        "fy/touched": error[touched, 1],
-        "mx/lag": wrench.known[:, AXES.index("mx")],
-        "my/lag": wrench.known[:, AXES.index("my")],
-    }
-    result.put(variant, {key: rms(values) for key, values in causes.items()})
-
-
 def rms(values: Array) -> float:
     """Root mean square of what is known."""
     return float(np.sqrt(np.nanmean(values**2)))
-
-
-def real_sensor(made: Analysis) -> Wrench:
-    """The reference that was asked for."""
-    assert made.virtual_sensor is not None, "a wrench was asked for"
-    reference = made.virtual_sensor.reference
-    assert reference is not None, "the sensor is the reference"
-    return reference
 
 
 def assembled_bearing(
@@ -163,7 +149,13 @@ def assembled_bearing(
             put_weights(result, FLOOR, mean_of(vendor, unloaded), mean_of(vendor, hung))
             soon = replay_bearing(zeroed, made, period=sampled)
             put_motion(result, "control at 1 ms", soon, phases["knocked"])
-            result.charts["fig12"] = beside_vendor(zeroed, vendor)
+            lines = (
+                ChartLine("libfranka", vendor.known, REFERENCE),
+                ChartLine("virtual sensor, drift removed", zeroed.known, "#0b6fb8"),
+            )
+            units, families = tuple(map(unit_of, AXES)), (1, 1, 1, 2, 2, 2)
+            chart = Chart("wrench", "", units, AXES, zeroed.t, lines, families=families)
+            result.charts["fig12"] = chart
             result.charts["fig13"] = deviation_chart(controlled, slice(6))
     return result
 
@@ -187,11 +179,7 @@ def put_weights(result: RunResult, variant: str, drift: Array, hung: Array) -> N
 
 
 def replay_bearing(
-    wrench: Wrench,
-    made: Analysis,
-    *,
-    period: float | None = None,
-    as_printed: bool = False,
+    wrench: Wrench, made: Analysis, *, period: float | None = None, as_printed: bool = False
 ) -> Replay:
     """One force through Table IV's traditional and variable controllers."""
     words = [] if period is None else [f"admittance.period={period}"]
@@ -202,12 +190,7 @@ def replay_bearing(
     return replay(wrench, made.recording.q, made.robot, parameters, laws, source=source)
 
 
-def put_motion(
-    result: RunResult,
-    variant: str,
-    found: Replay,
-    knocked: Sequence[float],
-) -> None:
+def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence[float]) -> None:
     """Return time of a guided arm, its rest, and its motion under knocks."""
     t, (start, stop) = found.motion.t, knocked
     for n, controller in enumerate(found.controllers):
@@ -228,16 +211,6 @@ def put_motion(
         result.put(variant, {f"{key}/{kind}": value for key, value in values.items()})
 
 
-def beside_vendor(wrench: Wrench, vendor: Wrench) -> Chart:
-    """The virtual sensor's wrench, drift removed, over libfranka's."""
-    lines = (
-        ChartLine("libfranka", vendor.known, REFERENCE),
-        ChartLine("virtual sensor, drift removed", wrench.known, "#0b6fb8"),
-    )
-    units = tuple(map(unit_of, AXES))
-    return Chart("wrench", "", units, AXES, wrench.t, lines, families=(1, 1, 1, 2, 2, 2))
-
-
 def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
     """Errors joint by joint, lags, rms of the free cycle, and the guidelines' facts.
 
@@ -246,50 +219,40 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
     recording = simulate(load_scenario(scenario, ()), seed).recording
     robot, models, result = load_robot("ur5"), Runs(), RunResult()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.
-    free = FreeChoice(period=period, alignment="period", low_pass=None)
+    choice_of_free = FreeChoice(period=period, alignment="period", low_pass=None)
     for variant, chosen in VARIANTS.items():
         choice = AnalysisChoice(
             observers=ObserverChoice.parsed(observer=PAPER, **chosen),
-            free=free,
+            free=choice_of_free,
             contacts=False,
             reference=ReferenceChoice(name="two-cycle"),
         )
         made = analyse(recording, robot, choice, models)
-        put_errors(result, variant, made, period)
-        put_facts(result, variant, made)
+        assert made.errors is not None, "a reference was asked for"
+        rows = made.errors.filter(pl.col("joint").is_not_null())
+        for row in rows.iter_rows(named=True):
+            key = f"{row['observer']}/{row['joint']}"
+            result.put(variant, {key: row["rmse_Nm"]})
+            result.put(FLOOR, {key: row["reference_floor_Nm"]})
+        # Free rms and lag are means of joints 1 to 3.
+        for estimate in made.estimates:
+            free = (estimate.t > 1.0) & (estimate.t < period)
+            result.put(variant, {f"free/{estimate.name}": rms(estimate.tau[free, :3])})
+            own = rows.filter((pl.col("observer") == estimate.name) & (pl.col("joint") <= 3))
+            if lags := own["lag_s"].drop_nulls().to_list():
+                result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
+        for each in facts(made.observers, made.tunings, made.motion.log, made.errors):
+            numbers = {
+                "response": each.response,
+                "delay": each.delay,
+                "passed": 100.0 * each.passed,
+                "rmse": each.rmse,
+                "numbers": float(each.parameter_count),
+            }
+            result.put(variant, {f"{key}/{each.name}": value for key, value in numbers.items()})
         if variant == CORRECTED:
             chart = torque_chart(made)
             # Four bands would hide one another.
             lines = (line._replace(shown=True, leads=False, half=None) for line in chart.series)
             result.charts["fig3"] = chart._replace(series=tuple(lines))
     return result
-
-
-def put_errors(result: RunResult, variant: str, made: Analysis, period: float) -> None:
-    """RMSE and floor by joint, lag and free rms as means of joints 1 to 3."""
-    assert made.errors is not None, "a reference was asked for"
-    rows = made.errors.filter(pl.col("joint").is_not_null())
-    for row in rows.iter_rows(named=True):
-        key = f"{row['observer']}/{row['joint']}"
-        result.put(variant, {key: row["rmse_Nm"]})
-        result.put(FLOOR, {key: row["reference_floor_Nm"]})
-    for estimate in made.estimates:
-        free = (estimate.t > 1.0) & (estimate.t < period)
-        rms = float(np.sqrt(np.mean(estimate.tau[free, :3] ** 2)))
-        result.put(variant, {f"free/{estimate.name}": rms})
-        own = rows.filter((pl.col("observer") == estimate.name) & (pl.col("joint") <= 3))
-        if lags := own["lag_s"].drop_nulls().to_list():
-            result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
-
-
-def put_facts(result: RunResult, variant: str, made: Analysis) -> None:
-    """Numbers of the guidelines."""
-    for each in facts(made.observers, made.tunings, made.motion.log, made.errors):
-        found = {
-            "response": each.response,
-            "delay": each.delay,
-            "passed": 100.0 * each.passed,
-            "rmse": each.rmse,
-            "numbers": float(each.parameter_count),
-        }
-        result.put(variant, {f"{key}/{each.name}": value for key, value in found.items()})

@@ -139,10 +139,7 @@ def render_page(paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job
 
 
 def render_markdown(
-    paper: Paper,
-    found: Mapping[str, ShownItem],
-    jobs: Sequence[Job],
-    command: str,
+    paper: Paper, found: Mapping[str, ShownItem], jobs: Sequence[Job], command: str
 ) -> str:
     """Markdown of a reproduction, with its command."""
     parts = [

@@ -6,7 +6,7 @@ Medians over the rounds are reported.
 
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
@@ -51,17 +51,6 @@ class Timings:
         begin = time.perf_counter()
         work()
         self.seconds.setdefault(name, []).append((time.perf_counter() - begin) * scale)
-
-    def rounds(
-        self,
-        work: Mapping[str, Callable[[], object]],
-        count: int,
-        scales: Mapping[str, float] | None = None,
-    ) -> None:
-        """Time every call in turn, so many rounds."""
-        for _ in range(count):
-            for name, call in work.items():
-                self.measure(name, call, (scales or {}).get(name, 1.0))
 
     def median(self, name: str) -> float:
         """Median over the rounds. [s]"""
@@ -114,11 +103,27 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
         a complete log, with their tuning but for ``best``; and what was run.
     """
     robot, timings = load_robot(robot_name), Timings()
+    recording = circle(robot, samples)
+    observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
+    run = Run(recording=recording, robot=robot)
+    free = recording.t < FREE_SECONDS
+    part = [RunSamples(run, free)]
+    spectra = partial(spectra_of, RunSamples(run, ~free), part)
     with one_core():
-        work = work_of(robot, circle(robot, samples))
+        terms, found = run.terms, spectra()
+        work: dict[str, Callable[[], object]] = {
+            "dynamics": partial(dynamics_terms, recording, robot),
+            **{observer.name: partial(observer.estimate, terms) for observer in observers},
+            "spectra": spectra,
+            BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
+            **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
+            **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
+        }
         for call in work.values():  # once unmeasured
             call()
-        timings.rounds(work, rounds)
+        for _ in range(rounds):
+            for name, call in work.items():
+                timings.measure(name, call)
     return {
         "simd": simd(),
         "robot": robot.name,
@@ -142,30 +147,34 @@ def estimate_tuned(name: str, terms: DynamicsTerms, found: Spectra) -> None:
     tune_to_spectra(name, found).estimate(terms)
 
 
-def work_of(robot: Robot, recording: Recording) -> dict[str, Callable[[], object]]:
-    """Name → what the benchmark times along a recording."""
-    observers, _ = ObserverChoice(names=(*PAPER, "kfo-rts")).build(robot, recording.median_step)
-    run = Run(recording=recording, robot=robot)
-    terms = run.terms
-    free = recording.t < FREE_SECONDS
-    part = [RunSamples(run, free)]
-    spectra = partial(spectra_of, RunSamples(run, ~free), part)
-    found = spectra()
-    return {
-        "dynamics": partial(dynamics_terms, recording, robot),
-        **{observer.name: partial(observer.estimate, terms) for observer in observers},
-        "spectra": spectra,
-        BEST: partial(tune_to_spectra(BEST, found).estimate, terms),
-        **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
-        **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
-    }
-
-
 def computing_time(_seed: int) -> RunResult:
     """Seconds for the paper's samples by observer, with dynamics; printed ratios."""
+    robot, timings, result = load_robot("ur5"), Timings(), RunResult()
+    log = circle(robot, SAMPLES)
+    # The printed way runs over fewer samples and is scaled.
+    few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
+    q, dq, step, scale = few.q, few.require("dq"), few.median_step, SAMPLES / few.samples
+    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
     with one_core():
-        timings = timed()
-    result = RunResult()
+        terms, short = dynamics_terms(log, robot), dynamics_terms(few, robot)
+        dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
+        # Both first-order observers run in one loop: each is half of it.
+        both = partial(first_order_loops, short.p, short.mu, step)
+        printed: dict[str, tuple[Callable[[], object], float]] = {
+            "dynamics": (partial(literal_momentum_terms, robot.model, q, dq), scale),
+            "fdo": (both, 0.5 * scale),
+            "gmo": (both, 0.5 * scale),
+            "kfo-fe": (dense, scale),
+            "kfo-zoh": (partial(dense, rebuild=True), scale),
+        }
+        built, _ = ObserverChoice(names=PAPER).build(robot, step)
+        own: dict[str, Callable[[], object]] = {"dynamics": partial(dynamics_terms, log, robot)}
+        own |= {observer.name: partial(observer.estimate, terms) for observer in built}
+        for _ in range(ROUNDS):
+            for name, call in own.items():
+                timings.measure(f"{CORRECTED} {name}", call)
+            for name, (call, share) in printed.items():
+                timings.measure(f"{AS_PRINTED} {name}", call, share)
     for variant in (AS_PRINTED, CORRECTED):
         dynamics = timings.median(f"{variant} dynamics")
         cost = {name: dynamics + timings.median(f"{variant} {name}") for name in PAPER}
@@ -175,33 +184,6 @@ def computing_time(_seed: int) -> RunResult:
         for name in ("fdo", "kfo-fe"):
             result.put(variant, {f"zoh/{name}": cost["kfo-zoh"] / cost[name]})
     return result
-
-
-def timed() -> Timings:
-    """The parts of both ways; the printed one runs over fewer samples and is scaled."""
-    robot, timings = load_robot("ur5"), Timings()
-    log = circle(robot, SAMPLES)
-    few = log.between(0.0, float(log.t[SCRIPT_SAMPLES - 1]))
-    q, dq, step = few.q, few.require("dq"), few.median_step
-    terms, short = dynamics_terms(log, robot), dynamics_terms(few, robot)
-    kalman = KalmanObserver(discretisation="zoh", r_diag=0.5, q_p_diag=0.01, q_tau_diag=5000.0)
-    dense = partial(dense_kalman_loop, short.p, short.mu, step, kalman)
-    built, _ = ObserverChoice(names=PAPER).build(robot, step)
-    # Both first-order observers run in one loop: each is half of it.
-    both = partial(first_order_loops, short.p, short.mu, step)
-    work: dict[str, Callable[[], object]] = {
-        **{f"{CORRECTED} {o.name}": partial(o.estimate, terms) for o in built},
-        f"{CORRECTED} dynamics": partial(dynamics_terms, log, robot),
-        f"{AS_PRINTED} dynamics": partial(literal_momentum_terms, robot.model, q, dq),
-        f"{AS_PRINTED} fdo": both,
-        f"{AS_PRINTED} gmo": both,
-        f"{AS_PRINTED} kfo-fe": dense,
-        f"{AS_PRINTED} kfo-zoh": partial(dense, rebuild=True),
-    }
-    scales = {name: SAMPLES / len(q) for name in work if name.startswith(AS_PRINTED)}
-    halves = {name: 0.5 * SAMPLES / len(q) for name, call in work.items() if call is both}
-    timings.rounds(work, ROUNDS, scales | halves)
-    return timings
 
 
 def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> tuple[Array, Array]:
@@ -238,12 +220,7 @@ def held_matrices(step: float, q_p: Array, q_tau: Array) -> tuple[Array, Array, 
 
 
 def dense_kalman_loop(
-    p: Array,
-    mu: Array,
-    step: float,
-    kalman: KalmanObserver,
-    *,
-    rebuild: bool = False,
+    p: Array, mu: Array, step: float, kalman: KalmanObserver, *, rebuild: bool = False
 ) -> Array:
     """Textbook Kalman filter of 2n states with covariance, sample by sample.
 
