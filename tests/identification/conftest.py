@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification.processing import PreparedLog, Processing
+from vftcli.identification.processing import CUTOFF, PreparedLog
 from vftcli.identification.training import Training, prepare_training
 from vftcli.robots import JointFriction, Robot, load_robot
 from vftcli.robots.friction import friction_torque
@@ -20,7 +20,7 @@ def prepared_log(t, q=None, dq=None, ddq=None, tau=None, usable=None, **signals)
     q, dq, ddq, tau = (np.zeros(shape) if x is None else x for x in (q, dq, ddq, tau))
     return PreparedLog(
         recording=Recording(t=t, q=q, dq=dq, torque=tau, **signals),
-        processing=Processing(),
+        cutoff=CUTOFF,
         kept=np.arange(len(t)),
         t=t,
         q=q,
@@ -80,4 +80,4 @@ def rubbing_log(rubbing_arm) -> Recording:
 @pytest.fixture
 def rubbing_data(rubbing_arm, rubbing_log) -> Training:
     """That log as training data for its own robot."""
-    return prepare_training([rubbing_log], rubbing_arm, Processing(), fit_constants=False)
+    return prepare_training([rubbing_log], rubbing_arm)

@@ -20,7 +20,6 @@ from vftcli.identification.clean_fit import (
     warm_up_remarks,
 )
 from vftcli.identification.friction_fit import fit_frictions
-from vftcli.identification.processing import Processing
 from vftcli.identification.training import prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
@@ -50,7 +49,7 @@ def data(rubbing_data):
 def test_a_push_is_left_out_of_the_fit(recording):
     push = np.where((recording.t > 5) & (recording.t < 6), 40.0, 0.0)[:, None] * np.eye(6)[1]
     pushed = replace(recording, current=recording.current + push / UR5.torque_constant)
-    data = prepare_training([pushed], UR5, Processing(), fit_constants=False)
+    data = prepare_training([pushed], UR5)
     found, fits, (remark,) = fit_without_contacts(data, strict=False)
     assert remark.code == "suspected-contacts"
     t, weights = data.logs[0].motion.t, found.logs[0].weights
@@ -62,9 +61,7 @@ def test_a_push_is_left_out_of_the_fit(recording):
     np.testing.assert_allclose(lost, [-TOUCH_MARGIN, TOUCH_MARGIN], atol=0.025)
     assert (remark.values["count"], remark.values["worst_joints"]) == (1, [2])
     assert remark.values["total_s"] == ends[1] - ends[0]
-    clean = fit_without_contacts(
-        prepare_training([recording], UR5, Processing(), fit_constants=False), strict=False
-    )
+    clean = fit_without_contacts(prepare_training([recording], UR5), strict=False)
     assert clean.remarks == []
     np.testing.assert_allclose(fits[1].fit.values[:2], clean.fits[1].fit.values[:2], rtol=0.05)
 
@@ -168,7 +165,7 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
         heavier = chain_parameters(UR5.with_payload(load).loaded_chain)
         extra = torque_regressor(UR5.chain, q, dq, ddq) @ (heavier - chain_parameters(UR5.chain))
         log = replace(recording, current=recording.current + extra / UR5.torque_constant)
-        data = prepare_training([log], UR5, Processing(), fit_constants=False)
+        data = prepare_training([log], UR5)
         remarks = model_doubts(data, [None] * 6)
         assert [r.code for r in remarks] == ["unknown-load"] * doubted
         if doubted:
@@ -178,7 +175,7 @@ def test_an_unknown_load_is_doubted_from_half_a_kilogram_on(recording, sines):
 @pytest.mark.slow
 def test_strict_methods_refuse_what_others_remark_on(recording):
     turned = replace(recording, current=-recording.current)
-    data = prepare_training([turned], UR5, Processing(), fit_constants=False)
+    data = prepare_training([turned], UR5)
     with pytest.raises(IdentificationError, match="Choose another --robot"):
         fit_without_contacts(data, strict=True)
     codes = [r.code for r in fit_without_contacts(data, strict=False).remarks]
@@ -195,12 +192,12 @@ def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(reco
     # 10 cosines of freedom a link against 2300 equations a joint: a few per cent
     assert ratio(data) == pytest.approx(1.0, abs=0.1)
     ur10 = replace(load_robot("ur10e"), torque_constant=UR5.torque_constant)
-    other = prepare_training([recording], ur10, Processing(), fit_constants=False)
+    other = prepare_training([recording], ur10)
     assert ratio(other) > OTHER_LINKS
     rng = np.random.default_rng(4)
     noise = 30.0 * rng.standard_normal(recording.q.shape) / UR5.torque_constant
     noisy = replace(recording, current=recording.current + noise)
-    trained = prepare_training([noisy], UR5, Processing(), fit_constants=False)
+    trained = prepare_training([noisy], UR5)
     remarks = fit_without_contacts(trained, strict=True).remarks
     (said,) = [r for r in remarks if r.code == "noisy-effort"]
     assert said.values["ratio"] < 1.2
@@ -209,7 +206,7 @@ def test_links_of_another_arm_are_told_from_an_effort_that_no_links_explain(reco
 
 def remarks_of(recording, arm):
     """What is said of a log's warm-up."""
-    data = prepare_training([recording], arm, Processing(), fit_constants=False)
+    data = prepare_training([recording], arm)
     return warm_up_remarks(data, fit_frictions(data))
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.identification import Task, identify
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
-from vftcli.identification.processing import Processing, gravity_torque, prepare
+from vftcli.identification.processing import gravity_torque, prepare
 from vftcli.identification.result import repeated_share
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
@@ -139,10 +139,8 @@ def test_links_are_identified_for_another_trajectory():
     test = found.residuals.filter(
         (found.residuals["role"] == "held-out") & (found.residuals["model"] == "identified")
     )
-    noise = prepare(log(true, 7), true, Processing())
-    floor = np.sqrt(
-        np.mean((noise.tau - prepare(log(true, 7, noise=0.0), true, Processing()).tau) ** 2, axis=0)
-    )
+    noise = prepare(log(true, 7), true)
+    floor = np.sqrt(np.mean((noise.tau - prepare(log(true, 7, noise=0.0), true).tau) ** 2, axis=0))
     # the filter's rounding of reversals is in both; 1.3 covers the 46 numbers of 1400 samples
     assert np.mean(test["rms_Nm"].to_numpy()) < 1.3 * np.mean(floor)
     assert found.base is not None
@@ -231,7 +229,7 @@ def test_a_repeated_trajectory_is_told():
     found = identify([first], UR5, Task(method="friction"), [again, other])
     (told,) = [r for r in found.remarks if r.code == "repeated-trajectory"]
     assert told.values["share_percent"] == 100.0
-    motions = [prepare(r, UR5, Processing()) for r in (first, again, other)]
+    motions = [prepare(r, UR5) for r in (first, again, other)]
     assert repeated_share(motions[0], motions[1]) == 1.0
     assert repeated_share(motions[0], motions[2]) < 0.2
 

@@ -8,7 +8,6 @@ import pytest
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
 from vftcli.identification.methods import chosen_method
-from vftcli.identification.processing import Processing
 from vftcli.identification.training import prepare_training
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
@@ -35,7 +34,7 @@ def with_other_links(recording, sines, share):
 @pytest.mark.parametrize(("share", "method"), [(0.0, "friction"), (0.35, "base")])
 def test_wrong_links_are_identified_too(rubbing_log, sines, share, method):
     log = with_other_links(rubbing_log, sines, share)
-    result = chosen_method(prepare_training([log], UR5, Processing(), False))
+    result = chosen_method(prepare_training([log], UR5))
     assert result.method == method
     said = "links-identified" in [remark.code for remark in result.remarks]
     assert said is (method == "base")

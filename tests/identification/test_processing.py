@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.processing import Processing, gravity_torque, prepare, usable_samples
+from vftcli.identification import Task
+from vftcli.identification.processing import (
+    gravity_torque,
+    prepare,
+    settings_record,
+    stride,
+    usable_samples,
+)
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
@@ -25,7 +32,7 @@ def log(rate=500.0, seconds=8.0, joints=7):
 
 def test_a_log_is_cut_to_its_motion_and_decimated_to_six_samples_a_period():
     recording, _ = log()
-    motion = prepare(recording, PANDA, Processing())
+    motion = prepare(recording, PANDA)
     # 500 Hz over 6 · 8 Hz is 10.4: every tenth sample
     assert np.all(np.diff(motion.kept) == 10)
     assert motion.t[0] == pytest.approx(0.502)
@@ -35,7 +42,7 @@ def test_a_log_is_cut_to_its_motion_and_decimated_to_six_samples_a_period():
 
 def test_signals_of_the_band_pass_and_velocity_becomes_acceleration():
     recording, w = log()
-    motion = prepare(recording, PANDA, Processing())
+    motion = prepare(recording, PANDA)
     inner = (motion.t > 1.5) & (motion.t < 6.5)
     angle = w * (motion.t[inner] - 0.5)[:, None] + np.arange(7)
     # two passes of a Butterworth filter of order 4 take (0.4 / 8)⁸ of the amplitude
@@ -51,13 +58,13 @@ def test_signals_of_the_band_pass_and_velocity_becomes_acceleration():
 def test_a_log_at_rest_has_no_samples():
     t = np.arange(0, 4, 0.002)
     still = np.zeros((len(t), 7))
-    motion = prepare(Recording(t=t, q=still, dq=still, torque=still), PANDA, Processing())
+    motion = prepare(Recording(t=t, q=still, dq=still, torque=still), PANDA)
     assert motion.samples == 0
     assert list(motion.chunks()) == []
 
 
 def test_chunks_cover_every_sample_once():
-    motion = prepare(log()[0], PANDA, Processing())
+    motion = prepare(log()[0], PANDA)
     rows = np.concatenate([np.arange(motion.samples)[span] for span in motion.chunks(100)])
     np.testing.assert_array_equal(rows, np.arange(motion.samples))
 
@@ -76,13 +83,13 @@ def test_long_stops_and_gaps_tell_nothing():
     assert np.flatnonzero(~usable[:, 1]).tolist() == gap
 
 
-@pytest.mark.parametrize(("rate", "stride"), [(1000.0, 20), (500.0, 10), (48.0, 1), (20.0, 1)])
-def test_the_stride_keeps_six_samples_a_period_of_the_cutoff(rate, stride):
-    assert Processing(cutoff=8.0).stride(1 / rate) == stride
+@pytest.mark.parametrize(("rate", "each"), [(1000.0, 20), (500.0, 10), (48.0, 1), (20.0, 1)])
+def test_the_stride_keeps_six_samples_a_period_of_the_cutoff(rate, each):
+    assert stride(8.0, 1 / rate) == each
 
 
 def test_settings_say_what_was_done():
-    words = Processing(cutoff=4.0).settings_record(0.002)
+    words = settings_record(4.0, 0.002)
     assert words["cutoff_hz"] == 4.0
     assert words["decimation"] == 20.0  # 500 Hz over 24 Hz
     assert words["kept_rate_hz"] == 25.0
@@ -91,7 +98,7 @@ def test_settings_say_what_was_done():
 @pytest.mark.parametrize("cutoff", [0.0, -1.0, 1e4])
 def test_impossible_cutoffs_are_refused(cutoff):
     with pytest.raises(ParameterError, match="it must be positive"):
-        Processing(cutoff=cutoff)
+        Task(cutoff=cutoff)
 
 
 def test_gravity_is_pinocchios_chunk_by_chunk():

@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
-from vftcli.identification.processing import Processing, prepare
+from vftcli.identification.processing import prepare
 from vftcli.identification.result import REPEATED, repeated_share
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
@@ -229,8 +229,7 @@ def test_panda_second_half(panda, method, limit):
 def test_the_same_free_motion_is_recognised(ur10e):
     robot = load_robot("ur10e")
     a, b, other = (
-        prepare(ur10e(name), robot, Processing())
-        for name in ("free_repeat_a", "free_repeat_b", "free_12harm")
+        prepare(ur10e(name), robot) for name in ("free_repeat_a", "free_repeat_b", "free_12harm")
     )
     assert repeated_share(a, b) >= REPEATED
     assert repeated_share(a, other) < REPEATED

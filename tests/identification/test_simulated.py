@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.identification import Processing, Task, identify
+from vftcli.identification import Task, identify
 from vftcli.identification.physical_links import is_physical
 from vftcli.identification.processing import (
     gravity_torque,
@@ -94,7 +94,7 @@ def test_friction_rotor_and_constants_come_back_within_five_per_cent(train, trut
 def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth):
     found = identify([train], load_robot("ur5"), Task(method="base"), [other])
     trace = next(t for t in found.traces if t.role == "held-out")
-    motion = prepare(other, truth, Processing())
+    motion = prepare(other, truth)
     floor = root_mean_square(motion.tau - predicted_torque(truth, motion))
     # the floor is what the true arm itself leaves: current noise and stiction at reversals
     assert root_mean_square(trace.residual).mean() <= 1.1 * floor.mean()

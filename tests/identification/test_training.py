@@ -20,7 +20,6 @@ from vftcli.identification.methods import (
     with_links,
     with_vector,
 )
-from vftcli.identification.processing import Processing
 from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
@@ -108,7 +107,7 @@ def test_friction_and_rotor_of_every_joint_are_found(data):
 @pytest.mark.slow
 def test_residuals_are_cut_apart_log_by_log(recording):
     logs = [recording, recording.between(0.0, 7.0)]
-    data = prepare_training(logs, UR5, Processing(), fit_constants=False)
+    data = prepare_training(logs, UR5)
     fits = fit_frictions(data)
     first, second = all_residuals(data, fits)
     assert (len(first), len(second)) == tuple(log.motion.samples for log in data.logs)
@@ -121,7 +120,7 @@ def test_drive_constants_need_currents(recording):
     with pytest.raises(
         IdentificationError, match=r"--set identify\.constants=yes needs motor currents"
     ):
-        prepare_training([torque], UR5, Processing(), fit_constants=True)
+        prepare_training([torque], UR5, fit_constants=True)
 
 
 def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
@@ -186,7 +185,7 @@ def test_a_current_that_falls_with_the_torque_is_refused(data):
 def test_a_wrong_drive_constant_scales_friction_and_rotor(recording):
     """Currents of an arm whose K is 1.05 × the profile's: all torques are 1.05 × what is read."""
     log = replace(recording, current=recording.current / 1.05)
-    data = prepare_training([log], UR5, Processing(), fit_constants=True)
+    data = prepare_training([log], UR5, fit_constants=True)
     found = friction_method(data)
     K = {n.joint: n for n in found.numbers if n.parameter == "torque_constant"}
     assert K[2].value == pytest.approx(1.05 * UR5.torque_constant[1], rel=0.01)

@@ -7,9 +7,8 @@ from vftcli.signals.packages import door
 
 if TYPE_CHECKING:
     from vftcli.identification.fitting import identify
-    from vftcli.identification.processing import Processing
     from vftcli.identification.result import Identification
 else:
-    __getattr__ = door(__name__, "fitting", "processing", "result")
+    __getattr__ = door(__name__, "fitting", "result")
 
-__all__ = ["Identification", "Processing", "Task", "identify"]
+__all__ = ["Identification", "Task", "identify"]

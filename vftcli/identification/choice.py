@@ -43,6 +43,8 @@ class Task(Choice):
     friction: bool = True
 
     def __post_init__(self) -> None:
+        if not 0.0 < self.cutoff < 1e4:
+            raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
         if self.method is not None:
             check_known(self.method, METHODS, f"--method {self.method}")
         if self.constants and self.method not in {None, "friction"}:

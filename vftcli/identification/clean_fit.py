@@ -115,7 +115,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
     # The filter spreads an event at standstill over a period of its cutoff.
-    reach = max(1, round(1.0 / (motion.processing.cutoff * median_step(motion.t))))
+    reach = max(1, round(1.0 / (motion.cutoff * median_step(motion.t))))
     sticks = near(slower(motion.dq, SLIDES), reach)
     excess = np.maximum(np.abs(residual) - np.abs(dry) * sticks, 0.0)
     z = excess * usable / np.maximum(sd, 1e-9)

@@ -9,16 +9,8 @@ import polars as pl
 
 from vftcli.identification.choice import Task
 from vftcli.identification.methods import chosen_method, friction_method, whole_arm
-from vftcli.identification.payload import (
-    LoadFit,
-    NotSameMotionError,
-    TooFewPosesError,
-    names_of,
-    payload_from_motion,
-    payload_from_pair,
-    payload_from_poses,
-)
-from vftcli.identification.processing import Processing
+from vftcli.identification.payload import LoadFit, find_load, names_of
+from vftcli.identification.processing import settings_record
 from vftcli.identification.result import (
     PARAMETERS,
     RESIDUALS,
@@ -33,7 +25,6 @@ from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
-from vftcli.signals.errors import IdentificationError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.recording import Recording
 
@@ -71,16 +62,15 @@ def identify(
     refuse_repeated_logs(sources)
     refuse_repeated_logs(held_out, "--check")
     load = find_load(logs, robot, free) if task.method == "payload" else None
-    processing = Processing(cutoff=task.cutoff)
     train = logs if free is None or load is None else [free]
     train = [log for log in train if load is None or not load.carried_by(log)]
     result = MethodResult("payload", robot)
     if load is None:
-        data = prepare_training(train, robot, processing, task.constants, task.friction)
+        data = prepare_training(train, robot, task.cutoff, task.constants, task.friction)
         result = FITS[task.method](data)
     new, numbers, remarks = result.robot, [*result.numbers], [*result.remarks]
     scored = [
-        score(log, role, robot, new, processing)
+        score(log, role, robot, new, task.cutoff)
         for role, some in (("train", train), ("held-out", held_out))
         for log in some
     ]
@@ -103,34 +93,10 @@ def identify(
         shape_choices=pl.DataFrame(result.shape_choices, schema=SHAPE_CHOICES, orient="row"),
         base=result.base,
         traces=traces,
-        processing=processing.settings_record(logs[0].median_step),
+        processing=settings_record(task.cutoff, logs[0].median_step),
         remarks=tuple(remarks),
     )
     return replace(found, robot=with_provenance(found, task.name, sources, train, load))
-
-
-def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
-    """The load, from a pair if there is one, else from poses, else from motion."""
-    bare = robot.with_payload(None)
-    if free is not None:
-        fit = payload_from_pair(logs[0], free, bare)
-        if fit.carried_by(free):
-            raise IdentificationError(
-                f"{free.name}, given as free of load, is the heavier one; swap the two logs"
-            )
-        return fit
-    # A pair repeats a motion: in both logs some joint travels further than it would at rest. Two
-    # episodes of a dataset carry one load.
-    moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
-    if len(logs) == 2 and moved and not all(r.source.part for r in logs):
-        try:
-            return payload_from_pair(logs[0], logs[1], bare)
-        except NotSameMotionError:
-            pass  # two different motions with the load may still tell it
-    try:
-        return payload_from_poses(logs, bare)
-    except TooFewPosesError:
-        return payload_from_motion(logs, bare)
 
 
 def with_provenance(

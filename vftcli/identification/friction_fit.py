@@ -109,9 +109,7 @@ class JointData(NamedTuple):
         cuts = np.cumsum([motion.samples for motion in motions])[:-1]
         return np.concatenate(
             [
-                low_pass(motion.t, part, LISTENING)
-                if motion.processing.cutoff > LISTENING
-                else part
+                low_pass(motion.t, part, LISTENING) if motion.cutoff > LISTENING else part
                 for motion, part in zip(motions, np.split(signals, cuts), strict=True)
             ]
         )

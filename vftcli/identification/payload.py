@@ -8,9 +8,10 @@ import numpy as np
 
 from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.processing import (
+    STATIC,
     PreparedLog,
-    Processing,
     gravity_torque,
+    load_columns,
     prepare,
     root_mean_square,
 )
@@ -33,7 +34,6 @@ from vftcli.signals.rest import faster, held
 from vftcli.signals.series import intervals, resample_columns
 
 PASSES = 3  #: Fits, each with the joints' residuals of the last one.
-STATIC = 4  #: Parameters that gravity shows: mass, three first moments.
 SAME_MOTION = 5e-3  #: Largest position difference of two logs of one motion. [rad rms]
 COARSE, FINE = 0.05, 5e-4  #: Steps of the search for the shift between two logs. [s]
 DWELL = 0.5  #: Shortest rest that is a pose. [s]
@@ -81,15 +81,9 @@ class LoadFit(NamedTuple):
 def load_at_flange(
     x: Array, sd: Array, left: Array, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
-    """A load in flange axes from a solution.
+    """A load in flange axes from mass and first moments in the last link's frame, with their sd.
 
-    Args:
-        x: Mass and first moments in the last link's frame. (4,) [kg, kg·m]
-        sd: Their standard deviations. (4,)
-        left: RMS torque left in each joint. (n,) [N·m]
-        robot: The arm.
-        loaded: The logs with the load.
-        origin: How it was found.
+    (4,) each [kg, kg·m]; `left` is the RMS torque left in each joint. (n,) [N·m]
     """
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
     if mass <= 0 or mass_sd > 0.5 * mass:
@@ -126,12 +120,9 @@ class JointsFit(NamedTuple):
     def cluster_covariance(self, clusters: Sequence[slice | Indices]) -> Array:
         """Covariance of x with residuals that clusters share. (k, k)
 
-        Each cluster's pull on the solution makes G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
+        The pull of each of B clusters of rows on the solution makes G (Σ_b A_bᵀ r_b r_bᵀ A_b) G ·
         B/(B − 1), G = (AᵀA)⁻¹ (K.-Y. Liang, S. Zeger, "Longitudinal data analysis using generalized
         linear models", Biometrika 73(1), 1986).
-
-        Args:
-            clusters: The rows of each, B of them.
         """
         inverse, rest = self.inverse, self.left * self.weights
         pulls = np.array([np.einsum("knp,kn->p", self.A[c], rest[c]) for c in clusters])
@@ -147,14 +138,10 @@ class JointsFit(NamedTuple):
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
 
     def gain_covariance(self, y: Array, gain: float) -> Array:
-        """Covariance of x by uncertain drive constants. (k, k)
+        """Covariance of x by drive constants of this relative sd, y (N, n) explained. (k, k)
 
         Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
         each one.
-
-        Args:
-            y: The torque to explain. (N, n)
-            gain: Relative standard deviation of a joint's torque.
         """
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse
@@ -175,45 +162,33 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
     return JointsFit(x, left, w, A * w[:, :, None])
 
 
-def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
-    """Torque of mass and first moments in the last link's frame. (N, n, 4)"""
-    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
-
-
 def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> LoadFit:
     """A load from one motion with and without it; the loaded log shows by itself.
 
     At equal phase the torque differs by the load and by friction that grows with it.
     """
     for loaded, free in ((second, first), (first, second)):
-        fit, sd, origin = solve_pair(loaded, free, robot)
+        motion = prepare(loaded, robot)
+        shift, distance = find_time_shift(motion, free)
+        torque = zero_phase(free.t, drive_torque(free, robot), motion.cutoff)
+        at = motion.t + shift
+        inside = (at >= free.t[0]) & (at <= free.t[-1])
+        extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
+        sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
+        q, usable = motion.q[inside], motion.usable[inside].astype(float)
+        Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
+        fit = fit_all_joints(Y, extra, usable)
+        # Friction grows with the load we seek: a few rounds settle it.
+        for _ in range(4):
+            A = np.concatenate([Y, load_friction(robot, q, sign, fit.x[:STATIC])], axis=2)
+            fit = fit_all_joints(A, extra, usable)
         if fit.x[0] >= 0:
             break
-    x, left = fit.x[:STATIC], root_mean_square(fit.left)
-    return load_at_flange(x, sd, left, robot, (loaded,), origin)
-
-
-def solve_pair(loaded: Recording, free: Recording, robot: Robot) -> tuple[JointsFit, Array, Remark]:
-    """Fit beyond the free log's torque, sd of mass and moments (4,), origin."""
-    processing = Processing()
-    motion = prepare(loaded, robot, processing)
-    shift, distance = find_time_shift(motion, free)
-    torque = zero_phase(free.t, drive_torque(free, robot), processing.cutoff)
-    at = motion.t + shift
-    inside = (at >= free.t[0]) & (at <= free.t[-1])
-    extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
-    sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
-    q = motion.q[inside]
-    Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
-    usable = motion.usable[inside].astype(float)
-    fit = fit_all_joints(Y, extra, usable)
-    # Friction grows with the load we seek: a few rounds settle it.
-    for _ in range(4):
-        A = np.concatenate([Y, load_friction(robot, q, sign, fit.x[:STATIC])], axis=2)
-        fit = fit_all_joints(A, extra, usable)
     sd = np.sqrt(np.diag(fit.motion_covariance(extra, gain_sd(loaded, robot))))[:STATIC]
     values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * distance}
-    return fit, sd, Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
+    origin = Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
+    x, left = fit.x[:STATIC], root_mean_square(fit.left)
+    return load_at_flange(x, sd, left, robot, (loaded,), origin)
 
 
 def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
@@ -391,3 +366,27 @@ def carrying(run: Run, x: Array) -> Run:
     more = loaded.coriolis_transpose_dq - own.coriolis_transpose_dq
     mu = handed_over(terms.mu + more - loaded.gravity + own.gravity)
     return run.holding(terms=replace(terms, p=handed_over(terms.p + loaded.p - own.p), mu=mu))
+
+
+def find_load(logs: Sequence[Recording], robot: Robot, free: Recording | None) -> LoadFit:
+    """The load, from a pair if there is one, else from poses, else from motion."""
+    bare = robot.with_payload(None)
+    if free is not None:
+        fit = payload_from_pair(logs[0], free, bare)
+        if fit.carried_by(free):
+            raise IdentificationError(
+                f"{free.name}, given as free of load, is the heavier one; swap the two logs"
+            )
+        return fit
+    # A pair repeats a motion: in both logs some joint travels further than it would at rest. Two
+    # episodes of a dataset carry one load.
+    moved = all(np.ptp(r.q, axis=0).max() > 0.05 for r in logs)
+    if len(logs) == 2 and moved and not all(r.source.part for r in logs):
+        try:
+            return payload_from_pair(logs[0], logs[1], bare)
+        except NotSameMotionError:
+            pass  # two different motions with the load may still tell it
+    try:
+        return payload_from_poses(logs, bare)
+    except TooFewPosesError:
+        return payload_from_motion(logs, bare)

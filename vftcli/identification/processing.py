@@ -7,54 +7,42 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.kernels import CHUNK, momentum_terms
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import NONZERO, faster
 from vftcli.signals.series import covered, gaps_of, intervals
 
+#: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
+CUTOFF = 8.0
 #: Samples kept per period of the cutoff when the filtered log is decimated.
 OVERSAMPLING = 6.0
 STOP = 0.3  #: Length of a stop from which on it identifies nothing, because of stiction. [s]
+STATIC = 4  #: Parameters of a link that gravity shows: mass, three first moments.
 GAP = 10.0  #: Steps longer than this many median steps are left out.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Processing:
-    """Filter and decimation: all parts of a joint's torque share one filter."""
+def settings_record(cutoff: float, step: float) -> dict[str, str | float]:
+    """The settings of a log of this median step [s], for the robot file and `run.json`."""
+    return {
+        "filter": f"Butterworth order {STEEP}, forwards and backwards (zero phase)",
+        "cutoff_hz": cutoff,
+        "band_hz": f"0 to {cutoff:g}",
+        "differentiation": "central differences of the filtered velocity on the log's clock; "
+        "positions are never differentiated",
+        "decimation": float(stride(cutoff, step)),
+        "kept_rate_hz": round(1.0 / (step * stride(cutoff, step)), 6),
+        "scored_span": f"first to last sample with |dq| > {NONZERO:g} rad/s",
+    }
 
-    #: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
-    cutoff: float = 8.0
 
-    def __post_init__(self) -> None:
-        if not 0.0 < self.cutoff < 1e4:
-            raise ParameterError(f"cutoff is {self.cutoff:g} Hz; it must be positive")
-
-    def settings_record(self, step: float) -> dict[str, str | float]:
-        """The settings in words, for the robot file and `run.json`.
-
-        Args:
-            step: Median step of the log. [s]
-        """
-        return {
-            "filter": f"Butterworth order {STEEP}, forwards and backwards (zero phase)",
-            "cutoff_hz": self.cutoff,
-            "band_hz": f"0 to {self.cutoff:g}",
-            "differentiation": "central differences of the filtered velocity on the log's clock; "
-            "positions are never differentiated",
-            "decimation": float(self.stride(step)),
-            "kept_rate_hz": round(1.0 / (step * self.stride(step)), 6),
-            "scored_span": f"first to last sample with |dq| > {NONZERO:g} rad/s",
-        }
-
-    def stride(self, step: float) -> int:
-        """Every how many samples of the filtered log are kept."""
-        return max(1, int(1.0 / (step * OVERSAMPLING * self.cutoff) + 1e-9))
+def stride(cutoff: float, step: float) -> int:
+    """Every how many samples of the filtered log are kept."""
+    return max(1, int(1.0 / (step * OVERSAMPLING * cutoff) + 1e-9))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +50,7 @@ class PreparedLog:
     """A log prepared for identification: M samples from first to last motion."""
 
     recording: Recording  #: The log.
-    processing: Processing  #: Its filter.
+    cutoff: float  #: Cutoff of its filter, one for all parts of a joint's torque. [Hz]
     kept: NDArray[np.int64]  #: Numbers of these samples in the log. (M,)
     t: Array  #: Time. (M,) [s]
     q: Array  #: Positions. (M, n) [rad]
@@ -82,8 +70,7 @@ class PreparedLog:
         """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
         recording = self.recording
         columns = [
-            zero_phase(recording.t, column[:, None], self.processing.cutoff)[self.kept]
-            for column in signals.T
+            zero_phase(recording.t, column[:, None], self.cutoff)[self.kept] for column in signals.T
         ]
         return np.concatenate(columns, axis=1)
 
@@ -93,22 +80,16 @@ class PreparedLog:
             yield slice(start, min(start + size, self.samples))
 
 
-def prepare(recording: Recording, robot: Robot, processing: Processing) -> PreparedLog:
-    """Filter, differentiate and decimate a log, one column at a time.
-
-    Raises:
-        MissingSignalError: If velocities, or both currents and torques, are missing.
-        RobotError: If the number of joints differs.
-        ClockError: If the log is too short for the filter.
-    """
+def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> PreparedLog:
+    """Filter, differentiate and decimate a log, one column at a time."""
     torque, dq = drive_torque(recording, robot), recording.require("dq")
-    t, stride = recording.t, processing.stride(recording.median_step)
+    t, each = recording.t, stride(cutoff, recording.median_step)
     # Before the first and after the last movement stiction holds what no model of velocity knows.
     moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
-    kept = np.arange(moving[0], moving[-1] + 1, stride) if moving.size else np.arange(0)
+    kept = np.arange(moving[0], moving[-1] + 1, each) if moving.size else np.arange(0)
 
     def smooth(signal: Array) -> Array:
-        return zero_phase(t, signal[:, None], processing.cutoff)
+        return zero_phase(t, signal[:, None], cutoff)
 
     joints = []
     for position, speed, effort in zip(recording.q.T, dq.T, torque.T, strict=True):
@@ -116,10 +97,10 @@ def prepare(recording: Recording, robot: Robot, processing: Processing) -> Prepa
         signals = smooth(position), velocity, derivative(t, velocity), smooth(effort)
         joints.append([signal[kept] for signal in signals])
     q, velocities, ddq, tau = (np.concatenate(x, axis=1) for x in zip(*joints, strict=True))
-    usable = usable_samples(t, dq, processing.cutoff)[kept]
+    usable = usable_samples(t, dq, cutoff)[kept]
     return PreparedLog(
         recording=recording,
-        processing=processing,
+        cutoff=cutoff,
         kept=kept,
         t=t[kept],
         q=q,
@@ -166,13 +147,16 @@ def predicted_torque(robot: Robot, motion: PreparedLog) -> Array:
     torque = rigid_torque(robot, motion) + robot.chain.rotor_inertia * motion.ddq
     if not robot.friction:
         return torque
-    recording = motion.recording
-    load = gravity_torque(robot, recording.q)
-    friction = RunningFriction(robot.friction).torque(
-        recording.q, recording.require("dq"), load, measured_temperature(recording)
-    )
-    total: Array = torque + motion.filtered(friction)
+    log, friction = motion.recording, RunningFriction(robot.friction)
+    load, temperature = gravity_torque(robot, log.q), measured_temperature(log)
+    losses = friction.torque(log.q, log.require("dq"), load, temperature)
+    total: Array = torque + motion.filtered(losses)
     return total
+
+
+def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
+    """Torque of mass and first moments in the last link's frame. (N, n, 4)"""
+    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
 
 
 def root_mean_square(x: Array) -> Array:

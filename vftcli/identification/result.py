@@ -11,14 +11,14 @@ import numpy as np
 import polars as pl
 
 from vftcli.identification.processing import (
+    STATIC,
     PreparedLog,
-    Processing,
+    load_columns,
     predicted_torque,
     prepare,
     root_mean_square,
 )
 from vftcli.robots.friction import SMOOTHING
-from vftcli.robots.regressor import LINK, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import uses_current
 from vftcli.signals.arrays import Array
@@ -171,9 +171,9 @@ class Identification:
     remarks: tuple[Remark, ...] = ()  #: What the reader should know.
 
 
-def score(log: Recording, role: str, profile: Robot, robot: Robot, processing: Processing) -> Trace:
+def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace:
     """Measured torque of a log, and the identified robot's and the profile's."""
-    motion = prepare(log, profile, processing)
+    motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
     before = root_mean_square(motion.tau - predicted_torque(profile, motion))
@@ -211,14 +211,9 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
 
 
 def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
-    """Causes of a held-out log's residual where it is much larger than in training.
+    """Causes of a held-out log's residual where it is much larger than in training (n,) [N·m].
 
     A load on the flange, which explains all joints at once, is looked for first.
-
-    Args:
-        robot: The identified robot.
-        trace: The held-out log.
-        trained: RMS of the training logs. (n,) [N·m]
     """
     motion, name = trace.motion, trace.motion.recording.name
     worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
@@ -238,26 +233,19 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
 
 def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:
     """Mass that would explain the residual, and the share explained. [kg], [1]"""
-    Y = [
-        torque_regressor(robot.chain, motion.q[s], motion.dq[s], motion.ddq[s])[:, :, -LINK:]
-        for s in motion.chunks()
-    ]
-    A = np.concatenate(Y)[:, :, :4].reshape(-1, 4)
+    q, dq, ddq = motion.q, motion.dq, motion.ddq
+    rows = [load_columns(robot, q[s], dq[s], ddq[s]).reshape(-1, STATIC) for s in motion.chunks()]
+    A = np.concatenate(rows)
     y = residual.ravel()
     x = np.linalg.lstsq(A, y, rcond=1e-6)[0]
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
-    """Whether friction explains joint j's (from 0) residual beyond training.
+    """Whether friction explains joint j's (from 0) residual beyond training's RMS [N·m].
 
     Coulomb and viscous friction and an offset are fitted to the residual; where they explain
     `EXPLAINS` of it, friction is named as its cause.
-
-    Args:
-        trace: The held-out log.
-        j: Joint, from 0.
-        trained: RMS of its residual in the training logs. [N·m]
     """
     motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
     where = Where(motion.recording.name, (j + 1,))

@@ -27,12 +27,7 @@ from vftcli.identification.methods import (
     profile_friction,
     temperature_remarks,
 )
-from vftcli.identification.processing import (
-    Processing,
-    gravity_torque,
-    prepare,
-    rigid_torque,
-)
+from vftcli.identification.processing import gravity_torque, prepare, rigid_torque
 from vftcli.identification.result import MethodResult, Number, number
 from vftcli.identification.training import Training
 from vftcli.robots.friction import friction_torque
@@ -168,46 +163,41 @@ class ControllerTargets(NamedTuple):
         return np.concatenate([source.joint(j, shape) for source in self.sources])
 
 
-def read_targets(recording: Recording, robot: Robot) -> ControllerTargets:
-    """A log's targets, filtered like its motion."""
-    wanted, asked = recording.require("target_current"), recording.require("target_torque")
-    motion = prepare(recording, robot, Processing(cutoff=CUTOFF))
-    smooth = zero_phase(recording.t, asked, CUTOFF)
-    return ControllerTargets(
-        sources=(friction_columns(motion, robot),),
-        dq=motion.dq,
-        ddq=motion.ddq,
-        current=motion.filtered(wanted),
-        moment=smooth[motion.kept],
-        lead=derivative(recording.t, smooth)[motion.kept],
-        rigid=rigid_torque(robot, motion),
-        gravity=gravity_torque(robot, motion.q),
-    )
-
-
-def controller_models(recordings: Sequence[Recording], robot: Robot) -> tuple[ControllerModel, ...]:
-    """The controller's model of every joint, by its targets."""
+def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[ControllerModel]:
+    """The controller's model of every joint, by its targets, filtered like the motion."""
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "
             "read a model off; use --method friction or base"
         )
-    logs = [read_targets(recording, robot) for recording in recordings]
-    for recording, log in zip(recordings, logs, strict=True):
+    logs = []
+    for recording in recordings:
+        current, moment = recording.require("target_current"), recording.require("target_torque")
+        motion = prepare(recording, robot, CUTOFF)
+        smooth = zero_phase(recording.t, moment, CUTOFF)
+        log = ControllerTargets(
+            sources=(friction_columns(motion, robot),),
+            dq=motion.dq,
+            ddq=motion.ddq,
+            current=motion.filtered(current),
+            moment=smooth[motion.kept],
+            lead=derivative(recording.t, smooth)[motion.kept],
+            rigid=rigid_torque(robot, motion),
+            gravity=gravity_torque(robot, motion.q),
+        )
         refuse_guided(recording, log, robot)
+        logs.append(log)
     sources, signals = tuple(log.sources[0] for log in logs), (log[1:] for log in logs)
     every = ControllerTargets(sources, *map(np.concatenate, zip(*signals, strict=True)))
-    return tuple(joint_model(j, every, float(K)) for j, K in enumerate(robot.torque_constant))
-
-
-def joint_model(j: int, log: ControllerTargets, before: float) -> ControllerModel:
-    """Model of joint j (from 0); K first, since friction needs it."""
-    # Of two ways to K, the surer one wins.
-    still, moving = constant_at_rest(j, log), constant_in_motion(j, log)
-    constant = min((still, moving), key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
-    K = constant.value if constant.known else before
-    rotor, gravity = rotor_inertia(j, log)
-    return ControllerModel(constant, rotor, controller_friction(j, log, K), gravity)
+    models = []
+    for j, before in enumerate(robot.torque_constant.tolist()):
+        # Of two ways to K, the surer one wins; friction needs it.
+        ways = constant_at_rest(j, every), constant_in_motion(j, every)
+        K = min(ways, key=lambda k: k.sd / abs(k.value) if k.sd < np.inf else np.inf)
+        friction = controller_friction(j, every, K.value if K.known else before)
+        rotor, gravity = rotor_inertia(j, every)
+        models.append(ControllerModel(K, rotor, friction, gravity))
+    return models
 
 
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
@@ -283,9 +273,7 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
     return rotor, Estimate(scale, scale_sd, scale_sd < 1e-3)
 
 
-def controller_friction(
-    j: int, log: ControllerTargets, constant: float
-) -> tuple[Shape, Array, Array] | None:
+def controller_friction(j: int, log: ControllerTargets, constant: float) -> FrictionLaw | None:
     """Best shape of K·target_current − target_moment, coefficients, sd.
 
     The controller's own law is a bent line: its points where the motion spans them, elsewhere

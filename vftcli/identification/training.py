@@ -8,8 +8,8 @@ import numpy as np
 
 from vftcli.identification.friction_shapes import FrictionColumns, friction_columns
 from vftcli.identification.processing import (
+    CUTOFF,
     PreparedLog,
-    Processing,
     predicted_torque,
     prepare,
     rigid_torque,
@@ -61,34 +61,32 @@ class Training:
 def prepare_training(
     recordings: Sequence[Recording],
     robot: Robot,
-    processing: Processing,
-    fit_constants: bool,
+    cutoff: float = CUTOFF,
+    fit_constants: bool = False,
     rubs: bool = True,
 ) -> Training:
     """Training data of a profile's logs, of joints that rub or not."""
-    motions = [prepare(recording, robot, processing) for recording in recordings]
+    motions = [prepare(recording, robot, cutoff) for recording in recordings]
     if fit_constants and not all(uses_current(r, robot) for r in recordings):
         raise IdentificationError(
             "--set identify.constants=yes needs motor currents; the logs have torques. Leave it out"
         )
     moves, reverses = moving_joints(motions)
+    logs = []
+    for motion in motions:
+        if motion.samples > 1:
+            rigid, columns = rigid_torque(robot, motion), friction_columns(motion, robot)
+            losses = predicted_torque(robot, motion) - rigid
+            logs.append(TrainingLog(motion, columns, motion.usable.astype(float), rigid, losses))
     return Training(
         robot=robot,
         recordings=tuple(recordings),
-        logs=tuple(training_log(motion, robot) for motion in motions if motion.samples > 1),
+        logs=tuple(logs),
         moves=moves,
         reverses=reverses,
         fit_constants=fit_constants,
         rubs=rubs,
     )
-
-
-def training_log(motion: PreparedLog, robot: Robot) -> TrainingLog:
-    """A prepared log with its friction columns and the profile's torques."""
-    rigid = rigid_torque(robot, motion)
-    losses = predicted_torque(robot, motion) - rigid
-    columns, weights = friction_columns(motion, robot), motion.usable.astype(float)
-    return TrainingLog(motion, columns, weights, rigid, losses)
 
 
 def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
