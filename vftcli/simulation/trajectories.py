@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -260,14 +260,13 @@ class JointwiseSpec:
         if min(self.speeds, default=0.0) <= 0:
             raise ParameterError("trajectory.speeds must be positive")
         t, times, paths = self.rest, [], []
-        for axis in self.amplitude * np.eye(robot.joints):
-            for speed in self.speeds:
-                for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
-                    length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
-                    times.append((t, t + length))
-                    paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
-                    t += length
-                t += self.rest
+        for axis, speed in product(self.amplitude * np.eye(robot.joints), self.speeds):
+            for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
+                length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
+                times.append((t, t + length))
+                paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
+                t += length
+            t += self.rest
         return Stretches(np.array(times), tuple(paths), t)
 
 
@@ -295,15 +294,8 @@ class ExcitationSpec:
         return Periodic(self.period, self.cycles, *series)
 
 
-TrajectorySpec = (
-    CircleSpec
-    | HoldSpec
-    | OffsetsSpec
-    | JointMovesSpec
-    | PosesSpec
-    | JointwiseSpec
-    | ExcitationSpec
-)
+StatedSpec = CircleSpec | HoldSpec | OffsetsSpec | JointMovesSpec
+TrajectorySpec = StatedSpec | PosesSpec | JointwiseSpec | ExcitationSpec
 
 
 def check_times(times: Array, length: float) -> None:
@@ -363,13 +355,12 @@ def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str
         found = reach(robot.model, pin.SE3(rotation, point), q)
         # A jump of a radian is another branch of the inverse kinematics.
         if found is None or np.max(np.abs(found - q)) > 1.0:
-            x, y, z = point
+            place = ", ".join(f"{value:.3f}" for value in point)
             raise ParameterError(
-                f"{what}: the flange of {robot.name!r} cannot reach ({x:.3f}, {y:.3f}, {z:.3f}) m "
-                f"(point {k + 1} of {len(points)}); choose a smaller motion or another start"
+                f"{what}: the flange of {robot.name!r} cannot reach ({place}) m (point {k + 1} of "
+                f"{len(points)}); choose a smaller motion or another start"
             )
-        q = found
-        path.append(q)
+        path.append(q := found)
     return np.array(path)
 
 
