@@ -14,8 +14,18 @@ import pytest
 from distributed import LocalCluster
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import REPLACED, Workers, connected, run_tasks
-from vftcli.batch.outcome import EngineError, Failure, Outcome, begin, failure_of, perform
+from vftcli.batch.cluster import (
+    REPLACED,
+    EngineError,
+    Failure,
+    Outcome,
+    Workers,
+    begin,
+    connected,
+    failure_of,
+    perform,
+    run_tasks,
+)
 
 HERE = WorkersChoice(jobs=0)
 

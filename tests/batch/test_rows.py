@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.batch.rows import SCHEMA, rows_of, size_of
+from vftcli.batch.log_work import SCHEMA, rows_of, size_of
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log

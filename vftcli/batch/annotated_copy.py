@@ -18,8 +18,8 @@ from vftcli.batch.annotation import (
     force_columns,
 )
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import run_tasks
-from vftcli.batch.datasets import Dataset, open_dataset
+from vftcli.batch.cluster import Outcome, begin, run_tasks
+from vftcli.batch.datasets import DataFile, Dataset, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.copying import (
     RECORD,
     WORK,
@@ -30,11 +30,12 @@ from vftcli.batch.datasets.copying import (
     stored_rows,
     unfinished,
 )
-from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single, Statistics
-from vftcli.batch.datasets.statistics import statistics_of
-from vftcli.batch.outcome import Outcome, begin
+from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
+from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
 from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.log.run_record import to_json, versions
+from vftcli.readers import FORMATS
+from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.
@@ -82,16 +83,12 @@ def annotate(
         plan = Plan(dataset, work, key)
         run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
         expected = force_columns(choice, (), derived=False, valid=choice.anyway)
-        outcomes = run(
-            plan.groups(expected), partial(estimate_episodes, choice), started(workers, dataset)
-        )
+        few = sum(len(f.episodes) for f in islice(dataset.files(), FEW + 1)) <= FEW
+        place = HERE if few and workers == WorkersChoice() else workers
+        outcomes = run(plan.groups(expected), partial(estimate_episodes, choice), place)
         made = gathered(outcomes, choice, progress)
-        columns = force_columns(
-            choice,
-            joint_names(made),
-            derived=any(one.get("derived") for one in made.episodes),
-            valid=choice.anyway,
-        )
+        derived, names = any(one.get("derived") for one in made["episodes"]), joint_names(made)
+        columns = force_columns(choice, names, derived=derived, valid=choice.anyway)
         write = partial(write_file, dataset, columns, choice.suffix)
         tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
         each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
@@ -101,19 +98,45 @@ def annotate(
             statistics |= outcome.value["statistics"]
         progress("writing descriptions", 0.9, 1.0)
         if path.is_dir():
-            copy_others(path, folder, plan.places)
+            copy_others(path, folder, {file.place for file in plan.rows})
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
-        record = record_of_copy(path, command, choice, columns, made, plan.sources)
+        record = {
+            "command": command,
+            "versions": versions(),
+            "dataset": str(path),
+            "sign": SIGN,
+            "robot": made["robot"],
+            "observer": made["observer"],
+            "causal": columns[0].told["causal"],
+            "columns": {c.name: {**c.told, "names": list(c.elements) or None} for c in columns},
+            "status": dict(Counter(one["status"] for one in made["episodes"])),
+            "transient_frames": max(one.get("transient_frames", 0) for one in made["episodes"]),
+            "friction": choice.robot.friction,
+            "episodes": made["episodes"],
+            "sources": dict(sorted(plan.sources.items())),
+        }
         with finished(folder / RECORD) as temporary:
             put_text(temporary, to_json(record))
     return record
 
 
-def started(workers: WorkersChoice, dataset: Dataset) -> WorkersChoice:
-    """Place of the episodes' work: here by default if they are few."""
-    some = islice(dataset.files(), FEW + 1)
-    few = sum(len(file.episodes) for file in some) <= FEW
-    return HERE if few and workers == WorkersChoice() else workers
+def open_dataset(path: Path, columns: str | None = None) -> Dataset:
+    """The dataset at a path, a folder or an HDF5 file; `columns` is what ``--columns`` says of it.
+
+    Raises:
+        LogError: If it is none that forces can be written into.
+    """
+    file = open_log(path)
+    if FORMATS["lerobot"].recognises(file):
+        return LeRobotDataset(path)
+    if FORMATS["hdf5"].recognises(file):
+        return Hdf5Dataset(path.parent, path, columns)
+    if path.is_dir() and files_below(path):
+        return Hdf5Dataset(path, None, columns)
+    raise LogError(
+        f"{path}: neither a LeRobot dataset (a folder with meta/info.json), nor HDF5 files "
+        "(DROID's trajectory.h5, *.hdf5); of another log `vftcli estimate` writes the torques"
+    )
 
 
 class Plan:
@@ -128,11 +151,6 @@ class Plan:
         self._dataset, self._work, self._key = dataset, work, key
         self.rows: dict[DataFile, list[Path]] = {}
         self.sources: dict[str, str] = {}
-
-    @property
-    def places(self) -> set[Path]:
-        """The data files, by their paths in the dataset."""
-        return {file.place for file in self.rows}
 
     def groups(self, columns: list[ForceColumn]) -> Iterator[list[EpisodesTask]]:
         """The episodes in groups that go to a worker together."""
@@ -154,14 +172,6 @@ class Plan:
             yield group
 
 
-class Made(NamedTuple):
-    """Results of the episodes."""
-
-    episodes: list[dict[str, Any]]  #: A record each.
-    robot: dict[str, Any] | None  #: The robot of the first that could be done.
-    observer: dict[str, Any] | None  #: Its observer.
-
-
 def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
     """Result of a task."""
     if outcome.failure is None:
@@ -174,20 +184,20 @@ def gathered(
     outcomes: Iterable[Outcome[Any]],
     choice: ForceChoice,
     progress: Callable[[str, float, float], None],
-) -> Made:
-    """Results of the episodes, in the order of their files."""
+) -> dict[str, Any]:
+    """Results of all episodes as of `estimate_episodes`, in the order of their files."""
     episodes: list[dict[str, Any]] = []
-    robot = observer = None
+    made: dict[str, Any] = {"episodes": episodes, "robot": None, "observer": None}
     for outcome in outcomes:
-        told = value_of(outcome)
-        for record in told["episodes"]:
-            if not choice.anyway:
-                refuse_missing(record)
-        episodes += told["episodes"]
-        robot, observer = robot or told["robot"], observer or told["observer"]
+        some = value_of(outcome)
+        for record in () if choice.anyway else some["episodes"]:
+            refuse_missing(record)
+        episodes += some["episodes"]
+        for name in ("robot", "observer"):
+            made[name] = made[name] or some[name]
         progress(f"{len(episodes)} episodes estimated", 0.0, 0.8)
     episodes.sort(key=lambda record: (record["file"], record["episode"]))
-    return Made(episodes, robot, observer)
+    return made
 
 
 REMEDY = "--anyway writes 0 there, and a column that says so"
@@ -213,16 +223,15 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
         )
 
 
-def joint_names(made: Made) -> list[str]:
+def joint_names(made: Mapping[str, Any]) -> list[str]:
     """The names of the joints, of the first episode that tells any; all must have as many."""
-    known = [one for one in made.episodes if one["status"] != "missing"]
+    episodes = made["episodes"]
+    known = [one for one in episodes if one["status"] != "missing"]
+    if not episodes:
+        raise LogError("the dataset has no episodes")
     if not known:
-        count = len(made.episodes)
-        raise LogError(
-            f"none of the {count} episodes can be done; the first: {made.episodes[0]['reason']}"
-            if made.episodes
-            else "the dataset has no episodes"
-        )
+        reason = episodes[0]["reason"]
+        raise LogError(f"none of the {len(episodes)} episodes can be done; the first: {reason}")
     if len(widths := {one["joint_count"] for one in known}) > 1:
         raise LogError(
             f"the episodes are of arms of {' and '.join(map(str, sorted(widths)))} joints"
@@ -244,11 +253,8 @@ def write_file(
     }
     with finished(task.target) as temporary:
         dataset.write(task.file, columns, forces, temporary)
-    statistics = {
-        number: {name: statistics_of(values) for name, values in own.items()}
-        for number, own in forces.items()
-        if dataset.has_statistics
-    }
+    kept = forces.items() if dataset.has_statistics else ()
+    statistics = {n: {name: statistics_of(x) for name, x in own.items()} for n, own in kept}
     return {"place": task.file.place.as_posix(), "statistics": statistics}
 
 
@@ -267,29 +273,3 @@ def filled(
             values = np.isfinite(values).all(axis=1, keepdims=True).astype(np.float32)
         found[column.name] = np.nan_to_num(values, nan=0.0)
     return found
-
-
-def record_of_copy(
-    path: Path,
-    command: str,
-    choice: ForceChoice,
-    columns: list[ForceColumn],
-    made: Made,
-    sources: Mapping[str, str],
-) -> dict[str, Any]:
-    """Content of ``meta/vftcli.json``."""
-    return {
-        "command": command,
-        "versions": versions(),
-        "dataset": str(path),
-        "sign": SIGN,
-        "robot": made.robot,
-        "observer": made.observer,
-        "causal": columns[0].told["causal"],
-        "columns": {c.name: {**c.told, "names": list(c.elements) or None} for c in columns},
-        "status": dict(Counter(one["status"] for one in made.episodes)),
-        "transient_frames": max(one.get("transient_frames", 0) for one in made.episodes),
-        "friction": choice.robot.friction,
-        "episodes": made.episodes,
-        "sources": dict(sorted(sources.items())),
-    }

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.batch.cluster import begin
+from vftcli.batch.datasets import DataFile, ForceColumn, Single
 from vftcli.batch.datasets.copying import put_rows, stored_rows
-from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Single
-from vftcli.batch.outcome import begin
 from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import settling_samples
@@ -84,18 +84,6 @@ class ForceChoice:
         """Sources of the columns beside the episode: this, robot file, program."""
         return f"{self!r} {robot_file} {VERSION}"
 
-    def analysis(self, number: int, library: Library, examiner: Examiner) -> AnalysisChoice:
-        """The analysis of an episode as of a single log."""
-        return AnalysisChoice(
-            read=replace(self.read, episode=number),
-            robot=self.robot,
-            observers=self.observers,
-            wrench=self.wrench,
-            contacts=self.contact,
-            library=library,
-            examiner=examiner,
-        )
-
 
 class EpisodesTask(NamedTuple):
     """Some episodes of one data file."""
@@ -121,7 +109,21 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]
         begin(f"episode {number}")
         record: dict[str, Any] = {"episode": number, "file": task.file.place.as_posix()}
         try:
-            analysis = analysed(choice, choice.analysis(number, library, examiner), task.file.log)
+            asked = AnalysisChoice(
+                read=replace(choice.read, episode=number),
+                robot=choice.robot,
+                observers=choice.observers,
+                wrench=choice.wrench,
+                contacts=choice.contact,
+                library=library,
+                examiner=examiner,
+            )
+            recording = library.open(task.file.log, asked.read)
+            check_signals(recording, anyway=choice.anyway)
+            analysis = analyse(*prepared(recording, asked), asked)
+            if choice.contact and analysis.contacts is None:
+                reason = next(str(r) for r in analysis.remarks if r.code == "contacts-not-told")
+                raise LogError(f"{recording.name}: {reason}")
             columns = columns_of(analysis, choice)
         except ParameterError:
             raise  # what is asked cannot be had of any episode
@@ -139,17 +141,6 @@ def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]
     if arrays:
         put_rows(task.rows, told=np.array(text), **arrays)
     return dict(json.loads(text))
-
-
-def analysed(choice: ForceChoice, asked: AnalysisChoice, path: Path) -> Analysis:
-    """One episode's estimates."""
-    recording = asked.library.open(path, asked.read)
-    check_signals(recording, anyway=choice.anyway)
-    made = analyse(*prepared(recording, asked), asked)
-    if asked.contacts and made.contacts is None:
-        reason = next(str(r) for r in made.remarks if r.code == "contacts-not-told")
-        raise LogError(f"{recording.name}: {reason}")
-    return made
 
 
 def check_signals(recording: Recording, *, anyway: bool) -> None:
@@ -231,12 +222,8 @@ def force_columns(
     choice: ForceChoice, names: Sequence[str], *, derived: bool, valid: bool
 ) -> list[ForceColumn]:
     """The columns that are written."""
-    online = choice.is_online and not derived
-    made = {
-        "observer": choice.observer,
-        "causal": online,
-        "version": f"vftcli {VERSION}",
-    }
+    online, version = choice.is_online and not derived, f"vftcli {VERSION}"
+    made = {"observer": choice.observer, "causal": online, "version": version}
     joint = {"units": "N·m", "frame": "joint axes", "sign": SIGN, **made}
     flag = {"units": "1", "frame": "none", "sign": "1 where known, 0 where filled with 0", **made}
     found = [("external_torque", tuple(names), joint)]

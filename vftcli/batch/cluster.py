@@ -1,4 +1,4 @@
-"""Pieces of work here or on a Dask cluster, each reported at its end.
+"""Pieces of work here or on a Dask cluster, each reported at its end; an error is an outcome too.
 
 What is done is the caller's: a function of one task, at the top of a module, that writes its result
 itself (a temporary file, then a rename) before it returns. Results that only live in the engine are
@@ -10,26 +10,18 @@ import hashlib
 import logging
 import os
 import signal
+import socket
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from contextvars import ContextVar
 from functools import cache
 from itertools import count, islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from vftcli.batch.choice import EXTRA, MEMORY, MOST_WORKERS, WorkersChoice
-from vftcli.batch.outcome import (
-    KILLED,
-    Effort,
-    EngineError,
-    Failure,
-    Outcome,
-    Task,
-    Work,
-    failure_of,
-    perform,
-)
+from vftcli.signals.errors import VftError
 from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
@@ -59,8 +51,72 @@ CONFIG: Mapping[str, object] = {
 }
 
 #: Packages that make the numbers, or write them.
-PACKAGES = ("vftcli", "numpy", "scipy", "polars", "pin")
+PACKAGES = ("numpy", "scipy", "polars", "pin")
 HEAD = 4096  #: Bytes by which workers compare their files with ours. [B]
+
+
+Task = TypeVar("Task")
+
+#: What is done with each task; what it returns is small, and can be pickled.
+Work = Callable[[Task], Any]
+KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
+
+_stage: ContextVar[str] = ContextVar("stage", default="")
+
+
+class EngineError(VftError):
+    """The engine does not answer, or its workers cannot do the work."""
+
+
+class Failure(NamedTuple):
+    """Reason of a task's failure."""
+
+    stage: str  #: What was being done, as the work called it with `begin`.
+    type: str  #: Name of the error's class.
+    line: str  #: What it says, on one line.
+
+
+class Effort(NamedTuple):
+    """Cost and place of a task."""
+
+    started: float  #: When it began, on the clock of where it ran. [s since 1970]
+    seconds: float  #: Time from then to its end. [s]
+    cpu_seconds: float  #: Time of its thread on a processor. [s]
+    place: str  #: Host and process.
+
+
+class Outcome(NamedTuple, Generic[Task]):
+    """End of a task."""
+
+    task: Task  #: The task.
+    value: Any = None  #: What the work returned, None if it failed.
+    failure: Failure | None = None  #: Why it failed, or None.
+    effort: Effort | None = None  #: Its effort; None if its worker died.
+
+
+def begin(stage: str) -> None:
+    """Name the work's stage; a failure is reported with it."""
+    _stage.set(stage)
+
+
+def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:
+    """Do the work on one task: what it returned, why it failed or None, what it took."""
+    begin("starting")
+    started, wall, cpu = time.time(), time.monotonic(), time.thread_time()
+    value, failure = None, None
+    try:
+        value = work(task)
+    except Exception as error:  # noqa: BLE001 - one log must not stop the others
+        failure = failure_of(error)
+    seconds, cpu_seconds = time.monotonic() - wall, time.thread_time() - cpu
+    place = f"{socket.gethostname()}:{os.getpid()}"
+    return value, failure, Effort(started, seconds, cpu_seconds, place)
+
+
+def failure_of(error: BaseException) -> Failure:
+    """An error's text on one line, with the stage begun last."""
+    words = " ".join(str(error).split()) or "no words"
+    return Failure(_stage.get(), type(error).__name__, words)
 
 
 def dask_setup(_worker: object) -> None:
@@ -100,15 +156,11 @@ def connected(
     import distributed  # noqa: F401 - its settings, which are changed here for a block
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL + 1)  # outcomes report who dies
-    with dask.config.set(dict(CONFIG)):
-        if choice.address is None:
-            with local(choice, tell) as client:
-                yield client
-        else:
-            with standing(choice, tell) as client:
-                check_versions(client)
-                check_sight(client, seen)
-                yield client
+    cluster = local if choice.address is None else standing
+    with dask.config.set(dict(CONFIG)), cluster(choice, tell) as client:
+        if choice.address is not None:
+            check_workers(client, seen)
+        yield client
 
 
 @contextmanager
@@ -146,15 +198,9 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
     from distributed import Client
     from distributed.security import Security
 
-    security = None
-    if choice.tls:
-        authority, certificate, key = map(str, choice.tls)
-        security = Security(
-            tls_ca_file=authority,
-            tls_client_cert=certificate,
-            tls_client_key=key,
-            require_encryption=True,
-        )
+    names = ("tls_ca_file", "tls_client_cert", "tls_client_key")
+    files = dict(zip(names, map(str, choice.tls), strict=False))
+    security = Security(**files, require_encryption=True) if files else None
     try:
         client = Client(choice.address, security=security, timeout=ANSWER)
     except Exception as error:  # noqa: BLE001 - what answers there may be anything
@@ -175,51 +221,41 @@ def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Cl
         yield client
 
 
-def check_versions(client: "Client") -> None:
-    """Check that every worker computes with this process's code."""
-    here = packages_here()
-    for address, there in client.run(packages_here, on_error="return").items():
+def check_workers(client: "Client", seen: Sequence[str]) -> None:
+    """Check that every worker computes with this process's code and sees its files."""
+    here = surroundings(seen)
+    for address, there in client.run(surroundings, seen, on_error="return").items():
         if not isinstance(there, dict):
             raise EngineError(
                 f"worker {address} cannot run vftcli ({failure_of(there).line[:120]}); install "
-                f"vftcli {here['vftcli']} there"
+                f"vftcli {VERSION} there"
             )
-        for name, version in here.items():
-            if there.get(name) != version:
+        for name, state in here.items():
+            if there.get(name) == state:
+                continue
+            if name in seen:
                 raise EngineError(
-                    f"worker {address} has {name} {there.get(name) or 'not at all'}, here it is "
-                    f"{version}: results would differ. Install the same there"
+                    f"worker {address} does not see {name} as it is here; share the folder with it"
                 )
+            raise EngineError(
+                f"worker {address} has {name} {there.get(name) or 'not at all'}, here it is "
+                f"{state}: results would differ. Install the same there"
+            )
 
 
-def packages_here() -> dict[str, str | None]:
-    """Version of Python and of every package that takes part, None for one that is not there."""
+def surroundings(paths: Sequence[str]) -> dict[str, str | None]:
+    """Versions of Python and of the packages that take part, and the state of each path.
+
+    That is the digest of size and first bytes, "folder", or "nothing".
+    """
     import platform
     from importlib.metadata import PackageNotFoundError, version
 
-    found: dict[str, str | None] = {"python": platform.python_version()}
+    found: dict[str, str | None] = {"python": platform.python_version(), "vftcli": VERSION}
     for name in PACKAGES:
-        try:
+        found[name] = None
+        with suppress(PackageNotFoundError):
             found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = None
-    return {**found, "vftcli": VERSION}
-
-
-def check_sight(client: "Client", seen: Sequence[str]) -> None:
-    """Check that every worker sees this process's files."""
-    here = heads_of(seen)
-    for address, there in client.run(heads_of, seen, on_error="return").items():
-        for path, head in here.items():
-            if not isinstance(there, dict) or there.get(path) != head:
-                raise EngineError(
-                    f"worker {address} does not see {path} as it is here; share the folder with it"
-                )
-
-
-def heads_of(paths: Sequence[str]) -> dict[str, str]:
-    """State of each path: digest of size and first bytes, "folder", or "nothing"."""
-    found = {}
     for path in paths:
         found[path] = "folder" if os.path.isdir(path) else "nothing"  # noqa: PTH112
         with suppress(OSError), Path(path).open("rb") as file:
@@ -254,10 +290,12 @@ def outcomes(
                 group, ended = sent.pop(future), result_of(future)
                 if ended is None:
                     sent[future] = group  # its worker died with the result: it is done again
-                elif isinstance(ended, Failure) and (len(group) > 1 or standing):
+                elif not isinstance(ended, Failure):
+                    yield from (Outcome(task, *x) for task, x in zip(group, ended, strict=True))
+                elif len(group) > 1 or standing:
                     again += [(task,) for task in group]
-                else:
-                    yield from told(group, ended)
+                else:  # only one of a single task can have ended its worker
+                    yield Outcome(group[0], failure=ended)
     finally:
         with suppress(Exception):  # the cluster may be gone
             client.cancel(list(sent))
@@ -279,15 +317,6 @@ def settle() -> None:
     started; one that ends before is not started again.
     """
     time.sleep(SETTLED)
-
-
-def told(group: Sequence[Task], ended: "list[Any] | Failure") -> Iterator[Outcome[Task]]:
-    """The outcomes of a group's tasks; only one of a single task can have ended its worker."""
-    if isinstance(ended, Failure):
-        yield Outcome(group[0], failure=ended)
-        return
-    for task, each in zip(group, ended, strict=True):
-        yield Outcome(task, *each)
 
 
 class Workers:

@@ -9,11 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import run_tasks
+from vftcli.batch.cluster import Effort, Failure, Outcome, run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
-from vftcli.batch.log_work import LogJob, LogTask, work_on_log
-from vftcli.batch.outcome import Effort, Failure, Outcome
-from vftcli.batch.rows import SCHEMA
+from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.log.run_record import versions
@@ -92,7 +90,8 @@ class BatchRun:
             if key in there or key in begun:
                 continue
             begun.add(key)
-            share = 1.0 if entry.episode is not None or size_of(entry) < SMALL else float(most)
+            size = sum(path.stat().st_size for path in entry.files if path.exists())
+            share = 1.0 if entry.episode is not None or size < SMALL else float(most)
             if group and share > room:
                 yield group
                 group, room = [], float(most)
@@ -182,53 +181,36 @@ class BatchRun:
         self.failures |= {n: ended[key] for n, key in self.keys.items() if key in ended}
         finished = [n for n, key in sorted(self.keys.items()) if key in there]
         logs = pl.DataFrame(
-            {
-                "log": [self.labels[n] for n in finished],
-                "episode": [self.logs[n].episode for n in finished],
-                "key": [self.keys[n] for n in finished],
-            },
+            [(self.labels[n], self.logs[n].episode, self.keys[n]) for n in finished],
             schema={"log": pl.String, "episode": pl.Int64, "key": pl.String},
+            orient="row",
         )
+        ends = sorted(self.failures.items())
         failures = pl.DataFrame(
-            [
-                (self.labels[n], self.keys.get(n), *failure)
-                for n, failure in sorted(self.failures.items())
-            ],
-            schema={
-                "log": pl.String,
-                "key": pl.String,
-                "stage": pl.String,
-                "error": pl.String,
-                "line": pl.String,
-            },
+            [(self.labels[n], self.keys.get(n), *failure) for n, failure in ends],
+            schema=dict.fromkeys(("log", "key", "stage", "error", "line"), pl.String),
             orient="row",
         )
         count = self.count()._replace(done=len(finished) - self.before)
-        pages, lines = self.pages(finished), list[LogSummary]()
+        # A report is a log's own page.
+        own = finished if self.job.do == "report" else ()
+        pages = {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in own}
+        lines = list[LogSummary]()
 
         def noted() -> "Iterator[pl.DataFrame]":
             for piece in self.folder.gather(logs, SCHEMA):
                 lines.extend(batch_lines(piece, pages))
                 yield piece
 
-        self.folder.put_gathered(
-            noted(),
-            failures,
-            lambda: render_batch(lines, failures),
-            self.record(count),
-        )
+        page, record = lambda: render_batch(lines, failures), self.record(count)
+        self.folder.put_gathered(noted(), failures, page, record)
         return failures, count
-
-    def pages(self, finished: Sequence[int]) -> dict[str, str]:
-        """Label of a log → its own page, where it has one."""
-        if self.job.do != "report":
-            return {}
-        return {self.labels[n]: f"{self.folder.place(self.keys[n])}/index.html" for n in finished}
 
     def record(self, count: BatchCount) -> dict[str, Any]:
         """Content of `run.json`: facts of the time and place of each log's work."""
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
-        spans = [(e.started, e.started + e.seconds) for e in self.efforts.values()]
+        efforts = self.efforts.values()
+        last = max((e.started + e.seconds for e in efforts), default=0.0)
         return {
             "command": self.command,
             "versions": versions(),
@@ -238,18 +220,11 @@ class BatchRun:
             "done_before": count.before,
             "done_now": count.done,
             "failed": count.failed,
-            "in_task_s": sum(e.seconds for e in self.efforts.values()),
-            "in_task_cpu_s": sum(e.cpu_seconds for e in self.efforts.values()),
-            "first_to_last_s": max(b for _, b in spans) - min(a for a, _ in spans)
-            if spans
-            else None,
+            "in_task_s": sum(e.seconds for e in efforts),
+            "in_task_cpu_s": sum(e.cpu_seconds for e in efforts),
+            "first_to_last_s": last - min(e.started for e in efforts) if efforts else None,
             "tasks": [
                 {"log": label_of[key], "key": key, **effort._asdict()}
                 for key, effort in self.efforts.items()
             ],
         }
-
-
-def size_of(entry: LogEntry) -> int:
-    """Bytes of a log's files, 0 of those that are gone."""
-    return sum(path.stat().st_size for path in entry.files if path.exists())

@@ -51,8 +51,7 @@ def batch(
 
     Example: vftcli batch fixtures/ur5_t*.csv --robot ur5 --do estimate -o out
     """
-    from vftcli.batch.kinds import for_comparison, for_estimates
-    from vftcli.batch.log_work import LogJob
+    from vftcli.batch.log_work import LogJob, for_comparison, for_estimates
     from vftcli.batch.run import BatchRun
     from vftcli.cli.console import command_line, say
     from vftcli.cli.progress import STAGES

@@ -88,7 +88,7 @@ def compare(
     """
     import polars as pl
 
-    from vftcli.batch.kinds import for_comparison
+    from vftcli.batch.log_work import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis
     from vftcli.cli.jacobian import JacobianLogs
     from vftcli.evaluation import paired_significance

@@ -35,7 +35,7 @@ def estimate(
 
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.batch.kinds import for_estimates
+    from vftcli.batch.log_work import for_estimates
     from vftcli.cli.console import command_line, say_left_out
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
-from vftcli.batch.datasets import open_dataset
-from vftcli.batch.datasets.episodes import ForceColumn
+from vftcli.batch.annotated_copy import open_dataset
+from vftcli.batch.datasets import ForceColumn
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.signals.errors import LogError
 

@@ -9,10 +9,9 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.batch.datasets import open_dataset
-from vftcli.batch.datasets.episodes import ForceColumn
-from vftcli.batch.datasets.lerobot import LeRobotDataset, with_features
-from vftcli.batch.datasets.statistics import statistics_of
+from vftcli.batch.annotated_copy import open_dataset
+from vftcli.batch.datasets import ForceColumn
+from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of, with_features
 from vftcli.signals.errors import LogError
 
 FIXTURE = Path(__file__).parents[3] / "fixtures" / "panda_episodes"

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.batch.datasets.statistics import KEYS, pooled, statistics_of
+from vftcli.batch.datasets.lerobot import KEYS, pooled, statistics_of
 
 RNG = np.random.default_rng(4)
 EPISODES = [RNG.standard_normal((n, 3)).astype(np.float32) + k for k, n in enumerate((30, 50, 20))]

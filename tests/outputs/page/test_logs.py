@@ -5,7 +5,7 @@ from dataclasses import replace
 import polars as pl
 
 from vftcli.analysis import Analysis
-from vftcli.batch.rows import SCHEMA
+from vftcli.batch.log_work import SCHEMA
 from vftcli.outputs.believability import MARKS
 from vftcli.outputs.page.pages import (
     batch_lines,

@@ -1,36 +1,62 @@
 """Datasets: episodes of LeRobot, DROID and other HDF5, written back with forces in them."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple, Protocol
 
-from vftcli.batch.datasets.episodes import Dataset
-from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
-from vftcli.batch.datasets.lerobot import LeRobotDataset
-from vftcli.readers import FORMATS
-from vftcli.readers.reader import open_log
-from vftcli.signals.errors import LogError
+import numpy as np
+from numpy.typing import NDArray
 
-
-def open_dataset(path: Path, columns: str | None = None) -> Dataset:
-    """The dataset at a path.
-
-    Args:
-        path: A folder, or an HDF5 file.
-        columns: What ``--columns`` says of its columns, or None.
-
-    Raises:
-        LogError: If it is none that forces can be written into.
-    """
-    file = open_log(path)
-    if FORMATS["lerobot"].recognises(file):
-        return LeRobotDataset(path)
-    if FORMATS["hdf5"].recognises(file):
-        return Hdf5Dataset(path.parent, path, columns)
-    if path.is_dir() and files_below(path):
-        return Hdf5Dataset(path, None, columns)
-    raise LogError(
-        f"{path}: neither a LeRobot dataset (a folder with meta/info.json), nor HDF5 files "
-        "(DROID's trajectory.h5, *.hdf5); of another log `vftcli estimate` writes the torques"
-    )
+Single = NDArray[np.float32]  #: Values of a column, as they are written. (frames, width)
 
 
-__all__ = ["Dataset", "open_dataset"]
+class ForceColumn(NamedTuple):
+    """A column that is added."""
+
+    name: str  #: Its name, as external_torque; the dataset decides its place.
+    elements: tuple[str, ...]  #: What each of its numbers is, empty for a single one.
+    #: Unit, sign, frame, observer and whether it is causal, for who reads the dataset.
+    told: Mapping[str, Any]
+
+    @property
+    def width(self) -> int:
+        """Numbers a frame."""
+        return max(1, len(self.elements))
+
+
+class DataFile(NamedTuple):
+    """One file of a dataset with the episodes in it."""
+
+    place: Path  #: Its path in the dataset's folder.
+    log: Path  #: What is read to get an episode: the file, or the folder of the whole dataset.
+    episodes: tuple[int, ...]  #: Their numbers, as ``--episode`` takes them.
+
+
+#: Episode → name of a column → its values, a row a frame of the episode.
+Forces = Mapping[int, Mapping[str, Single]]
+Statistics = Mapping[str, NDArray[Any]]  #: Key of a statistic, as mean → its values. (width,)
+OfEpisodes = Mapping[int, Mapping[str, Statistics]]  #: Episode → name of a column → its statistics.
+
+
+class Dataset(Protocol):
+    """A folder of episodes that a copy is made of."""
+
+    folder: Path
+    has_statistics: bool
+
+    def files(self) -> Iterator[DataFile]:
+        """The data files with their episodes."""
+
+    def frames(self, file: DataFile, number: int) -> int:
+        """Number of frames of an episode, even of one unreadable as a log."""
+
+    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+        """Refuse a file that has such columns already."""
+
+    def write(
+        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
+    ) -> None:
+        """Write a data file with the columns added."""
+
+    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
+        """Write the descriptions of the copy, where everything else is, that name its columns."""

@@ -2,10 +2,10 @@
 
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes
+from vftcli.batch.datasets import DataFile, ForceColumn, Forces, OfEpisodes
 from vftcli.readers.formats import FORMATS
 from vftcli.readers.hdf5 import episode_places
 from vftcli.readers.reader import open_log
@@ -33,9 +33,7 @@ class Hdf5Dataset:
     has_statistics = False
 
     def __init__(self, folder: Path, only: Path | None = None, columns: str | None = None) -> None:
-        self.folder = folder
-        self._only = only
-        self._columns = columns
+        self.folder, self._only, self._columns = folder, only, columns
 
     def files(self) -> Iterator[DataFile]:
         """The files with their episodes, by name."""
@@ -43,26 +41,26 @@ class Hdf5Dataset:
             numbers = FORMATS["hdf5"].numbers(open_log(path))
             yield DataFile(path.relative_to(self.folder), path, numbers)
 
+    def _places(self, file: DataFile) -> tuple[Path, Mapping[int, str]]:
+        """A data file, and where each episode is in it."""
+        path = self.folder / file.place
+        return path, episode_places(open_log(path), self._columns)
+
     def frames(self, file: DataFile, number: int) -> int:
         """Number of an episode's frames: those of the first set beside positions."""
         import h5py
 
-        path = self.folder / file.place
-        group = episode_places(open_log(path), self._columns)[number]
+        path, places = self._places(file)
+        group = places[number]
         with h5py.File(path, "r") as content:
             there = content[group or "/"].values()
             return next(int(each.shape[0]) for each in there if isinstance(each, h5py.Dataset))
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
-        """Refuse a file that has such data sets already.
-
-        Raises:
-            LogError: If it has.
-        """
+        """Refuse a file that has such data sets already."""
         import h5py
 
-        path = self.folder / file.place
-        places = episode_places(open_log(path), self._columns)
+        path, places = self._places(file)
         with h5py.File(path, "r") as content:
             for name in (places[k] + c.name for k in file.episodes for c in columns):
                 if name in content:
@@ -74,8 +72,7 @@ class Hdf5Dataset:
         """Copy a file and add the data sets to the copy; the original is never opened to write."""
         import h5py
 
-        path = self.folder / file.place
-        places = episode_places(open_log(path), self._columns)
+        path, places = self._places(file)
         shutil.copyfile(path, target)
         target.chmod(0o644)
         with h5py.File(target, "r+") as content:

@@ -1,4 +1,7 @@
-"""LeRobot datasets written back: columns, info.json, Parquet metadata and statistics."""
+"""LeRobot datasets written back: columns, info.json, Parquet metadata and statistics.
+
+Statistics of a column are kept of each episode, and of all episodes together.
+"""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence
@@ -7,8 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.batch.datasets.episodes import DataFile, ForceColumn, Forces, OfEpisodes, Statistics
-from vftcli.batch.datasets.statistics import KEYS, pooled
+from vftcli.batch.datasets import (
+    DataFile,
+    ForceColumn,
+    Forces,
+    OfEpisodes,
+    Single,
+    Statistics,
+)
 from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
 from vftcli.readers.parquet import EPISODE, guarded
 from vftcli.signals.errors import LogError
@@ -18,6 +27,9 @@ PREFIX = "observation."  #: What the names of observations begin with.
 DATASET = "a dataset of LeRobot"  #: What needs pyarrow.
 #: Key of a Parquet schema's metadata under which the `datasets` library tells its features.
 METADATA = b"huggingface"
+#: Keys of the quantiles.
+QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
+KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)  #: All keys.
 
 
 class LeRobotDataset:
@@ -49,25 +61,18 @@ class LeRobotDataset:
         path = self.folder / file.place
         with guarded(path):
             source = pq.ParquetFile(path)
-            if EPISODE not in source.schema_arrow.names:
-                return int(source.metadata.num_rows)
-            numbers = source.read(columns=[EPISODE]).column(0).to_numpy()
-        return int(np.count_nonzero(numbers == number))
+            numbers = episode_numbers(source)
+        rows = source.metadata.num_rows if numbers is None else np.sum(numbers == number)
+        return int(rows)
 
     def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
-        """Refuse a file that has such columns already.
-
-        Raises:
-            LogError: If it has.
-        """
+        """Refuse a file that has such columns already."""
         pq = needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
         with guarded(path):
-            there = {
-                *pq.read_schema(path).names,
-                *named_features(self.folder, info_of(self.folder)),
-            }
+            names = pq.read_schema(path).names
+            there = {*names, *named_features(self.folder, info_of(self.folder))}
         for column in columns:
             if PREFIX + column.name in there:
                 raise LogError(
@@ -77,42 +82,29 @@ class LeRobotDataset:
     def write(
         self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
     ) -> None:
-        """Write a data file with the columns behind its own; rows and row groups stay as they are.
-
-        Raises:
-            LogError: If an episode of the file has no forces, or another number of frames.
-        """
+        """Write a data file with the columns behind its own; row groups stay as they are."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
         with guarded(path):
             source = pq.ParquetFile(path)
-            numbers = None
-            if EPISODE in source.schema_arrow.names:
-                numbers = source.read(columns=[EPISODE]).column(0).to_numpy()
+            numbers = episode_numbers(source)
         whole = whole_columns(path, numbers, source.metadata.num_rows, columns, forces)
         added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
         told = with_features(source.schema_arrow.metadata or {}, columns)
         schema = pa.schema([*source.schema_arrow, *added], metadata=told)
-        codec = source.metadata.row_group(0).column(0).compression.lower()
-        codec = "none" if codec == "uncompressed" else codec
         first = 0
-        with pq.ParquetWriter(target, schema, compression=codec) as writer:
+        with pq.ParquetWriter(target, schema, compression=codec_of(source)) as writer:
             for group in range(source.num_row_groups):
                 with guarded(path):
                     table = source.read_row_group(group)
                 rows = slice(first, first + table.num_rows)
                 first = rows.stop
-                values = [as_column(each[rows]) for each in whole]
-                arrays = [*table.columns, *values]
+                arrays = [*table.columns, *(as_column(each[rows]) for each in whole)]
                 writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
 
     def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Write info.json with the new features, and their statistics wherever others stand.
-
-        Raises:
-            LogError: If a file of statistics holds none, or the features have no names.
-        """
+        """Write info.json with the new features, and their statistics wherever others are."""
         info = info_of(self.folder)
         third = str(info.get("codebase_version", "")).startswith("v3")
         fps = {"fps": info["fps"]} if third and "fps" in info else {}
@@ -169,8 +161,7 @@ class LeRobotDataset:
                 table = table.append_column(name, pa.array(values, kind))
         target = copy / path.relative_to(self.folder)
         target.parent.mkdir(parents=True, exist_ok=True)
-        codec = source.metadata.row_group(0).column(0).compression.lower()
-        pq.write_table(table, target, compression="none" if codec == "uncompressed" else codec)
+        pq.write_table(table, target, compression=codec_of(source))
 
     def _finish_lines(
         self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
@@ -185,6 +176,19 @@ class LeRobotDataset:
                 told["stats"][PREFIX + column.name] = plain(own, keys)
             lines.append(json.dumps(told, ensure_ascii=False) + "\n")
         (copy / "meta" / path.name).write_text("".join(lines), encoding="utf-8")
+
+
+def episode_numbers(source: Any) -> Any:  # noqa: ANN401 - a ParquetFile → an array
+    """The episode of each row of a file, None where it holds one. (rows,)"""
+    if EPISODE not in source.schema_arrow.names:
+        return None
+    return source.read(columns=[EPISODE]).column(0).to_numpy()
+
+
+def codec_of(source: Any) -> str:  # noqa: ANN401 - a ParquetFile
+    """Compression of a file, as pyarrow writes it."""
+    codec: str = source.metadata.row_group(0).column(0).compression.lower()
+    return "none" if codec == "uncompressed" else codec
 
 
 def plain(statistics: Statistics, keys: Sequence[str]) -> dict[str, list[Any]]:
@@ -266,3 +270,38 @@ def with_features(
         several = {"feature": number, "length": column.width, "_type": kind}
         features[PREFIX + column.name] = number if column.width == 1 else several
     return told | {METADATA: json.dumps(library).encode()}
+
+
+def statistics_of(values: Single) -> Statistics:
+    """The statistics of one episode, its quantiles exact. (frames, k) → (k,) each, count (1,)"""
+    exact = values.astype(np.float64)
+    found = {
+        "min": exact.min(axis=0),
+        "max": exact.max(axis=0),
+        "mean": exact.mean(axis=0),
+        "std": exact.std(axis=0),
+        "count": np.array([len(exact)]),
+    }
+    each = np.quantile(exact, list(QUANTILES.values()), axis=0)
+    return found | dict(zip(QUANTILES, each, strict=True))
+
+
+def pooled(episodes: Sequence[Statistics]) -> Statistics:
+    """The statistics of several episodes together, as LeRobot puts them together.
+
+    Mean and standard deviation are those of all frames (law of total variance), quantiles the means
+    of the episodes' own weighted with their frames.
+    """
+    table = {key: np.array([one[key] for one in episodes]) for key in episodes[0]}
+    count = table.pop("count")
+    share = count / count.sum()
+    mean = np.sum(share * table["mean"], axis=0)
+    variance = np.sum(share * (table["std"] ** 2 + (table["mean"] - mean) ** 2), axis=0)
+    whole = {key: np.sum(share * values, axis=0) for key, values in table.items()}
+    return whole | {
+        "min": table["min"].min(axis=0),
+        "max": table["max"].max(axis=0),
+        "mean": mean,
+        "std": np.sqrt(variance),
+        "count": np.array([count.sum()]),
+    }
