@@ -13,7 +13,7 @@ from vftcli.evaluation.references import ReferenceLoad, make_reference
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
-from vftcli.refinement.limits import EXPECTED, MEASURED, gap_remark
+from vftcli.refinement.refine import EXPECTED, MEASURED, gap_remark
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot

@@ -17,7 +17,7 @@ from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns
 from vftcli.outputs.log.run_record import observer_record
 from vftcli.outputs.page.shell import part
 from vftcli.outputs.quantity import DASH, banded, signed, significant, vector
-from vftcli.refinement.limits import Budget
+from vftcli.refinement.refine import Budget
 from vftcli.signals.arrays import Array
 
 #: Headings of the table of what was computed on the log.
