@@ -47,7 +47,7 @@ def dense(rows):
     for j, column in enumerate(rows.columns):
         A[:, j, column_numbers(j, rows.joints)] = column
     for size in range(loads.sizes[-1]):
-        A[:, :, P + size] = loads.made_by(np.eye(loads.sizes[-1])[size])
+        A[:, :, P + size] = loads.torque_of(np.eye(loads.sizes[-1])[size])
     return A
 
 

@@ -62,13 +62,13 @@ def test_a_load_runs_straight_from_knot_to_knot():
     expected = np.zeros((60, 6))
     for k in range(loads.knots):
         hat = np.interp(t, at, np.eye(loads.knots)[k])
-        for c in range(loads.components):
+        for c in range(loads.torque.shape[2]):
             value = values[loads.numbers[k, c]]
             expected += value * hat[:, None] * loads.torque[:, :, c]
-    np.testing.assert_allclose(loads.made_by(values), expected, atol=1e-10)
-    flange = loads.made_by(values[: loads.sizes[1]])
+    np.testing.assert_allclose(loads.torque_of(values), expected, atol=1e-10)
+    flange = loads.torque_of(values[: loads.sizes[1]])
     np.testing.assert_allclose(
-        flange, loads.made_by(np.append(values[: loads.sizes[1]], np.zeros(6 * loads.knots)))
+        flange, loads.torque_of(np.append(values[: loads.sizes[1]], np.zeros(6 * loads.knots)))
     )
 
 

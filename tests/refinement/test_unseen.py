@@ -69,7 +69,7 @@ def test_the_unseen_share_is_that_of_dense_fits(wrong):
     for j, column in enumerate(rows.columns):
         A[:, j, column_numbers(j, 3)] = column
     for k in range(sizes[-1]):
-        A[:, :, P + k] = rows.loads.made_by(np.eye(sizes[-1])[k])
+        A[:, :, P + k] = rows.loads.torque_of(np.eye(sizes[-1])[k])
     squares = np.zeros((len(SCALES), 3))
     free = np.flatnonzero(wrong.free)
     for fold in np.array_split(free, 5):

@@ -117,7 +117,7 @@ class Baseline:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """Findings, and the missing ones with reasons."""
-        found = self.part.remarks if self.part is not None else ()
+        found = () if self.part is None else self.part.remarks
         load = () if self.load is None else (self.load.remark,)
         missing = () if self.missing is None else (self.missing,)
         return (*found, *load, *missing, *self.on_correction)
@@ -193,23 +193,15 @@ class FreeReading(NamedTuple):
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """An observer's run along the free pieces; on the log it is its estimate."""
     log = found.motion.log
-    read = [
-        estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
-        for run, _ in found.pieces
-    ]
-    if found.load is not None:
-        # A load is torque, and no error of who reads it.
-        carried = [found.load.torque(piece.run) for piece in found.pieces]
-        read = [tau - load for tau, load in zip(read, carried, strict=True)]
-    inside = [tau[piece.inside] for tau, piece in zip(read, found.pieces, strict=True)]
-    rests = [piece.run.rests[piece.inside] for piece in found.pieces]
-    none = (0, estimate.joints)
-    return FreeReading(
-        observer,
-        estimate,
-        samples=np.concatenate([np.zeros(none), *inside]),
-        resting=np.concatenate([np.zeros(none, dtype=bool), *rests]),
-    )
+    read, rests = [np.zeros((0, estimate.joints))], [np.zeros((0, estimate.joints), dtype=bool)]
+    for run, inside in found.pieces:
+        tau = estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
+        if found.load is not None:
+            # A load is torque, and no error of who reads it.
+            tau = tau - found.load.torque(run)
+        read.append(tau[inside])
+        rests.append(run.rests[inside])
+    return FreeReading(observer, estimate, np.concatenate(read), np.concatenate(rests))
 
 
 def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) -> Baselines:

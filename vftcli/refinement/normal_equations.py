@@ -10,7 +10,7 @@ wrist on the links before them. By the lever rule these make a force anywhere al
 The estimate keeps their torque: in doubt a torque is a push.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -41,27 +41,22 @@ class SlowLoads(NamedTuple):
     knots: int  #: Number of knots.
 
     @property
-    def components(self) -> int:
-        """Number of components m."""
-        return int(self.torque.shape[2])
-
-    @property
     def sizes(self) -> tuple[int, ...]:
         """Columns without loads, with the wrench, and with the forces."""
-        return tuple(sorted({0, WRENCH * self.knots, self.components * self.knots}))
+        return tuple(sorted({0, WRENCH * self.knots, self.numbers.size}))
 
     @property
     def numbers(self) -> NDArray[np.intp]:
         """Columns of each knot's components, the wrench first. (knots, m)"""
-        flange = np.arange(WRENCH * self.knots).reshape(self.knots, WRENCH)
-        along = np.arange(WRENCH * self.knots, self.components * self.knots)
-        return np.hstack([flange, along.reshape(self.knots, -1)])
+        numbers = np.arange(self.torque.shape[2] * self.knots)
+        flange, along = np.split(numbers, [WRENCH * self.knots])
+        return np.hstack([flange.reshape(self.knots, -1), along.reshape(self.knots, -1)])
 
-    def made_by(self, values: Array) -> Array:
+    def torque_of(self, values: Array) -> Array:
         """Columns times values in the order of `numbers`. (S, n) [N·m]"""
-        levels = np.zeros((self.knots, self.components))
-        given = self.numbers < len(values)
-        levels[given] = values[self.numbers[given]]
+        numbers = self.numbers
+        levels = np.zeros(numbers.shape)
+        levels[numbers < len(values)] = values[numbers[numbers < len(values)]]
         following = np.minimum(self.knot + 1, self.knots - 1)
         share = self.share[:, None]
         level = (1.0 - share) * levels[self.knot] + share * levels[following]
@@ -69,13 +64,7 @@ class SlowLoads(NamedTuple):
 
 
 def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
-    """Columns of slow external loads on a moving arm.
-
-    Args:
-        chain: The arm.
-        t: Times of the samples. (S,) [s]
-        q: Positions there. (S, n) [rad]
-    """
+    """Columns of slow external loads on a moving arm at times t (S,) [s] and positions q (S, n)."""
     wrench = flange_jacobian(chain, q).transpose(0, 2, 1) * np.repeat([FORCE, MOMENT], 3)
     along = [FORCE * force_torque(chain, q, joint) for joint in points_along(chain.joints)]
     length = float(t[-1] - t[0])
@@ -91,13 +80,7 @@ def points_along(joints: int) -> tuple[int, ...]:
 
 
 def force_torque(chain: Chain, q: Array, joint: int) -> Array:
-    """Torques of a base-axes force at a joint, on the link before. (S, n, 3)
-
-    Args:
-        chain: The arm.
-        q: Positions. (S, n) [rad]
-        joint: The joint, from 0; it and later ones feel nothing.
-    """
+    """Torques of a base-axes force at a joint, from 0, on the link before. (S, n, 3)"""
     poses = link_poses(chain, q)
     torque = np.zeros((*q.shape, 3))
     lever = poses.translation[:, joint, None] - poses.translation[:, :joint]
@@ -159,65 +142,47 @@ class Rows:
         return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
 
     def model_sums(self, weight: Array) -> NormalEquations:
-        """Sums over all rows, model's columns only.
-
-        Args:
-            weight: Of every row. (S, n)
-        """
-        sums = self._empty(0)
+        """Sums over all rows, by their weights (S, n), model's columns only."""
+        total = np.zeros((self.unknowns + 1, self.unknowns + 1))
         for j, column in enumerate(self.columns):
             X = np.column_stack([column, self.d[:, j]])
-            add(sums, X * np.sqrt(weight[:, j, None]), column_numbers(j, self.joints))
-        return finished(sums)
+            add([total], X * np.sqrt(weight[:, j, None]), column_numbers(j, self.joints))
+        return finished(total)
 
     def all_sums(self, weight: Array, taken: Mask, parts: Sequence[Mask]) -> list[NormalEquations]:
-        """Sums of all columns, model's and loads', over some samples.
+        """Sums of all columns, model's and loads', over some samples, then over parts of them.
 
         Args:
             weight: Of every row. (S, n)
             taken: The samples. (S,)
             parts: Some of them, which may overlap. (S,) each
-
-        Returns:
-            The sums over all these samples, then over each part.
         """
-        sums = [self._empty(self.loads.sizes[-1]) for _ in range(1 + len(parts))]
-        for block, member in self._blocks(taken, parts):
+        size = self.unknowns + self.loads.sizes[-1] + 1
+        sums = np.zeros((1 + len(parts), size, size))
+        # Blocks of samples between two knots and in one set of parts.
+        where = np.flatnonzero(taken)
+        kind = np.column_stack([self.loads.knot, *parts])[where]
+        edges = np.flatnonzero(np.any(np.diff(kind, axis=0) != 0, axis=1)) + 1
+        for block in np.split(where, edges) if len(where) else []:
             knot = int(self.loads.knot[block[0]])
             following = self.loads.numbers[knot : knot + 2].ravel() + self.unknowns
             share = self.loads.share[block, None]
+            inside = [sums[0], *(s for s, p in zip(sums[1:], parts, strict=True) if p[block[0]])]
             for j, column in enumerate(self.columns):
                 torque = self.loads.torque[block, j]
                 hats = [(1.0 - share) * torque, share * torque][: self.loads.knots]
                 X = np.hstack([column[block], *hats, self.d[block, j, None]])
                 X *= np.sqrt(weight[block, j, None])
-                numbers = np.concatenate([column_numbers(j, self.joints), following])
-                add(sums[0], X, numbers, [s for s, m in zip(sums[1:], member, strict=True) if m])
+                add(inside, X, np.concatenate([column_numbers(j, self.joints), following]))
         return [finished(one) for one in sums]
 
-    def _blocks(
-        self, taken: Mask, parts: Sequence[Mask]
-    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.bool_]]]:
-        """Samples in blocks between two knots and in one set of parts."""
-        kind = np.column_stack([self.loads.knot, *parts])[taken]
-        where = np.flatnonzero(taken)
-        edges = np.flatnonzero(np.any(np.diff(kind, axis=0) != 0, axis=1)) + 1
-        for block in np.split(where, edges):
-            if len(block):
-                yield block, np.array([part[block[0]] for part in parts], dtype=bool)
 
-    def _empty(self, loads: int) -> Array:
-        """Zeros for the sums, those with d in the last row and column."""
-        size = self.unknowns + loads + 1
-        return np.zeros((size, size))
-
-
-def add(total: Array, X: Array, numbers: NDArray[np.intp], also: Sequence[Array] = ()) -> None:
+def add(sums: Sequence[Array], X: Array, numbers: NDArray[np.intp]) -> None:
     """Add products of rows' columns, d the last, to sums at these places."""
+    places = np.append(numbers, len(sums[0]) - 1)
     product = X.T @ X
-    places = np.append(numbers, len(total) - 1)
-    for sums in (total, *also):
-        sums[np.ix_(places, places)] += product
+    for total in sums:
+        total[np.ix_(places, places)] += product
 
 
 def finished(total: Array) -> NormalEquations:
@@ -248,12 +213,7 @@ def solve(
 
 
 def forward_solved(factor: Array, right: Array) -> Array:
-    """L⁻¹ times right-hand sides, forward substitution in blocks. (N,) or (N, k)
-
-    Args:
-        factor: Lower triangular L. (N, N)
-        right: Right-hand sides. (N,) or (N, k)
-    """
+    """L⁻¹ times right-hand sides, forward substitution in blocks. (N,) or (N, k)"""
     found = right.astype(np.float64)
     for first in range(0, len(found), BLOCK):
         own = slice(first, first + BLOCK)

@@ -70,7 +70,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
         free = free_samples(np.max(np.abs(residual) / scale, axis=1), step)
         weight = huber(residual / scale) / (counted * scale**2)
         found = solve(rows.all_sums(weight, free, [])[0], rows.unknowns, rows.loads.sizes)
-        residual = rows.d + rows.modelled(found.model) + rows.loads.made_by(found.loads)
+        residual = rows.d + rows.modelled(found.model) + rows.loads.torque_of(found.loads)
         scale = np.maximum(robust_sd(residual[free]), least)
     return WholeLogFit(rows=rows, step=step, free=free, scale=scale, weight=weight)
 
@@ -78,11 +78,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
 def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Array, Array]:
     """Residual of a fit that weighs suspicious samples down, its scale. (S, n), (n,)
 
-    Args:
-        rows: What is fitted.
-        step: Time between two samples. [s]
-        counted: Samples that count as one.
-        least: Smallest scale. (n,) [N·m]
+    So many samples count as one; the scale is at `least` (n,) [N·m].
     """
     residual = rows.d
     quiet = np.quantile(np.abs(residual), QUIET_SHARE, axis=0)
@@ -104,12 +100,7 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
 
 
 def free_samples(worst: Array, step: float) -> Mask:
-    """Samples free of contact; all if few would be. (S,)
-
-    Args:
-        worst: Largest residual of any joint, in its scale. (S,)
-        step: Time between two samples. [s]
-    """
+    """Samples free of contact by any joint's residual in its scale; all if few would be. (S,)"""
     # rounding of a step must not shorten such a run
     runs = [run for run in runs_of(worst > CONTACT) if (run[1] - run[0]) * step >= LASTS - 1e-9]
     contact = covered(runs, len(worst), margin=round(GROWN / step))
@@ -148,12 +139,7 @@ class Guarded(NamedTuple):
 
 
 def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
-    """A fit tested on folds of its free samples, as far as it predicts.
-
-    Args:
-        fit: The fit.
-        dq: Joint velocities at its samples. (S, n) [rad/s]
-    """
+    """A fit tested on folds of its free samples, as far as it predicts; dq (S, n) [rad/s]."""
     moves = faster(dq)
     judged = moves | (moves[fit.free].mean(axis=0) < SELDOM)
     folds = [(int(f[0]), int(f[-1]) + 1) for f in np.array_split(np.flatnonzero(fit.free), FOLDS)]

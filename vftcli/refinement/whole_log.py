@@ -28,7 +28,7 @@ from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster
 from vftcli.signals.series import median_step, resample_columns
 
@@ -108,12 +108,12 @@ def whole_log_bias(run: Run) -> WholeLogBias:
     with np.errstate(all="ignore"):
         try:
             motion = smooth_motion(run)
-            stride = stride_of(motion.t)
-            fit = fit_robustly(
-                rows_of(run, motion, expected, stride),
-                stride * median_step(motion.t),
-                usual_friction(run.robot).dry,
-            )
+            t, stride = motion.t, stride_of(motion.t)
+            d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
+            loads = slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride])
+            columns = error_columns(run, motion, expected, stride)
+            rows = Rows(columns=columns, loads=loads, d=d[::stride])
+            fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot).dry)
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
                 tried = tried._replace(weight=weight_of_friction(fit, tried))
@@ -141,17 +141,6 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
     usual = np.array([np.mean(np.sum(column**2, axis=1)) for column in fit.rows.columns])
     worst = np.max(np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)))
     return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
-
-
-def rows_of(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> Rows:
-    """What is fitted: every so many samples of the log."""
-    t, terms = motion.t, run.terms
-    d = zero_phase(t, derivative(t, terms.p) - terms.mu, CUTOFF)
-    return Rows(
-        columns=error_columns(run, motion, expected, stride),
-        loads=slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride]),
-        d=d[::stride],
-    )
 
 
 def motion_of(run: Run) -> tuple[float, Remark | None]:
@@ -205,7 +194,7 @@ def bias_of(
     """The bias on the log's own clock, with its uncertainty and what is said of it."""
     t, n = motion.t, run.robot.joints
     free = fit.free[np.minimum((np.arange(len(t)) + stride // 2) // stride, len(fit.free) - 1)]
-    load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.made_by(found.loads)))
+    load = handed_over(resample_columns(t, t[::stride], -fit.rows.loads.torque_of(found.loads)))
     if found.solution is None:
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
         bare = untouched(run.terms, said[0])
@@ -231,21 +220,12 @@ def bias_of(
 
 
 def remarks_of(found: Guarded, changed: Array, free_share: float) -> tuple[Remark, ...]:
-    """Which joints were corrected and by how much, and which were left alone.
-
-    Args:
-        found: What the guard says.
-        changed: Root mean square of the correction. (n,) [N·m]
-        free_share: Share of the log that the fit calls free of contact.
-    """
-    applied = found.weight > 0.0
-    groups = {"whole-log-applied": applied, "whole-log-left-alone": ~applied}
-    remarks = []
-    for code, joints in groups.items():
+    """Joints that were corrected, by how much (n,) [N·m] rms, and those left alone."""
+    applied, remarks = found.weight > 0.0, []
+    for code, joints in {"applied": applied, "left-alone": ~applied}.items():
         values: dict[str, object] = {"unseen_share": found.share[joints].tolist()}
-        if code == "whole-log-applied":
+        if code == "applied":
             values |= {"changed_Nm": changed[joints].tolist(), "free_share": free_share}
         if joints.any():
-            where = Where(joints=tuple(int(j) + 1 for j in np.flatnonzero(joints)))
-            remarks.append(fact(code, where, **values))
+            remarks.append(fact(f"whole-log-{code}", on_joints(joints), **values))
     return tuple(remarks)
