@@ -40,6 +40,7 @@ ORDER = (
     "streaming",
     "proposal",
     "batch",
+    "answering",
     "notebook",
     "reproduction",
     "cli",

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,7 @@ T, Q = np.linspace(0.0, 1.0, 11), np.zeros((11, 6))
 
 @pytest.fixture(scope="module")
 def analysis() -> vft.Analysis:
-    return vft.report(CIRCLE, "ur5", observers=["best", "gmo"], reference="two-cycle")
+    return vft.report(CIRCLE, "ur5", observer=["best", "gmo"], reference="two-cycle")
 
 
 @pytest.mark.slow
@@ -94,7 +95,7 @@ def test_everything_in_hand_is_one_line_and_a_table(analysis: vft.Analysis) -> N
 
 @pytest.mark.slow
 def test_a_report_is_written_where_it_is_asked_for(tmp_path: Path) -> None:
-    asked = {"robot": "ur5", "observers": "gmo", "interval": "0:6", "free": "0:4"}
+    asked = {"robot": "ur5", "observer": "gmo", "interval": "0:6", "free": "0:4"}
     vft.report(CIRCLE, output=tmp_path / "out", **asked)  # type: ignore[arg-type]
     record = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
     assert record["command"].startswith("vftcli.report(")
@@ -122,6 +123,60 @@ def test_thresholds_are_those_of_the_command(tmp_path: Path) -> None:
     assert found._repr_html_().count("<tr>") == 1 + 6 + 6 + 1  # head, joints, axes, |F|
 
 
+@pytest.mark.slow
+def test_options_and_settings_are_the_keywords_of_a_call(analysis: vft.Analysis) -> None:
+    """Made from the fields of the choices: the calls take what the commands take, as `vftcli`."""
+    words = set(signature(vft.report).parameters)
+    assert {"log", "robot", "free", "observer", "gains", "zero", "reference_columns"} <= words
+    made = vft.estimate(CIRCLE, "ur5", observer="gmo", frame="base", settings={"gmo.gain": 5})
+    assert analysis.recording.source.sha256 == made.recording.source.sha256
+    assert made.wrench is not None
+    assert made.wrench.frame == "base"
+    assert np.all(getattr(made.observers[0], "gain", None) == 5.0)
+    table = vft.compare(CIRCLE, "ur5", "two-cycle", observer=["best", "gmo"])
+    assert analysis.errors is not None
+    assert table.columns == analysis.errors.columns
+    assert table.filter(recording=CIRCLE.name)["rmse_Nm"].equals(analysis.errors["rmse_Nm"])
+
+
+@pytest.mark.slow
+def test_an_analysis_is_plotted_and_saved(analysis: vft.Analysis, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    for what, panels in {"contacts": 1, "torques": 6, "wrench": 6, "errors": 1}.items():
+        assert len(analysis.plot(what).axes) == panels
+    assert len(analysis.plot("torques", joints=[2], observers=["gmo"]).axes) == 1
+    assert analysis.contacts is not None
+    (axes,) = analysis.contacts.plot().axes
+    assert len(axes.lines) >= len(analysis.contacts)
+    for wrong in ({"what": "forces"}, {"joints": [7]}, {"observers": ["fdo"]}):
+        with pytest.raises(vft.VftError, match="there is"):
+            analysis.plot(**wrong)  # type: ignore[arg-type]
+    analysis.save(tmp_path / "out")
+    assert (tmp_path / "out" / "index.html").exists()
+
+
+@pytest.mark.slow
+def test_robots_scenarios_and_replays_are_asked_for(tmp_path: Path) -> None:
+    log = vft.simulate("ur5-circle", seed=2, settings={"duration": 4})
+    assert log.truth is not None
+    assert log.truth.columns[:2] == ["t", "tau_ext/1"]
+    assert np.allclose(log.truth["t"].to_numpy()[-1], log.duration, atol=0.01)
+    examined = vft.inspect(log)
+    assert examined.robots[0].robot == "ur5"
+    assert len(examined.remarks.to_polars()) == len(examined.remarks)
+    rows = vft.admit(None, "ur5", alpha=[1, 1.6], release="x=0.3")
+    assert rows["alpha"].to_list() == [None, 1.0, 1.6]
+    mine = vft.identify(ROOT / "fixtures" / "ur5_table1.csv", "ur5", "friction")
+    mine.save(tmp_path / "mine.toml")
+    assert vft.load_robot(tmp_path / "mine.toml").friction == mine.friction
+    with pytest.raises(vft.VftError, match="--force"):
+        mine.save(tmp_path / "mine.toml")
+    tuned = vft.identify(CIRCLE, "ur5", method="gains", interval="0:12")
+    tuned.save(tmp_path / "tuned.toml")
+    gains = vft.load_robot(tmp_path / "tuned.toml").gains
+    assert np.allclose(gains["gmo"]["gain"], tuned.gains["gmo"]["gain"])
+
+
 MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "gain": (r"\(2,\).*\(6,\)", lambda: vft.MomentumObserver(gain=[5, 3]).estimate(TERMS)),
     "gain 2d": (r"\(n,\)", lambda: vft.MomentumObserver(gain=[[5, 3]])),
@@ -132,7 +187,7 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
         lambda: vft.KalmanObserver(initial_covariance=np.zeros((2, 2))).estimate(TERMS),
     ),
     "omega": ("one number", lambda: vft.FilteredDynamicsObserver(omega=[1, 2])),
-    "no terms": ("dynamics_terms", lambda: vft.MomentumObserver().estimate(RECORDING)),
+    "no terms": ("Run", lambda: vft.MomentumObserver().estimate(RECORDING)),
     "q one joint": (r"\(T, n\)", lambda: vft.Recording(t=T, q=Q[:, 0])),
     "q text": ("array of numbers", lambda: vft.Recording(t=T, q="q")),
     "q none": (r"\(T, n\)", lambda: vft.Recording(t=T, q=None)),
@@ -145,9 +200,14 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "tau": (r"\(T, n\)", lambda: vft.ExternalTorque(name="x", t=T, tau=Q[:, 0])),
     "rows of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=Q[:5])),
     "no joints of arrays": (r"\(11, n\)", lambda: vft.assemble(T, q=T)),
-    "robot by name": ("load_robot", lambda: vft.dynamics_terms(RECORDING, "ur5")),
-    "log by name": ("read", lambda: vft.dynamics_terms("log.csv", vft.load_robot("ur5"))),
-    "analyse": ("load_robot", lambda: vft.analyse(RECORDING, "ur5", vft.AnalysisChoice())),
+    "keyword": ("refrence. Did you mean reference", lambda: vft.report(CIRCLE, refrence="zero")),
+    "setting": ("no such setting.*low-pass", lambda: vft.contacts(CIRCLE, settings=LOW)),
+    "setting's value": ("expected a text", lambda: vft.contacts(CIRCLE, settings=NONE)),
+    "flag": ("True or False", lambda: vft.estimate(CIRCLE, causal="yes")),
+    "nothing": ("required argument: 'log'", vft.inspect),
+    "no reference": ("needs reference=: two-cycle", lambda: vft.compare(CIRCLE, "ur5")),
+    "two drivers": ("once", lambda: vft.admit(CIRCLE, "ur5", observer=["gmo", "fdo"])),
+    "scenario": ("no scenario 'circle'", lambda: vft.simulate("circle")),
     "robot's number": ("profile's name", lambda: vft.load_robot(5)),
     "pose": (r"\(T, 6\)", lambda: vft.flange_jacobian(vft.load_robot("ur5").chain, Q[0])),
     "no chain": ("robot.chain", lambda: vft.link_poses(vft.load_robot("ur5"), Q)),
@@ -157,14 +217,15 @@ MISTAKES: dict[str, tuple[str, Callable[[], object]]] = {
     "path": ("name of a file", lambda: vft.read(None)),
     "columns": ("no column", lambda: vft.read(CIRCLE, columns="q=foo*")),
     "columns of an object": ("read already", lambda: vft.contacts(RECORDING, columns="q=a*")),
-    "interval": ("interval='0:4'", lambda: vft.contacts(CIRCLE, "ur5", interval=(0, 4))),
-    "free": ("texts or paths", lambda: vft.report(CIRCLE, "ur5", free=3)),
+    "interval": ("is not A:B", lambda: vft.contacts(CIRCLE, "ur5", interval=(0, 4))),
+    "free": ("3: no such file", lambda: vft.report(CIRCLE, "ur5", free=3)),
     "report's robot": ("a Robot", lambda: vft.report(CIRCLE, 5)),
     "report's log": ("a Recording", lambda: vft.report(5)),
     "no free log": ("no log is given", lambda: vft.thresholds([], "ur5")),
     "no file": ("no such file", lambda: vft.contacts("no_such_log.csv", robot="ur5")),
 }  # fmt: skip
 
+LOW, NONE = {"two-cycle.lowpass": 5}, {"two-cycle.low-pass": None}
 RECORDING = vft.Recording(t=T, q=Q, dq=Q, torque=Q)
 TERMS = vft.DynamicsTerms(t=T, p=Q, mu=Q)
 TORQUE = vft.ExternalTorque(name="gmo", t=T, tau=Q)

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
@@ -15,6 +17,7 @@ from vftcli.signals.wrench import ExternalTorque
 
 if TYPE_CHECKING:
     import polars as pl
+    from matplotlib.figure import Figure
 
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
@@ -112,6 +115,33 @@ class Analysis(Shown):
         if reference is None:
             return self.virtual_sensor.wrenches
         return (*self.virtual_sensor.wrenches, replace(reference, name="reference"))
+
+    def plot(
+        self,
+        what: str = "contacts",
+        joints: Sequence[int] | None = None,
+        observers: Sequence[str] | None = None,
+    ) -> "Figure":
+        """A matplotlib figure of the contacts, torques, wrench or errors, neither shown nor saved.
+
+        Args:
+            what: contacts, torques, wrench or errors.
+            joints: The joints, from 1; None for all.
+            observers: The observers; None for `best`, else for all that ran.
+
+        Raises:
+            VftError: If there is no such plot, or matplotlib is missing.
+        """
+        # What draws and writes is several floors up; an analysis knows nothing of it.
+        draw = import_module("vftcli.outputs.log.figures").plot
+        figure: Figure = draw(self, what, joints, observers or ())
+        return figure
+
+    def save(self, folder: str | Path, *, force: bool = False) -> None:
+        """Write page, recording, tables and estimates into a folder, as `vftcli report` does."""
+        write = import_module("vftcli.outputs.log.report").write_report
+        command = self.run.get("command", "vftcli.Analysis.save")
+        write(Path(folder), self, command=command, force=force)
 
     def run_of(self, name: str, run: "Run") -> "Run":
         """The log or one of its free runs, as the observer of this name has it."""

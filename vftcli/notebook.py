@@ -1,237 +1,310 @@
 """One call a question, for notebooks: what a command answers, as objects.
 
 A log is a file, a bag's folder or a `Recording`; a robot is a profile's name, a file, or a `Robot`.
-What comes back shows itself as one line and as a small table, and has ``to_polars()``.
+Keywords are the options of the command without their dashes, made of the fields that own them;
+``settings={"two-cycle.low-pass": 5}`` takes every setting. What comes back shows itself as one line
+and as a small table. Nothing is printed, and nothing is written without ``output=``.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
-from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
-from vftcli.readers.estimates import refuse_estimates
+from vftcli.admittance.choice import ControlChoice
+from vftcli.analysis import Analysis
+from vftcli.answering import (
+    TUNED,
+    Opened,
+    errors_of,
+    gains_of,
+    identified,
+    modelled,
+    replayed,
+    touched,
+)
+from vftcli.batch.log_work import for_comparison, for_estimates
+from vftcli.doctor.examination import Examiner, examine
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.identification.choice import Task
+from vftcli.observers.choice import GoalChoice, ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Run, Runs
+from vftcli.robots.run import Runs
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.recording import EFFORTS, Recording
-from vftcli.signals.remarks import Remark, Remarks, Where, caution
+from vftcli.signals.option import Choice, settings_as_typed
+from vftcli.signals.parsing import did_you_mean
+from vftcli.signals.recording import Recording
+from vftcli.signals.remarks import Remarks
+from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
-    from vftcli.analysis import Analysis
+    import polars as pl
+
     from vftcli.contacts.contact_list import ContactList
     from vftcli.contacts.thresholds import Thresholds
+    from vftcli.doctor.examination import Examination
 
-Log = str | Path | Recording  #: A log as a user names it.
 #: A robot as a user names it; None where the log settles it.
 NamedRobot = str | Path | Robot | None
+R = TypeVar("R")
+C = TypeVar("C", bound=Choice)
+
+#: The rooms' choices of which calls take the options.
+OF_LOG: tuple[type[Choice], ...] = (ReadChoice, RobotChoice)
+OF_CONTACTS = (*OF_LOG, FreeChoice)
+OF_ESTIMATE = (*OF_CONTACTS, ObserverChoice, RefinementChoice, WrenchChoice)
+OF_REPORT = (*OF_ESTIMATE, ReferenceChoice)
 
 
-def report(
-    log: Log,
-    robot: NamedRobot = None,
-    *,
-    observers: Sequence[str] = (),
-    reference: str | None = None,
-    free: Sequence[str | Path] = (),
-    columns: str | None = None,
-    interval: str | None = None,
-    output: str | Path | None = None,
-    force: bool = False,
-) -> "Analysis":
-    """Everything about one log, as `vftcli report` has it.
+class Asked(NamedTuple):
+    """The keywords of a call, as they would be typed."""
 
-    Args:
-        log: The log.
-        robot: The arm.
-        observers: Which run, as "best" and "gmo"; the default of the command if none.
-        reference: What the estimates are compared with: zero, two-cycle, vendor, sensor, file:PATH.
-        free: Motion that nobody touched: other logs, or spans ``A:B`` of this one. [s]
-        columns: Columns of a table, as ``--columns``.
-        interval: The span ``A:B`` to use. [s]
-        output: A folder for page, recording and tables; None to write nothing.
-        force: Whether what is in the folder may be overwritten.
+    call: str  #: The call as `run.json` holds it.
+    robot: "str | Robot | None"  #: The arm.
+    words: Mapping[str, Any]  #: Word of an option → what it was given.
+    settings: Mapping[str, str]  #: Name → value of the settings.
+    anyway: bool = False  #: Whether to continue despite errors.
 
-    Returns:
-        The analysis, its `remarks` those of the log, of every estimate and of the run together.
+    def of(self, kind: type[C], **others: object) -> C:
+        """The choice of a room that they state, with other words for some of them."""
+        own = {word: self.words[word] for word in kind.options() if word in self.words}
+        return kind.parsed(settings=self.settings, **{**own, **others})
 
-    Raises:
-        VftError: If the log cannot be read, or is meaningless with this robot.
-    """
-    from vftcli.evaluation.reference_choice import ReferenceChoice
-    from vftcli.observers.choice import ObserverChoice
-    from vftcli.outputs.log.run_record import all_remarks
-
-    choice = replace(
-        log_choice(log, robot, free, columns, interval),
-        observers=ObserverChoice.parsed(observer=words_of(observers, "observers")),
-        reference=None if reference is None else ReferenceChoice(name=reference),
-    )
-    made = answered(log, robot, choice, analyse)
-    if output is not None:
-        from vftcli.outputs.log.report import write_report
-
-        command = f"vftcli.report({str(log)!r}, robot={made.robot.name!r})"
-        write_report(Path(output), made, command=command, force=force)
-    remarks = (*made.recording.source.remarks, *all_remarks(made))
-    return replace(made, remarks=Remarks(remarks))
+    def analysis(
+        self,
+        logs: Iterable[Opened],
+        *,
+        wrench: bool = False,
+        **others: object,
+    ) -> AnalysisChoice:
+        """What they ask of some logs."""
+        made: dict[str, Any] = {"refinement": self.of(RefinementChoice), **others}
+        made.setdefault("observers", self.of(ObserverChoice))
+        by_word = {"frame", "zero"} & {word for word, value in self.words.items() if value}
+        if wrench or by_word or any(map(WrenchChoice.takes, self.settings)):
+            made["wrench"] = self.of(WrenchChoice)
+        if self.words.get("reference") is not None:
+            made["reference"] = self.of(ReferenceChoice)
+        return AnalysisChoice(
+            read=self.of(ReadChoice),
+            free=self.of(FreeChoice),
+            contacts=made["refinement"].contacts,
+            robot=replace(self.of(RobotChoice), name=self.robot),
+            library=Library(log for log in logs if not isinstance(log, Recording)),
+            examiner=Examiner(anyway=self.anyway),
+            **made,
+        )
 
 
-def contacts(
-    log: Log,
-    robot: NamedRobot = None,
-    *,
-    free: Sequence[str | Path] = (),
-    columns: str | None = None,
-    interval: str | None = None,
-) -> "ContactList":
-    """What touched the arm along a log.
+def call(
+    *kinds: type[Choice], also: Sequence[str] = ()
+) -> Callable[[Callable[..., R]], Callable[..., R]]:
+    """Make a call of a function of logs and of what is `Asked`: options become its keywords.
 
     Args:
-        log: The log.
-        robot: The arm.
-        free: Motion that nobody touched: other logs, or spans ``A:B`` of this one. [s]
-        columns: Columns of a table, as ``--columns``.
-        interval: The span ``A:B`` to use. [s]
+        kinds: The choices of which it takes the options.
+        also: Options that may be given by their place, behind the robot.
+    """
+    options = {word: option for kind in kinds for word, (*_, option) in kind.options().items()}
+    words = [word for word, each in options.items() if not each.is_setting and word != "robot"]
+
+    def of(function: Callable[..., R]) -> Callable[..., R]:
+        first, _, *own = signature(function).parameters.values()
+        placed = [Parameter(word, Parameter.POSITIONAL_OR_KEYWORD, default=None) for word in also]
+        rest = (*(word for word in words if word not in also), "settings", "anyway")
+        named = [Parameter(word, Parameter.KEYWORD_ONLY, default=None) for word in rest]
+        robot = first.replace(name="robot", default=None, annotation=NamedRobot)
+        shown = Signature([first, robot, *placed, *own, *named])
+        name = function.__name__
+
+        @wraps(function)
+        def called(*places: object, **given: object) -> R:
+            for word in given:
+                if word not in shown.parameters:
+                    near = did_you_mean(word, shown.parameters)
+                    raise ParameterError(f"vft.{name} has no keyword {word}.{near}")
+            try:
+                bound = shown.bind(*places, **given)
+            except TypeError as error:
+                raise ParameterError(f"vft.{name}: {error}") from None
+            values = dict(bound.arguments)
+            said = ", ".join(f"{word}={value!r}" for word, value in values.items())
+            log, arm = checked(values.pop(first.name), values.pop("robot", None))
+            settings = settings_as_typed(values.pop("settings", None) or {}, kinds)
+            anyway = bool(values.pop("anyway", False))
+            typed = {w: options[w].keyword(values.pop(w)) for w in words if w in values}
+            if typed.get("columns") is not None and isinstance(log, Recording):
+                raise ParameterError("columns are those of a file; this log is read already")
+            asked = Asked(f"vftcli.{name}({said})", arm, typed, settings, anyway)
+            return function(log, asked, **values)
+
+        vars(called)["__signature__"] = shown
+        return called
+
+    return of
+
+
+def checked(log: object, robot: object) -> tuple[Any, str | Robot | None]:
+    """A log or several, and a robot, as a user named them; a name of a file as its path.
 
     Raises:
-        VftError: If the log cannot be read, or is meaningless with this robot.
+        ParameterError: If one is of another kind than is expected.
     """
-    choice = log_choice(log, robot, free, columns, interval)
-    found = answered(log, robot, choice, list_touches).contacts
-    assert found is not None, "a log that tells no contacts raises"
+    if not isinstance(robot, NamedRobot):
+        raise ParameterError(f"robot is {robot!r}; expected a name as 'ur5', a file, or a Robot")
+    for each in log if isinstance(log, list | tuple) else [log]:
+        if not isinstance(each, str | Opened | None):
+            raise ParameterError(f"the log is {each!r}; expected a file's name or a Recording")
+    arm = str(robot) if isinstance(robot, Path) else robot
+    if isinstance(log, list | tuple):
+        return [Path(one) if isinstance(one, str) else one for one in log], arm
+    return Path(log) if isinstance(log, str) else log, arm
+
+
+def several(logs: Opened | Sequence[Opened]) -> list[Opened]:
+    """One log or several as a list."""
+    found = [logs] if isinstance(logs, Opened) else list(logs)
+    if not found:
+        raise ParameterError("no log is given")
     return found
 
 
-def thresholds(
-    free: Log | Sequence[Log],
-    robot: NamedRobot = None,
+@call(*OF_LOG)
+def inspect(log: Opened, asked: Asked) -> "Examination":
+    """What a log holds and what is wrong with it: its `remarks`, and the `robots` that fit."""
+    choice, robot = asked.analysis([log]), None
+    recording = choice.library.open(log, choice.read)
+    if asked.robot is not None or choice.read.effort == "auto":
+        recording, robot = prepared(recording, choice)
+    return examine(recording, robot)
+
+
+@call(*OF_CONTACTS)
+def contacts(log: Opened, asked: Asked) -> "ContactList":
+    """What touched the arm along a log."""
+    (made,) = analyse_logs([log], asked.analysis([log]), work=list_touches)
+    assert made.contacts is not None, "a log that tells no contacts raises"
+    return made.contacts
+
+
+@call(*OF_ESTIMATE)
+def estimate(log: Opened, asked: Asked, *, wrench: bool = False) -> Analysis:
+    """The external torques along a log, with the contacts and the wrench of ``best``."""
+    return analysed(log, for_estimates(asked.analysis([log], wrench=wrench)), asked)
+
+
+@call(*OF_REPORT)
+def report(
+    log: Opened,
+    asked: Asked,
     *,
-    rate: float = 1.0,
-    columns: str | None = None,
-    interval: str | None = None,
-) -> "Thresholds":
-    """Thresholds that motion like that of free logs passes at a rate.
+    wrench: bool = False,
+    output: str | Path | None = None,
+    force: bool = False,
+) -> Analysis:
+    """Everything about a log, as `vftcli report` has it; ``output=`` is the folder to write."""
+    made = analysed(log, asked.analysis([log], wrench=wrench), asked)
+    if output is not None:
+        made.save(output, force=force)
+    return made
 
-    Args:
-        free: One log or several that nobody touched.
-        robot: The arm.
-        rate: False alarms of all joints together; of all axes likewise. [1/h]
-        columns: Columns of a table, as ``--columns``.
-        interval: The span ``A:B`` to use. [s]
 
-    Raises:
-        VftError: If a log cannot be read, is meaningless with this robot, or all are too short.
-    """
+def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
+    """The analysis of a log, its remarks those of log, estimates and run together."""
+    from vftcli.outputs.log.run_record import all_remarks
+
+    (made,) = analyse_logs([log], choice)
+    remarks = Remarks((*made.recording.source.remarks, *all_remarks(made)))
+    return replace(made, remarks=remarks, run={"command": asked.call})
+
+
+@call(*OF_REPORT, also=("reference",))
+def compare(
+    logs: Opened | Sequence[Opened], asked: Asked, *, wrench: bool = False
+) -> "pl.DataFrame":
+    """Each observer's error against a reference, the columns those of ``errors.csv``."""
+    if asked.words.get("reference") is None:
+        raise ParameterError("compare needs reference=: two-cycle, sensor, vendor, zero, …")
+    choice = for_comparison(asked.analysis(several(logs), wrench=wrench))
+    return errors_of(list(analyse_logs(several(logs), choice)))
+
+
+@call(*OF_LOG)
+def thresholds(free: Opened | Sequence[Opened], asked: Asked, rate: float = 1.0) -> "Thresholds":
+    """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     from vftcli.contacts.thresholds import compared_signals, find_thresholds
 
-    logs = [free] if isinstance(free, Log) else list(free)
-    if not logs:
-        raise ParameterError("no log is given; thresholds are learned from motion nobody touches")
-    models, runs = Runs(), []
-    for log in logs:
-        choice = log_choice(log, robot, (), columns, interval)
-        runs.append(modelled(*laid(log, robot, choice), choice, models))
+    logs, models = several(free), Runs()
+    choice = asked.analysis(logs)
+    opened = choice.library.open_logs(logs, choice.read)
+    runs = [modelled(*prepared(log, choice), choice, models) for log in opened]
     found = find_thresholds([compared_signals(run) for run in runs], rate)
-    return replace(found, remarks=(*found.remarks, *(r for run in runs for r in touched(run))))
+    shown = (remark for run in runs for remark in touched(run, anyway=asked.anyway))
+    return replace(found, remarks=(*found.remarks, *shown))
 
 
-def log_choice(
-    log: Log,
-    robot: NamedRobot,
-    free: Sequence[str | Path],
-    columns: str | None,
-    interval: str | None,
-) -> AnalysisChoice:
-    """What the words of a call ask of a log.
+@call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))
+def identify(
+    logs: Opened | Sequence[Opened], asked: Asked, *, check: Sequence[Opened] = ()
+) -> Robot:
+    """The robot that logs of free motion show; `Robot.save` writes its file."""
+    paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
+    if task.method == "gains":
+        found = gains_of(paths[0], asked.analysis(paths, observers=TUNED), goal)
+        return found.robot.with_gains({line.section: dict(line.gains) for line in found.tuned})
+    choice = asked.analysis([*paths, *check])
+    examiner = Examiner(anyway=asked.anyway, fitting=task.keeps_links)
+    return identified(paths, check, replace(choice, examiner=examiner), task).robot
 
-    Raises:
-        ParameterError: If they are of another kind than is expected.
+
+def simulate(
+    scenario: str | Path,
+    *,
+    seed: int | None = None,
+    settings: Mapping[str, object] | None = None,
+) -> Recording:
+    """The log of a simulated experiment, its true forces as a polars frame in its `truth`.
+
+    Args:
+        scenario: A scenario's name or file.
+        seed: Seed of everything random; None for the scenario's own.
+        settings: Keys of the scenario → their values, as ``{"duration": 8}``.
     """
-    words = {"columns": columns, "interval": interval}
-    for key, word in words.items():
-        if not isinstance(word, str | None):
-            raise ParameterError(f"{key} is {word!r}; expected a text, as interval='0:4'")
-    if not isinstance(robot, NamedRobot):
-        raise ParameterError(f"robot is {robot!r}; expected a name as 'ur5', a file, or a Robot")
-    if not isinstance(log, Log):
-        raise ParameterError(f"the log is {log!r}; expected a file's name or a Recording")
-    if columns is not None and isinstance(log, Recording):
-        raise ParameterError("columns are those of a file; this log is read already")
-    name = str(robot) if isinstance(robot, str | Path) else None
-    return AnalysisChoice(
-        read=ReadChoice.parsed(columns=columns, interval=interval),
-        robot=RobotChoice.parsed(robot=name),
-        free=FreeChoice.parsed(free=words_of(free, "free")),
-        library=Library([] if isinstance(log, Recording) else [log]),
-    )
+    import polars as pl
+
+    from vftcli.signals.packages import check_installed
+    from vftcli.simulation import load_scenario
+    from vftcli.simulation.experiment import simulate as run
+
+    check_installed("pinocchio", "vft.simulate")
+    changes = [f"{name}={value}" for name, value in (settings or {}).items()]
+    made = run(load_scenario(scenario, changes), seed)
+    return replace(made.recording, truth=pl.DataFrame(made.truth.columns()))
 
 
-def words_of(words: "Sequence[str | Path] | str | Path", name: str) -> list[str]:
-    """Several words, or the one that is given for them.
+@call(*OF_ESTIMATE, ControlChoice, also=("alpha",))
+def admit(
+    log: Opened | None,
+    asked: Asked,
+    *,
+    release: str | Sequence[str] = (),
+    seed: int | None = None,
+) -> "pl.DataFrame":
+    """The comparison of admittance controllers on a log's force, a row a controller and axis."""
+    import polars as pl
 
-    Raises:
-        ParameterError: If they are no words.
-    """
-    several = list(words) if isinstance(words, list | tuple) else [words]
-    if wrong := [word for word in several if not isinstance(word, str | Path)]:
-        raise ParameterError(f"{name} has {wrong[0]!r}; expected texts or paths")
-    return [str(word) for word in several]
+    def choice(observer: str, **words: str) -> AnalysisChoice:
+        changed = asked._replace(words={**asked.words, **words, "observer": [observer]})
+        return changed.analysis([] if log is None else [log])
 
-
-def laid(log: Log, robot: NamedRobot, choice: AnalysisChoice) -> tuple[Recording, Robot]:
-    """A log, read unless it is, and its robot, loaded unless it is, laid on each other."""
-    if isinstance(log, Recording):
-        recording = choice.read.within(log)
-    else:
-        if choice.read.columns is None:
-            refuse_estimates(Path(log))
-        recording = choice.library.open(log, choice.read)
-    if isinstance(robot, Robot):
-        return choice.examiner.taken(recording, robot, choice.read), robot
-    return prepared(recording, choice)
-
-
-def answered(log: Log, robot: NamedRobot, choice: AnalysisChoice, work: Analyser) -> "Analysis":
-    """What is asked of one log."""
-    return work(*laid(log, robot, choice), choice, Runs())
-
-
-def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:
-    """A log laid on its robot, examined.
-
-    Raises:
-        ExaminationError: If a finding makes every result meaningless.
-    """
-    run = models.of(recording, robot)
-    choice.examiner.examine(run.recording, run.robot)
-    return run
-
-
-def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
-    """A remark where a log that is to be free shows contact.
-
-    Raises:
-        ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
-    """
-    from vftcli.contacts.tail import SETTLING
-    from vftcli.evaluation.references import PLAIN, touches
-
-    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
-    found = [touch for touch in known if touch.stop > run.t[0] + SETTLING]
-    if not found:
-        return ()
-    worst = max(found, key=lambda touch: touch.excess)
-    where = Where(run.name, (worst.joint + 1,), (worst.start, worst.stop))
-    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
-    remark = caution("free-log-touched", where, count=len(found), **sizes)
-    if worst.excess > PLAIN and not anyway:
-        raise ParameterError(
-            f"{remark}. Give motion that nobody touches, a part of this log with --interval, or "
-            "take it all with --anyway"
-        )
-    return (remark,)
+    release = [release] if isinstance(release, str) else list(release)
+    found = replayed(log, asked.words, choice, asked.of(ControlChoice), release, seed, asked.anyway)
+    return pl.DataFrame(found.replay.rows, infer_schema_length=None)

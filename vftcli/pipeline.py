@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -90,16 +90,16 @@ class AnalysisChoice:
 
 #: What is done with each log of a command.
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Runs], "Analysis"]
-Failed = Callable[[Path, VftError], None]  #: Who is told which log could not be analysed, and why.
+Failed = Callable[[Any, VftError], None]  #: Who is told which log could not be analysed, and why.
 
 
-def raise_error(_log: Path, error: VftError) -> None:
+def raise_error(_log: object, error: VftError) -> None:
     """Raise what is wrong with a log."""
     raise error
 
 
 def analyse_logs(
-    logs: Iterable[Path],
+    logs: Iterable[Path | Recording],
     choice: AnalysisChoice,
     failed: Failed | None = None,
     work: Analyser | None = None,
@@ -117,11 +117,11 @@ def analyse_logs(
         VftError: If one cannot be analysed and nobody is told.
     """
     models, work, tell = Runs(), work or analyse, failed or raise_error
-    recordings: list[tuple[Path, Recording]] = []
+    recordings: list[tuple[Path | Recording, Recording]] = []
     for path in logs:
         choice.progress(f"reading {path.name}", 0.0, 0.05)
         try:
-            if choice.read.columns is None:
+            if choice.read.columns is None and isinstance(path, Path):
                 refuse_estimates(path)
             recordings += [(path, r) for r in choice.library.open_each([path], choice.read)]
         except VftError as error:

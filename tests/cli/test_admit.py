@@ -35,7 +35,7 @@ def test_release_rows(admit: Run) -> None:
         "admittance.xi=1",
         "--json",
     )
-    rows = json.loads(out)
+    rows = json.loads(out)["rows"]
     assert (code, err) == (0, "")
     assert [row["alpha"] for row in rows] == [None, 1.0, 1.3, 1.6, 1.9]
     assert [row["controller"] for row in rows] == ["traditional"] + ["variable"] * 4
@@ -49,7 +49,7 @@ def test_release_rows(admit: Run) -> None:
 
 @pytest.mark.slow
 def test_default_is_both_controllers_with_the_profile_s_values(admit: Run) -> None:
-    rows = json.loads(admit("--release", "rx=0.2", "--robot", "panda", "--json")[1])
+    rows = json.loads(admit("--release", "rx=0.2", "--robot", "panda", "--json")[1])["rows"]
     assert [(row["controller"], row["alpha"]) for row in rows] == [
         ("traditional", None),
         ("variable", 3.0),
@@ -101,14 +101,14 @@ def test_estimates_and_truth_are_forces_too(admit: Run, tmp_path: Path, monkeypa
         main()
     asked = ("--robot", "panda", "--json")
     estimates = tmp_path / "e" / "estimates.parquet"
-    from_log = json.loads(admit(FIXTURE, *asked)[1])
-    from_estimates = json.loads(admit(estimates, *asked)[1])
+    from_log = json.loads(admit(FIXTURE, *asked)[1])["rows"]
+    from_estimates = json.loads(admit(estimates, *asked)[1])["rows"]
     for one, other in zip(from_log, from_estimates, strict=True):
         assert one["peak"] == pytest.approx(other["peak"], abs=1e-9)  # the same torques, stored
     truth = json.loads(
         admit(FIXTURE, "--set", f"admittance.force=file:{FIXTURE}.truth.parquet", *asked)[1]
     )
-    peaks = {row["axis"]: row["peak"] for row in truth if row["controller"] == "variable"}
+    peaks = {row["axis"]: row["peak"] for row in truth["rows"] if row["controller"] == "variable"}
     assert peaks["x"] > 0.05  # the guiding hand pulls along +x with 7 N
     code, _, err = admit(estimates, "--robot", "panda", "--observer", "kfo")
     assert code == 1

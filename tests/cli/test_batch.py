@@ -119,7 +119,7 @@ def test_compare_has_the_errors_of_compare(run, tmp_path: Path) -> None:
     words = (*ONE, "--reference", "zero", "--interval", "0:4")
     out = tmp_path / "out"
     assert run("batch", CIRCLE, "--do", "compare", *words, "-o", out, "--jobs", "0")[0] == 0
-    rows = json.loads(run("compare", CIRCLE, *words, "--json")[1])
+    rows = json.loads(run("compare", CIRCLE, *words, "--json")[1])["rows"]
     table = pl.read_parquet(out / "batch.parquet")
     assert table["rmse_Nm"].to_list() == [row["rmse_Nm"] for row in rows]
     assert table["reference_floor_Nm"].to_list() == [row["reference_floor_Nm"] for row in rows]

@@ -49,7 +49,7 @@ def test_kept_options_give_the_numbers_of_typed_ones(run, here: Path) -> None:
 def test_what_is_typed_goes_before_what_is_kept(run, here: Path) -> None:
     keep(here, KEPT)
     _, out, err = run("compare", LOG, "--observer", "gmo", "--json")
-    assert {row["observer"] for row in json.loads(out)} == {"gmo"}
+    assert {row["observer"] for row in json.loads(out)["rows"]} == {"gmo"}
     assert "--observer" not in err
     code, _, err = run("compare", LOG, "--config", "none")
     assert (code, "note: " in err) == (2, False)

@@ -72,7 +72,7 @@ def test_letters_are_those_of_the_terminal(monkeypatch: pytest.MonkeyPatch) -> N
 def test_of_a_single_log_the_error_is_the_commands_own() -> None:
     library = Library(["a.csv"])
     with pytest.raises(ParameterError):
-        LeftOut(library, [Path("a.csv")]).told(Path("a.csv"), ParameterError("no"))
+        LeftOut(library, [Path("a.csv")]).add(Path("a.csv"), ParameterError("no"))
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_a_report_writes_the_others_and_fails(
     assert "✗ left out" in stdout
     record = json.loads((out / "run.json").read_text(encoding="utf-8"))
     assert list(record["left_out"]) == ["bad.csv"]
-    assert list(record["logs"]) == ["good"]
+    assert [log["folder"] for log in record["logs"]] == ["good"]
 
 
 @pytest.mark.slow
@@ -106,7 +106,7 @@ def test_lists_and_tables_show_the_others_and_fail(logs: tuple[Path, Path], run:
     words = (*logs, "--robot", "ur5")
     code, out, _ = run("contacts", *words, "--json")
     assert code == 1
-    assert [record["recording"] for record in json.loads(out)] == ["good.csv"]
+    assert [record["recording"] for record in json.loads(out)["logs"]] == ["good.csv"]
     code, out, _ = run("compare", *words, "--observer", "gmo", "--reference", TRUTH, "--csv")
     assert code == 1
     rows = csv.DictReader(io.StringIO(out))

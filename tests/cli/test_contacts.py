@@ -49,7 +49,7 @@ def test_several_logs_are_an_array(run: Run) -> None:
     other = FIXTURES / "panda_bag"
     code, out, _ = run("contacts", TAPS, other, "--json")
     assert code == 0
-    assert [record["recording"] for record in json.loads(out)] == [TAPS.name, other.name]
+    assert [record["recording"] for record in json.loads(out)["logs"]] == [TAPS.name, other.name]
 
 
 def test_a_free_part_that_is_not_there_is_refused(run: Run) -> None:

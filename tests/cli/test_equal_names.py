@@ -46,7 +46,7 @@ def compared(logs, *options):
 
 @pytest.mark.slow
 def test_json_has_the_rows_of_both_logs(logs):
-    rows = json.loads(compared(logs, "--json"))
+    rows = json.loads(compared(logs, "--json"))["rows"]
     samples = {row["recording"]: row["samples"] for row in rows}
     assert samples["a/log.csv"] == ROWS["a"] - 1
     assert samples["b/log.csv"] == ROWS["b"] - 1

@@ -1,9 +1,13 @@
 """Without a command the words are of `contacts`: a log or options may come first."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import vftcli as vft
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -44,3 +48,17 @@ def test_any_other_word_is_refused_with_the_nearest_command(run: Run, word: str,
     code, out, err = run(word, "x.csv")
     assert (code, out) == (2, "")
     assert said in err
+
+
+@pytest.mark.slow
+def test_an_arm_that_is_not_settled_is_asked_for(run: Run, tmp_path: Path) -> None:
+    """Behind what the log holds, on one line, with the two that fit best."""
+    log = vft.read(LOG)
+    held = np.column_stack([log.t, log.q, log.require("dq"), log.require("current")])
+    np.savetxt(tmp_path / "push.csv", held, delimiter=",")
+    words = (tmp_path / "push.csv", "--columns", "t,q:6,dq:6,current:6")
+    code, out, err = run(*words)
+    assert code == 1
+    assert out.startswith(f"{tmp_path / 'push.csv'}: headerless\n  joints    6\n")
+    assert re.fullmatch(r"error: Which arm\? Best fits: ur5 .*%\), .*%\)\. Add --robot ur5\n", err)
+    assert run(*words, "--json") == (code, "", err)

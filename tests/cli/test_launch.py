@@ -35,7 +35,7 @@ def test_exit_codes(words: tuple[str, ...], code: int) -> None:
 def test_long_output_arrives_whole_through_a_pipe() -> None:
     done = launched("compare", FIXTURE, "--robot", "ur5", "--reference", TRUTH, "--json")
     assert done.returncode == 0
-    assert done.stdout.rstrip().endswith("]")
+    assert done.stdout.rstrip().endswith("}")
 
 
 def test_functions_registered_for_the_exit_are_called() -> None:

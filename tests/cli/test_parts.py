@@ -69,7 +69,7 @@ def test_all_are_logs_of_their_own(episodes: Path, monkeypatch: Any, capsys: Any
     words = ("contacts", episodes, "--robot", "ur5", "--episode", "all", "--anyway", "--json")
     assert run(monkeypatch, *words) == 0
     found = capsys.readouterr()
-    assert [each["recording"] for each in json.loads(found.out)] == [
+    assert [each["recording"] for each in json.loads(found.out)["logs"]] == [
         "ur5.arrow episode 0",
         "ur5.arrow episode 1",
     ]

@@ -8,7 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from vftcli.cli.simulate import simulate_log
+from vftcli.cli.convert import simulate_log
 from vftcli.readers import read
 from vftcli.signals.errors import VftError
 

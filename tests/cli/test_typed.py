@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.batch.choice import WorkersChoice
-from vftcli.cli.analysis import AnalysisOptions, ListChoice, LogOptions
+from vftcli.cli.analysis import AnalysisOptions, LogOptions
 from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, command
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.observers.choice import ObserverChoice
@@ -121,7 +121,6 @@ def test_any_option_of_it_asks_for_a_wrench(typed: dict[str, object]) -> None:
             ("observers", ObserverChoice),
             ("free", FreeChoice),
             ("refinement", RefinementChoice),
-            ("listing", ListChoice),
         )
     }
     log = LogOptions(reading=Typed(ReadChoice, {}), robot=Typed(RobotChoice, {}))

@@ -85,7 +85,7 @@ def answer(table: Table, learns: bool, path: Path) -> Answer:
             made = (
                 of_thresholds(path, table)
                 if learns
-                else of_report(report(path, table.given, observers=OBSERVERS), table)
+                else of_report(report(path, table.given, observer=OBSERVERS), table)
             )
         except VftError as error:
             made = Answer(refused=str(error).removeprefix(f"{path.name}: "))

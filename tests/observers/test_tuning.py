@@ -116,7 +116,7 @@ def test_a_tuned_file_goes_into_a_comparison(tmp_path: Path) -> None:
     compare = ["compare", str(FIXTURE), "--robot", "ur5", "--json"]
     compare += ["--reference", f"file:{FIXTURE}.truth.parquet", "--gains", str(gains)]
     compare += ["--observer", "gmo", "--observer", "kfo-rts", "--observer", "rts-auto"]
-    found = json.loads(runner.invoke(app, compare).stdout)
+    found = json.loads(runner.invoke(app, compare).stdout)["rows"]
     rmse = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in found}
     for j in (1, 2, 3, 4, 6):  # J5 rests
         # the spectrum of 4 s of free motion tells the error to about a third on each joint

@@ -33,7 +33,7 @@ from vftcli.batch.datasets.copying import (
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
 from vftcli.outputs.files import digest, put_text
-from vftcli.outputs.log.run_record import to_json, versions
+from vftcli.outputs.log.run_record import envelope, to_json
 from vftcli.readers import FORMATS
 from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError
@@ -75,7 +75,9 @@ def annotate(
     check_copy(path, copy, force=force)
     for _ in files_within(path):
         pass  # a link that leaves it is refused before anything is computed
-    beside = [Path(n) for n in (choice.robot.name, choice.observers.gains_file) if n is not None]
+    beside = [
+        Path(str(n)) for n in (choice.robot.name, choice.observers.gains_file) if n is not None
+    ]
     files_beside = " ".join(digest(file) for file in beside if file.is_file())
     key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()
     with unfinished(copy, key) as folder:
@@ -100,9 +102,7 @@ def annotate(
         if path.is_dir():
             copy_others(path, folder, {file.place for file in plan.rows})
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
-        record = {
-            "command": command,
-            "versions": versions(),
+        found = {
             "dataset": str(path),
             "sign": SIGN,
             "robot": made["robot"],
@@ -115,6 +115,8 @@ def annotate(
             "episodes": made["episodes"],
             "sources": dict(sorted(plan.sources.items())),
         }
+        entry = {"recording": path.name, "path": str(path), "sha256": None}
+        record = envelope(command, [entry], found=found)
         with finished(folder / RECORD) as temporary:
             put_text(temporary, to_json(record))
     return record

@@ -104,7 +104,7 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
         from vftcli.outputs.log.report import CONTACTS, put_contacts
 
         with OutputFolder(folder, True, CONTACTS) as files:
-            put_contacts(files, "", [analysis])
+            put_contacts(files, "", [analysis], task.command)
 
 
 def for_estimates(choice: AnalysisChoice) -> AnalysisChoice:

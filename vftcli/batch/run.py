@@ -14,7 +14,7 @@ from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
-from vftcli.outputs.log.run_record import versions
+from vftcli.outputs.log.run_record import envelope, versions
 from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.readers.library import LogEntry, absolute, labelled
 
@@ -211,12 +211,9 @@ class BatchRun:
         label_of = {key: self.labels[n] for n, key in self.keys.items()}
         efforts = self.efforts.values()
         last = max((e.started + e.seconds for e in efforts), default=0.0)
-        return {
-            "command": self.command,
-            "versions": versions(),
+        found = {
             "do": self.job.do,
             "options_sha256": self.options,
-            "logs": count.logs,
             "done_before": count.before,
             "done_now": count.done,
             "failed": count.failed,
@@ -228,3 +225,8 @@ class BatchRun:
                 for key, effort in self.efforts.items()
             ],
         }
+        logs = [
+            {"recording": self.labels[n], "path": str(self.logs[n].path), "sha256": None}
+            for n in self.keys
+        ]
+        return envelope(self.command, logs, found=found)

@@ -18,7 +18,7 @@ import typer
 from vftcli.cli.commands import COMMANDS, with_command
 from vftcli.cli.help import GroupedCommand, JourneyGroup
 from vftcli.cli.progress import echo
-from vftcli.signals.errors import VftError
+from vftcli.signals.errors import UnsettledRobotError, VftError
 from vftcli.signals.parsing import printable
 
 
@@ -84,6 +84,10 @@ def main() -> None:
     try:
         make_app(asked_for())(prog_name="vftcli")
     except VftError as error:
+        if isinstance(error, UnsettledRobotError) and not {"--json", "--csv"} & set(sys.argv):
+            from vftcli.outputs.examination import holdings
+
+            echo("\n".join(holdings(error.recording)))
         fail(str(error))
     except MemoryError:
         fail("out of memory; use --interval to take a part of the log")

@@ -1,7 +1,7 @@
 """The options of commands that analyse a log, and what they state together."""
 
 import os
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
@@ -12,7 +12,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.option import WRITE, Choice, Option, is_yes, setting
+from vftcli.signals.option import WRITE, Option
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
@@ -86,16 +86,6 @@ class ExtraOptions(Bundle):
         return replace(self.written.choice(), extras=extras)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ListChoice(Choice):
-    """Whether contacts are listed."""
-
-    contacts: Annotated[
-        bool,
-        setting("contacts.list", "yes|no", "Whether contacts are listed.", is_yes),
-    ] = True
-
-
 class AnalysisOptions(Bundle):
     """All that can be asked of a log but what it is compared with."""
 
@@ -105,7 +95,6 @@ class AnalysisOptions(Bundle):
     refinement: Typed[RefinementChoice]
     also_wrench: Wrench
     wrench: Typed[WrenchChoice]
-    listing: Typed[ListChoice]
     anyway: Anyway
     talk: TalkOptions
 
@@ -134,10 +123,10 @@ class AnalysisOptions(Bundle):
             observers=self.observers.choice(**observers),
             free=self.free.choice(),
             refinement=self.refinement.choice(),
+            contacts=self.refinement.choice().contacts,
             wrench=self.wrench.choice() if self.asks_wrench else None,
             reference=replace(reference.choice(), contacts=self.talk.details)
             if reference is not None and compared
             else None,
-            contacts=self.listing.choice().contacts,
             progress=stages(),
         )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.progress import echo
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import check_known
@@ -67,7 +68,8 @@ def annotate_dataset(
     """
     from vftcli.batch.annotated_copy import annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
-    from vftcli.cli.console import command_line, detail, say, say_json, stages
+    from vftcli.cli.console import command_line, detail, say, stages
+    from vftcli.outputs.log.run_record import to_json
 
     added = added_columns(add)
     asked = ForceChoice(
@@ -92,7 +94,7 @@ def annotate_dataset(
         force=force,
     )
     if json:
-        say_json(record)
+        echo(to_json(record), nl=False)
         return
     for line in told_lines(record, asked):
         say(line)

@@ -30,7 +30,7 @@ JOURNEYS = {
     "Ask a log": {
         "contacts": "contacts:list_contacts",
         "report": "report:report",
-        "estimate": "estimate:estimate",
+        "estimate": "report:estimate",
         "compare": "compare:compare",
         "batch": "batch:batch",
         "thresholds": "thresholds:contact_thresholds",
@@ -43,12 +43,12 @@ JOURNEYS = {
     },
     "Study further": {
         "admit": "admit:admit",
-        "simulate": "simulate:simulate_log",
+        "simulate": "convert:simulate_log",
         "reproduce": "reproduce:reproduce",
-        "bench": "bench:bench",
+        "bench": "reproduce:bench",
     },
     "Look up": {
-        "help": "listings:show_help",
+        "help": "help:show_help",
     },
 }
 #: Name → the command.

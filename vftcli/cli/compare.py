@@ -88,37 +88,29 @@ def compare(
     """
     import polars as pl
 
+    from vftcli.answering import errors_of
     from vftcli.batch.log_work import for_comparison
-    from vftcli.cli.console import LeftOut, say_analysis
-    from vftcli.cli.jacobian import JacobianLogs
+    from vftcli.cli.console import LeftOut, say_analysis, say_json
     from vftcli.evaluation import paired_significance
-    from vftcli.evaluation.errors import PoolMember, evaluate_pooled
     from vftcli.outputs.log import tables
+    from vftcli.outputs.log.report import jacobian_entry
     from vftcli.outputs.log.rmse_tables import paper_bounds
+    from vftcli.outputs.log.run_record import all_remarks
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 
     drawn.folder()
     library = Library(logs)
     choice = for_comparison(analysis.choice(library, reference))
-    left_out, analyses = LeftOut(library, logs), []
-    by_jacobian = JacobianLogs(left_out, choice)
-    for made in analyse_logs(logs, choice, by_jacobian.told):
+    left_out, analyses = LeftOut(library, logs, choice), []
+    for made in analyse_logs(logs, choice, left_out.add):
         if not table.json:
             say_analysis(made)
         analyses.append(made)
-    if not (analyses or by_jacobian.judged):
+    if not (analyses or left_out.judged):
         left_out.end(0)
-    errors = [a.errors for a in analyses if a.errors is not None]
-    errors += [made.errors for made in by_jacobian.judged if made.errors is not None]
-    members = [
-        PoolMember(a.robot.name, a.estimates, a.reference)
-        for a in analyses
-        if a.reference is not None
-    ]
-    together = pl.concat([*errors, evaluate_pooled(members)], how="diagonal")
-    drawn.write(together)
-    rows, bounds = tables.marked(together, analyses), paper_bounds(analyses)
+    rows, bounds = errors_of(analyses, left_out.judged), paper_bounds(analyses)
+    drawn.write(rows)
     if table.form == "terminal":
         text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
         echo(text if analysis.talk.details else f"{text}{MORE}")
@@ -129,6 +121,10 @@ def compare(
         ]
         if pairs:
             echo(tables.pairs_text(pl.concat(pairs)))
+    elif table.json:
+        every = [remark for a in analyses for remark in all_remarks(a)]
+        judged = [jacobian_entry(made.log) for made in left_out.judged]
+        say_json([*(a.recording for a in analyses), *judged], every, rows=rows.to_dicts())
     else:
         echo(tables.FORMS[table.form](rows, bounds))
-    left_out.end(len(errors))
+    left_out.end(len(analyses) + len(left_out.judged))

@@ -19,7 +19,7 @@ from typer.core import TyperOption
 from vftcli.cli.commands import COMMANDS, now_of
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, settings_by_name
+from vftcli.signals.option import Choice, settings_by_name, text_of
 from vftcli.signals.parsing import did_you_mean, interval, printable, shown, toml_tables
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
@@ -223,10 +223,7 @@ def flattened(
                 raise ParameterError(
                     f"{path}: {dotted} is no setting; vftcli help settings lists them.{near}"
                 )
-            text = {True: "yes", False: "no"}.get(given) if isinstance(given, bool) else None
-            text = text or ",".join(words_in(given))
-            if not text:
-                raise ParameterError(f"{path}: {dotted} = {shown(given)} is not a text or a number")
+            text = text_of(given, f"{path}: {dotted}")
             setting = settings_by_name(choices).get(dotted)
             found[dotted] = beside(path.parent, text, setting[0]) if setting else text
     return found

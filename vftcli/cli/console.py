@@ -1,15 +1,14 @@
 """What every command prints alike: how much is said, to whom, and how wide."""
 
-import json
 import os
 import shlex
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -22,8 +21,11 @@ from vftcli.signals.parsing import printable, printable_lines
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
+    from vftcli.evaluation.logged_jacobian import JacobianJudgement
     from vftcli.outputs.canvas import Canvas
+    from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
+    from vftcli.readers.table import JacobianError
     from vftcli.robots.robot import Robot
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
@@ -120,22 +122,44 @@ def canvas() -> "Canvas":
     )
 
 
-def say_json(value: object) -> None:
-    """Print what a command makes to stdout, for machines; what is no finite number is null."""
-    from vftcli.outputs.log.run_record import jsonable
+def say_json(
+    logs: "Sequence[Mapping[str, Any] | Recording]",
+    remarks: "Iterable[Remark]" = (),
+    **found: Any,  # noqa: ANN401 - whatever JSON can hold
+) -> None:
+    """Print what a command found to stdout, for machines; what is no finite number is null."""
+    from vftcli.outputs.log.run_record import envelope, log_entry, to_json
 
-    echo(json.dumps(jsonable(value), indent=2, ensure_ascii=False, allow_nan=False))
+    entries = [log if isinstance(log, Mapping) else log_entry(log) for log in logs]
+    echo(to_json(envelope(command_line(), entries, remarks, found)), nl=False)
 
 
 class LeftOut:
-    """The logs of a command that could not be analysed: one line each, the others go on."""
+    """The logs of a command that could not be analysed: one line each, the others go on.
 
-    def __init__(self, library: "Library", logs: Sequence[Path]) -> None:
-        self._library, self._several = library, len(logs) > 1
+    Attributes:
+        judged: Of a vendor's torques beside a Jacobian what they tell, where a choice is given.
+        reasons: Label of every other log → why it is left out.
+    """
+
+    def __init__(
+        self, library: "Library", logs: Sequence[Path], choice: "AnalysisChoice | None" = None
+    ) -> None:
+        self._library, self._several, self._choice = library, len(logs) > 1, choice
+        self.judged: list[JacobianJudgement] = []
         self.reasons: dict[str, str] = {}
 
-    def told(self, log: Path, error: VftError) -> None:
-        """Say which log is left out, and why."""
+    def add(self, log: Path, error: VftError) -> None:
+        """Judge a log by its Jacobian, else say that it is left out, and why."""
+        from vftcli.readers.table import JacobianError
+
+        if self._choice is not None and isinstance(error, JacobianError):
+            try:
+                self.judged.append(judge_by_jacobian(log, error, self._choice))
+            except VftError as other:
+                error = other
+            else:
+                return
         if not self._several:
             raise error
         reason = " ".join(str(error).split())
@@ -149,6 +173,21 @@ class LeftOut:
         if not done:
             echo("error: none of the logs can be analysed", err=True)
         raise typer.Exit(1)
+
+
+def judge_by_jacobian(
+    log: Path, found: "JacobianError", choice: "AnalysisChoice"
+) -> "JacobianJudgement":
+    """What a vendor's torques beside a Jacobian tell of what is asked, with the notes on them."""
+    from vftcli.evaluation.logged_jacobian import judge_jacobian
+    from vftcli.readers.jacobian import jacobian_log
+
+    read = jacobian_log(log, found, choice.read, choice.library.label(log))
+    reference = choice.reference.name if choice.reference is not None else None
+    made = judge_jacobian(read, choice.wrench, reference)
+    for remark in (*read.remarks, *made.remarks):
+        say(f"note: {read.name}: {remark}")
+    return made
 
 
 def say_recording(recording: "Recording") -> None:

@@ -63,7 +63,7 @@ def list_contacts(
     )
     left_out = LeftOut(library, logs)
     found = []
-    for made in analyse_logs(logs, choice, left_out.told, list_touches):
+    for made in analyse_logs(logs, choice, left_out.add, list_touches):
         say_analysis(made)
         found.append(made)
     if found:
@@ -79,7 +79,7 @@ def print_stored(estimates: Path, form: ListOptions) -> None:
 
     record = stored_record(estimates)
     if form.json:
-        say_json(record)
+        say_json([record])
     elif form.csv:
         echo(contacts_csv([stored_list(record)]), nl=False)
     else:
@@ -90,16 +90,17 @@ def print_lists(
     found: "list[Analysis]", form: ListOptions, failed: "Mapping[str, str]", *, every: bool
 ) -> None:
     """Print the lists in the form that is asked for."""
-    from vftcli.cli.console import canvas, say_json
-    from vftcli.outputs import contacts as output
+    from vftcli.cli.console import canvas, command_line
+    from vftcli.outputs.contacts import contacts_csv
+    from vftcli.outputs.log.report import contacts_envelope
+    from vftcli.outputs.log.run_record import to_json
     from vftcli.outputs.screen import log_screen, logs_screen
 
     lists = [made.contacts for made in found if made.contacts is not None]
     if form.json:
-        records = [output.contacts_record(each) for each in lists]
-        say_json(records[0] if len(records) + len(failed) == 1 else records)
+        echo(to_json(contacts_envelope(found, command_line(), failed)), nl=False)
     elif form.csv:
-        echo(output.contacts_csv(lists), nl=False)
+        echo(contacts_csv(lists), nl=False)
     else:
         screen = canvas()
         texts = (

@@ -1,9 +1,15 @@
-"""`vftcli convert`: any readable log as a table or an MCAP."""
+"""`vftcli convert` and `vftcli simulate`: a log as another file, or as a robot would write it."""
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.progress import echo
 from vftcli.readers.reader import ReadChoice
+from vftcli.signals.option import Option, names_at
 
 
 @opt.command
@@ -40,18 +46,86 @@ def convert_log(
     say(health_line(examine(recording)))
     say_left_out([output])
     if json:
-        summary = {
-            "output": str(output),
-            "format": recording.source.format,
-            "samples": recording.samples,
-            "signals": recording.signals,
-            "repairs": [str(repair) for repair in recording.source.repairs],
-            "warnings": [str(warning) for warning in recording.source.warnings],
-        }
-        say_json(summary)
+        held = recording.source
+        say_json(
+            [recording],
+            held.remarks,
+            output=str(output),
+            format=held.format,
+            samples=recording.samples,
+            signals=recording.signals,
+            repairs=list(map(str, held.repairs)),
+            warnings=list(map(str, held.warnings)),
+        )
         return
     for repair in recording.source.repairs:
         say(f"repair: {repair}")
     for warning in recording.source.warnings:
         say(f"note: {warning}")
     say(f"wrote {recording.samples} samples of {', '.join(recording.signals)}")
+
+
+@opt.command
+def simulate_log(
+    *,
+    scenario: Annotated[str, Option("", "SCENARIO", "list, a scenario's name or a FILE.toml.")],
+    seed: Annotated[int | None, opt.SEED],
+    log_format: Annotated[
+        str,
+        Option(
+            "--as",
+            "FORMAT",
+            "Write rtde, ur-rtde, libfranka, rosbag2 or parquet.",
+            completes=names_at("simulation.writers:WRITERS"),
+        ),
+    ] = "",
+    changes: Annotated[list[str] | None, opt.SET._replace(group="")],
+    output: Annotated[Path | None, opt.OUT],
+    json: opt.Json,
+    force: opt.Force,
+) -> None:
+    """Simulate an experiment, with its true forces.
+
+    They stand beside the log, as PATH.truth.parquet. The settings are the scenario's keys, as
+    duration=8 or servo.stiffness=soft; without --as the format is the arm's own.
+
+    Example: vftcli simulate ur5-circle -o log.csv --seed 2
+    """
+    from vftcli.cli.console import command_line, say, say_json, say_left_out, steps_of
+    from vftcli.outputs.simulation import free_path, log_folder, save
+    from vftcli.robots import load_robot
+    from vftcli.signals.packages import check_installed
+    from vftcli.simulation import load_scenario
+    from vftcli.simulation.experiment import simulate_pair
+    from vftcli.simulation.scenario import listing
+    from vftcli.simulation.writers import usual_format
+
+    if scenario == "list":
+        scenarios = listing()
+        width = max(len(name) for name, _ in scenarios)
+        for name, title in scenarios:
+            echo(f"{name:<{width}} {title}")
+        return
+    if output is None:
+        raise typer.BadParameter("-o PATH says where the log goes")
+    check_installed("pinocchio", "vftcli simulate")
+    setup = load_scenario(scenario, changes or ())
+    paths = [output, free_path(output)] if setup.pair else [output]
+    log_folder(paths, force)
+    usual_format(setup, load_robot(setup.robot), log_format)  # refused before the run
+    runs = simulate_pair(setup, seed, steps_of("simulating"))
+    places = dict(zip(paths, runs, strict=True))
+    files = [str(f) for f in save(places, log_format, force, command_line())]
+    say_left_out(files)
+    if json:
+        say_json(
+            [],
+            scenario=setup.name,
+            seed=runs[0].seed,
+            files=files,
+            samples=len(runs[0].measured.rows),
+            robot=setup.robot,
+        )
+        return
+    for file in files:
+        say(f"wrote {file}")

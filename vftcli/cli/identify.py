@@ -15,9 +15,7 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.errors import ParameterError
 
 if TYPE_CHECKING:
-    from vftcli.readers.reader import ReadChoice
     from vftcli.robots.robot import Robot
-    from vftcli.signals.recording import Recording
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
@@ -81,6 +79,7 @@ def identify_robot(
 
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
+    from vftcli.answering import identified
     from vftcli.cli.console import (
         command_line,
         detail,
@@ -90,7 +89,6 @@ def identify_robot(
         say_recording,
         say_robots,
     )
-    from vftcli.identification import identify
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification import (
         beside,
@@ -100,40 +98,23 @@ def identify_robot(
     )
     from vftcli.readers.library import Library
 
-    chosen, task, without_load = logged.robot.choice(), asked.choice(), free.choice()
-    refinement = bias.choice()
+    task, without_load, refinement = asked.choice(), free.choice(), bias.choice()
     pages = {"--check": check, "--open": show}
     check_uses(task, without_load, logs, {**pages, "--gains": goal.words["gains"]})
     if task.method == "gains":
         also = {"free": without_load, "refinement": refinement, "anyway": anyway}
         find_gains(logs[0], output, logged, goal.choice(), made, **also)
         return
-    form, choice = made.figures, logged.reading.choice()
-    # An episode is one of LOG's; the others are logs of their own.
-    held_out_choice = replace(choice.whole, interval=task.check_interval)
-    unloaded_choice = replace(choice.whole, interval=choice.interval)
     library = Library([*logs, *(check or ()), *without_load.logs])
     # That the profile is not the arm's is what this command is there to change; but the friction
     # method keeps the profile's links, and the default begins with it.
     examiner = health_of(library, anyway=anyway, fitting=task.keeps_links)
-    profile = examiner.robot(next(library.open_each(logs, choice)), chosen)
+    choice = replace(logged.asked(library, free=without_load), examiner=examiner)
+    profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
     output = output or file_for(profile)
+    form = made.figures
     OutputFolder(output.parent, made.force, files_beside(output, form)).check()
-    task = replace(task, name=output.stem, friction=chosen.friction != "none")
-
-    def opened(
-        paths: list[Path] | tuple[Path, ...], how: "ReadChoice", *, whole: bool = False
-    ) -> list["Recording"]:
-        each = library.open_each(paths, how, whole=whole)
-        return [examiner.taken(log, profile, how) for log in each]
-
-    train = opened(logs, choice, whole=task.method == "payload")
-    held_out = opened(check or [], held_out_choice)
-    unloaded = opened(without_load.logs, unloaded_choice)
-    for recording in (*train, *held_out, *unloaded):
-        say_recording(recording)
-        examiner.examine(recording, profile)
-    found = identify(train, profile, task, held_out, unloaded[0] if unloaded else None)
+    found = identified(logs, check or (), choice, replace(task, name=output.stem), say_recording)
     record = write_identification(
         output, found, examiner.examinations, command_line(), made.force, form
     )
@@ -155,47 +136,32 @@ def find_gains(
     **others: Any,  # noqa: ANN401 - choices
 ) -> None:
     """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
+    from vftcli.answering import TUNED, gains_of
     from vftcli.cli.console import command_line, detail, say, say_json, say_recording
-    from vftcli.observers.choice import LOG_GAINS, ObserverChoice
-    from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
     from vftcli.outputs.log.figures import write_tuned
-    from vftcli.outputs.log.run_record import jsonable
-    from vftcli.pipeline import examine, model, prepared, read
     from vftcli.readers.library import Library
-    from vftcli.robots.run import Runs
 
-    wanted = parse_goal(goal.gains, goal.threshold)
-    choice = logged.asked(
-        Library([log]),
-        observers=ObserverChoice(gains=LOG_GAINS, causal=True),
-        **others,
-    )
-    recording, arm = prepared(choice.library.open(log, choice.read), choice)
-    output = output or file_for(arm)
+    choice = logged.asked(Library([log]), observers=TUNED, **others)
+    if output is None:
+        recording = choice.library.open(log, choice.read)
+        output = file_for(choice.examiner.robot(recording, choice.robot))
     check_file(output, made.force)
-    motion = read(recording, arm, choice, Runs())
-    examinations = examine(motion, choice)
-    found = model(motion, choice)
-    if found is None or (spectra := found.plain.spectra) is None:
-        why = found.plain.missing if found else "no free part"
-        raise ParameterError(f"nothing to find gains from: {why}")
-    tuned = tune_all(spectra, wanted)
-    reached = bounds_reached(tuned, spectra, wanted)
-    notes = [str(remark) for remark in (*found.remarks, *reached)]
-    doubts = overridden_lines(examinations)
-    heading = [*doubts, command_line(), f"goal: {goal.gains}", f"robot: {arm.name}", *notes]
-    write_tuned(output, heading, spectra, tuned, force=made.force, form=made.figures)
+    found = gains_of(log, choice, goal)
+    notes, health = list(map(str, found.remarks)), found.examinations
+    said = [command_line(), f"goal: {goal.gains}", f"robot: {found.robot.name}", *notes]
+    heading = [*overridden_lines(health), *said]
+    write_tuned(output, heading, found.spectra, found.tuned, force=made.force, form=made.figures)
     if made.json:
-        rows = [jsonable(line.record) for line in tuned]
-        health = jsonable(health_record(examinations))
-        say_json({"goal": goal.gains, "examination": health, "notes": notes, "observers": rows})
+        rows = [line.record for line in found.tuned]
+        about = {"goal": goal.gains, "examination": health_record(health), "observers": rows}
+        say_json([found.recording], found.remarks, **about)
         return
-    say_recording(recording)
-    for note in (*arm.remarks, *notes):
+    say_recording(found.recording)
+    for note in (*found.robot.remarks, *notes):
         detail(f"note: {note}")
-    echo(terminal(tuned_grid(tuned, wanted.threshold is not None)).rstrip("\n"))
+    echo(terminal(tuned_grid(found.tuned, found.goal.threshold is not None)).rstrip("\n"))
     say(f"wrote {output}: use it with --gains {output}")

@@ -41,6 +41,7 @@ def inspect_log(
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
+    from vftcli.outputs.log.run_record import log_entry
     from vftcli.readers import read_first_recording
 
     if output is not None:
@@ -59,8 +60,8 @@ def inspect_log(
         echo("\n\n".join(map(examination_text, examinations)))
     written = {} if output is None else write_options(output, logs, logged, force=force)
     if json:
-        each = list(map(examination_record, examinations))
-        say_json({**(each[0] if len(each) == 1 else {"logs": each}), **written})
+        entries = [log_entry(one.recording, examination_record(one)) for one in examinations]
+        say_json(entries, [remark for one in examinations for remark in one.remarks], **written)
     warnings = sum(len(examination.warnings) for examination in examinations)
     if strict and warnings:
         echo(f"{warnings} warning{'s' if warnings > 1 else ''} (--strict)", err=True)

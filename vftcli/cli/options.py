@@ -35,10 +35,11 @@ from vftcli.signals.option import (
     WRITE,
     Choice,
     Option,
+    settings_as_typed,
     settings_by_name,
 )
 from vftcli.signals.packages import check_installed
-from vftcli.signals.parsing import assignment, did_you_mean
+from vftcli.signals.parsing import assignment
 
 if TYPE_CHECKING:
     from vftcli.readers.reader import ReadChoice
@@ -228,15 +229,9 @@ def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[s
     Raises:
         ParameterError: If a word is malformed or there is no such setting.
     """
-    found = dict(assignment(word, "--set", "NAME=VALUE") for word in words)
-    for name in found:
-        if not any(kind.takes(name) for kind in choices):
-            near = did_you_mean(name, settings_by_name(choices))
-            raise ParameterError(
-                f"--set {name}: this command has no such setting; vftcli help settings lists all."
-                f"{near}"
-            )
-    return found
+    return settings_as_typed(
+        dict(assignment(word, "--set", "NAME=VALUE") for word in words), choices
+    )
 
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:

@@ -1,21 +1,24 @@
-"""`vftcli report`: everything about a log in one folder."""
+"""`vftcli report` and `vftcli estimate`: logs become folders, with all of it or estimates alone."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
 from vftcli.cli.progress import echo
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.signals.option import Choice, setting
+from vftcli.signals.option import WRITE, Choice, Option, setting
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterator
 
     from vftcli.analysis import Analysis
     from vftcli.cli.console import LeftOut
+    from vftcli.outputs.log.estimates import Group
     from vftcli.pipeline import AnalysisChoice
+    from vftcli.readers.table import JacobianError
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,17 +50,15 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.cli.console import LeftOut, command_line, open_made, say_left_out
-    from vftcli.cli.jacobian import write_by_jacobian
-    from vftcli.evaluation.print_table import check_published
+    from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_left_out
+    from vftcli.evaluation.print_table import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import FILES, report_files, write_report, write_reports
-    from vftcli.pipeline import WRITING
+    from vftcli.outputs.log.report import FILES, report_files
+    from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
 
-    library, published = Library(logs), beside.choice().table
-    written = also.choice()
+    library, published, written = Library(logs), beside.choice().table, also.choice()
     output = opt.folder_of(output, logs, analysis.log.reading)
     names = report_files([library.label(log) for log in logs], written.extras, figures)
     OutputFolder(output, force, names).check()
@@ -65,69 +66,52 @@ def report(
     if published is not None:
         check_published(published, reference.words["reference"])
         choice = replace(choice, observers=choice.observers.beside_print())
-    left_out = LeftOut(library, logs)
+    left_out, analyses = LeftOut(library, logs), []
     try:
-        analyses = analysed(logs, choice, left_out, published, json=json)
+        for made in analyse_logs(logs, choice, left_out.add):
+            table = None
+            if published is not None and made.errors is not None:
+                table = compare_with(published, made.errors, made.observers, made.tunings)
+            analyses.append(replace(made, published=table))
+            if not json:
+                say_analysis(made)
     except JacobianError as found:  # of one log; among several it is left out
         write_by_jacobian(logs[0], found, choice, output, force=force, json=json)
         return
     if not analyses:
         left_out.end(0)
     choice.progress("writing", WRITING, 1.0)
-    command, failed = command_line(), left_out.reasons
-    if len(analyses) + len(failed) == 1:
-        record = write_report(
-            output, analyses[0], command=command, force=force, choice=written, form=figures
-        )
-    else:
-        record = write_reports(
-            output,
-            analyses,
-            command=command,
-            force=force,
-            choice=written,
-            form=figures,
-            failed=failed,
-        )
+    how = {"command": command_line(), "force": force, "choice": written, "form": figures}
+    record = written_record(output, analyses, left_out.reasons, **how)
     say_left_out(FILES)
     if json:
         echo(record)
     else:
-        show_report(analyses, output, failed, written.extras, details=analysis.talk.details)
+        show_report(analyses, output, left_out, written.extras, details=analysis.talk.details)
     if show:
         open_made(output)
     left_out.end(len(analyses))
 
 
-def analysed(
-    logs: "Sequence[Path]",
-    choice: "AnalysisChoice",
-    left_out: "LeftOut",
-    published: str | None,
-    *,
-    json: bool,
-) -> "list[Analysis]":
-    """The logs that can be analysed, a printed table beside their errors where one is asked for."""
-    from vftcli.cli.console import say_analysis
-    from vftcli.evaluation.print_table import compare_with
-    from vftcli.pipeline import analyse_logs
+def written_record(
+    output: Path,
+    analyses: "Sequence[Analysis]",
+    failed: Mapping[str, str],
+    **how: Any,  # noqa: ANN401 - of `write_report`
+) -> str:
+    """The text of `run.json` of one log or several, their folder written."""
+    from vftcli.outputs.log.report import write_report, write_reports
 
-    analyses = []
-    for made in analyse_logs(logs, choice, left_out.told):
-        beside = None
-        if published is not None and made.errors is not None:
-            beside = compare_with(published, made.errors, made.observers, made.tunings)
-        analyses.append(replace(made, published=beside))
-        if not json:
-            say_analysis(made)
-    return analyses
+    if len(analyses) + len(failed) == 1:
+        return write_report(output, analyses[0], **how)
+    return write_reports(output, analyses, failed=failed, **how)
 
 
 def show_report(
     analyses: "Sequence[Analysis]",
     output: Path,
-    failed: "Mapping[str, str]",
-    extras: "Sequence[str]",
+    left_out: "LeftOut",
+    extras: Sequence[str],
     *,
     details: bool,
 ) -> None:
@@ -139,10 +123,10 @@ def show_report(
     from vftcli.outputs.log.tables import print_text, to_terminal
     from vftcli.outputs.screen import log_screen, logs_screen, written_lines
 
+    failed = left_out.reasons
     several = len(analyses) + len(failed) > 1
     screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
-    names = (*names, "figures/")
-    below = written_lines(output, names, screen, several=several)
+    below = written_lines(output, (*names, "figures/"), screen, several=several)
     if several:
         show(logs_screen(analyses, screen, failed, below, every=details))
     else:
@@ -152,3 +136,102 @@ def show_report(
             show(to_terminal(made.errors, paper_bounds([made])))
         if made.published is not None:
             show(print_text(made.published))
+
+
+@opt.command
+def estimate(
+    log: opt.Log,
+    output: opt.LogFolder,
+    analysis: AnalysisOptions,
+    also: ExtraOptions,
+    csv: Annotated[bool, Option("--csv", "", "Also write estimates.csv.", group=WRITE)],
+    rrd: Annotated[bool, Option("--rrd", "", "Also write recording.rrd.", group=WRITE)],
+    json: opt.Json,
+    force: opt.Force,
+    show: opt.Open,
+) -> None:
+    """Write the external torques and wrench.
+
+    Writes DIR/estimates.parquet (t, q/1…, tau_ext/OBSERVER/1…, wrench/best/fx…, contact) and
+    DIR/run.json.
+
+    Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
+    """
+    from vftcli.batch.log_work import for_estimates
+    from vftcli.cli.console import command_line, open_made, say_left_out
+    from vftcli.outputs.files import OutputFolder
+    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
+    from vftcli.pipeline import analyse, prepared
+    from vftcli.readers.estimates import refuse_estimates
+    from vftcli.readers.library import Library
+    from vftcli.readers.table import JacobianError
+    from vftcli.signals.packages import check_installed
+    from vftcli.signals.recording import EXAMINED
+    from vftcli.streaming import analysed_in_blocks, comes_in_blocks
+
+    output = opt.folder_of(output, [log], analysis.log.reading)
+    library, written = Library([log]), also.choice(csv=csv, rrd=rrd or show)
+    names = estimate_files(written.extras)
+    if "rrd" in written.extras:
+        check_installed("rerun", "recording.rrd (--rrd, --open)")
+    if analysis.log.reading.words["columns"] is None:
+        refuse_estimates(log)
+    OutputFolder(output, force, names).check()
+    choice = analysis.choice(library)
+    # Of a large log only the columns that are looked at are read; outputs show the others too.
+    few = not (choice.lists_contacts or choice.wrench or written.extras)
+    choice = for_estimates(choice)
+    try:
+        recording = library.open(log, replace(choice.read, signals=EXAMINED if few else None))
+        # What needs no complete log comes in blocks, so that memory does not grow with it.
+        if set(written.extras) <= {"csv"} and comes_in_blocks(recording, choice):
+            found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
+        else:
+            found = analyse(*prepared(recording, choice), choice)
+        made, record = write_estimate_folder(output, found, command_line(), written, force)
+    except JacobianError as error:
+        write_by_jacobian(log, error, choice, output, force=force, json=json)
+        return
+    say_left_out(names)
+    if json:
+        echo(record)
+    else:
+        show_estimates(made, output, names)
+    if show:
+        open_made(output)
+
+
+def show_estimates(made: "Analysis", output: Path, files: Sequence[str]) -> None:
+    """Print what was found in short, and what was written."""
+    from vftcli.cli.console import canvas, say_analysis, show
+    from vftcli.outputs.screen import short_screen, written_lines
+
+    say_analysis(made)
+    screen = canvas()
+    show(short_screen(made, written_lines(output, files, screen), screen))
+
+
+def write_by_jacobian(
+    log: Path,
+    found: "JacobianError",
+    choice: "AnalysisChoice",
+    output: Path,
+    *,
+    force: bool,
+    json: bool,
+) -> None:
+    """Write what there is of a vendor's torques beside a Jacobian, where it is asked for."""
+    from vftcli.cli.console import command_line, judge_by_jacobian, say, show
+    from vftcli.outputs.log.report import write_jacobian_folder
+    from vftcli.outputs.log.tables import to_terminal
+
+    if choice.wrench is None and choice.reference is None:
+        raise found
+    made = judge_by_jacobian(log, found, choice)
+    record = write_jacobian_folder(output, made, command_line(), force=force)
+    if json:
+        echo(record)
+        return
+    if made.errors is not None:
+        show(to_terminal(made.errors, every=False))
+    say(f"{output}: estimates.parquet and run.json; no page and no recording without positions")

@@ -38,10 +38,10 @@ def contact_thresholds(
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
+    from vftcli.answering import modelled, touched
     from vftcli.cli.console import say, say_json, say_recording, say_robots
     from vftcli.contacts.threshold_check import check_contacts
     from vftcli.contacts.thresholds import check_alike, compared_signals, find_thresholds, left_out
-    from vftcli.notebook import modelled, touched
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.pipeline import prepared
@@ -71,8 +71,8 @@ def contact_thresholds(
     remarks = (*thresholds.remarks, *shown)
     if json:
         record = thresholds_record(thresholds, counted, checks)
-        record |= {"logs": [run.name for run in free], "remarks": list(remarks)}
-        say_json({**record, "examination": health_record(choice.examiner.examinations)})
+        health = health_record(choice.examiner.examinations)
+        say_json([run.recording for run in free], remarks, **record, examination=health)
         return
     for run in free:
         say_recording(run.recording)

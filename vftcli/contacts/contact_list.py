@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
 
 if TYPE_CHECKING:
     import polars as pl
+    from matplotlib.figure import Figure
 
     from vftcli.contacts.places import ArmPart
     from vftcli.contacts.untouched import Basis
@@ -283,6 +285,12 @@ class ContactList(Shown):
         if not self.contacts:
             return pl.DataFrame(schema=dict.fromkeys(FIRST_COLUMNS, pl.Float64))
         return pl.DataFrame([c.row() for c in self.contacts], infer_schema_length=None)
+
+    def plot(self) -> "Figure":
+        """A matplotlib figure of |F| of every contact with its band, neither shown nor saved."""
+        draw = import_module("vftcli.outputs.log.figures").contacts_figure
+        figure: Figure = draw(self)
+        return figure
 
     def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":
         """The list by what the log's examination says.

@@ -17,9 +17,9 @@ from vftcli.robots.choice import RobotChoice, choices_for
 from vftcli.robots.pairing import paired, unwound
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import effort_name
-from vftcli.signals.errors import ExaminationError, RobotError
+from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import EFFORTS, Recording
-from vftcli.signals.remarks import Remark, as_record, fact, filled, sentence, words
+from vftcli.signals.remarks import Remark, Remarks, as_record, fact, filled, sentence, words
 from vftcli.signals.shown import Shown
 
 #: Findings that an arm's model is another's: what identification is for.
@@ -46,6 +46,11 @@ class Examination(Shown):
     recording: Recording  #: The log.
     findings: tuple[Remark, ...]  #: Warnings before notes.
     robots: tuple[RobotMatch, ...]  #: The arms compared with the log, best first.
+
+    @property
+    def remarks(self) -> Remarks:
+        """What the log's reader found, then the findings."""
+        return Remarks((*self.recording.source.remarks, *self.findings))
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:
         """The findings with which no result means anything.
@@ -166,8 +171,10 @@ class Examiner:
         """The robot by choice, by the log, or by its maker's own model.
 
         Raises:
-            RobotError: If none of these names one; with what each profile leaves unexplained.
+            UnsettledRobotError: If none of these names one; with the profiles that fit best.
         """
+        if isinstance(choice.name, Robot):
+            return choice.load(recording)
         name, remarks = choice.name or recording.robot_hint, tuple[Remark, ...]()
         if name is None:
             name, remarks = guessed(recording)
@@ -232,15 +239,18 @@ class Examiner:
         return tuple(made for _, _, made in self._made)
 
 
+NEAREST = 2  #: Profiles that are named where none is settled.
+
+
 def guessed(recording: Recording) -> tuple[str, tuple[Remark, ...]]:
     """The profile that the maker's own model in a log tells, and on what grounds."""
     found, fits = guess_robot(recording)
     if found is None:
-        ranked = f": {'; '.join(map(str, fits))}" if fits else ""
-        raise RobotError(
-            f"{recording.name} does not say which arm it is, and no profile settles it{ranked}; "
-            f"{choices_for(recording)}"
+        near = ", ".join(fit.in_short for fit in fits[:NEAREST])
+        words = (
+            f"Best fits: {near}. Add --robot {fits[0].robot}" if fits else choices_for(recording)
         )
+        raise UnsettledRobotError(f"Which arm? {words}", recording)
     others = [str(fit) for fit in fits if fit is not found]
     remark = fact("robot-guessed", robot=found.robot, fit=str(found), others=others or ["none"])
     return found.robot, (remark,)

@@ -72,6 +72,13 @@ class RobotMatch:
         load = f" with {self.load:.2g} kg on the flange" if self.load else ""
         return f"{self.robot} {100 * self.misfit:.3g} %{load} ({self.evidence})"
 
+    @property
+    def in_short(self) -> str:
+        """Its name and model error, as ``ur10 with 0.19 kg (0.50 %)``."""
+        load = f" with {self.load:.2g} kg" if self.load else ""
+        percent = f"{100 * self.misfit:#.2g}".removesuffix(".")
+        return f"{self.robot}{load} ({percent} %)"
+
 
 class ArmFindings(NamedTuple):
     """Findings by the model of an arm."""

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,6 +13,9 @@ from vftcli.signals.errors import ShapeError
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import ExternalTorque
+
+if TYPE_CHECKING:
+    from vftcli.robots.run import Run
 
 Complex = NDArray[np.complex128]
 
@@ -65,9 +68,10 @@ class BlockObserver(Shown):
     def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
         """Estimate of a block, and the observer's state after; None at a log's start."""
 
-    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
-        """The estimate of a whole log, from rest at its first sample."""
-        return self.run(terms)[0]
+    def estimate(self, terms: "DynamicsTerms | Run") -> ExternalTorque:
+        """The estimate of a whole log, from rest at its first sample, by its run or its terms."""
+        found: Any = getattr(terms, "terms", terms)
+        return self.run(found)[0]
 
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
         """An estimate (T, n) [N·m] under the observer's name, its array for good."""
@@ -100,4 +104,4 @@ def angular(frequency: Array) -> Array:
 
 def check_terms(terms: DynamicsTerms) -> None:
     """Raise a ParameterError unless what an observer runs over are dynamics terms."""
-    check_kind(terms, DynamicsTerms, "terms", "dynamics_terms(recording, robot)")
+    check_kind(terms, DynamicsTerms, "run", "Run(recording=…, robot=…)")

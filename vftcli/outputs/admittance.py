@@ -30,7 +30,14 @@ from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.grid import Grid, json_rows
-from vftcli.outputs.log.run_record import input_record, log_remarks, robot_record, seal, versions
+from vftcli.outputs.log.run_record import (
+    envelope,
+    input_record,
+    log_entry,
+    log_remarks,
+    robot_record,
+    seal,
+)
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.quantity import counted
 from vftcli.signals.arrays import Array
@@ -115,10 +122,9 @@ def admittance_record(
     examinations: Sequence[Examination] = (),
 ) -> dict[str, Any]:
     """Everything that `run.json` of a replay holds."""
-    p = replay.parameters
-    return {
-        "command": command,
-        "versions": versions(),
+    p, logs = replay.parameters, [recording] if recording is not None else []
+    found = {
+        "rows": replay.rows,
         "examination": health_record(examinations),
         "input": input_record(recording) if recording is not None else None,
         "robot": robot_record(replay.robot),
@@ -147,9 +153,9 @@ def admittance_record(
             for verdict in replay.verdicts
         ],
         "conventions": CONVENTIONS,
-        "notes": list(replay.remarks),
-        **log_remarks([recording] if recording is not None else []),
+        **log_remarks(logs),
     }
+    return envelope(command, list(map(log_entry, logs)), replay.remarks, found)
 
 
 def loop_record(run: ClosedLoop) -> dict[str, Any]:

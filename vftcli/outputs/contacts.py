@@ -133,6 +133,7 @@ def stored_record(estimates: Path) -> dict[str, Any]:
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         found, log = record["contacts"], record["input"]["path"]
+        about = {"path": log, "sha256": record["input"]["sha256"]}
     except (OSError, ValueError, KeyError, TypeError):
         raise LogError(
             f"{estimates} holds estimates, and no {SEAL} of theirs is beside it; give the log"
@@ -141,7 +142,7 @@ def stored_record(estimates: Path) -> dict[str, Any]:
         raise LogError(f"{estimates} was made without a list of contacts; give the log, {log}")
     if "basis" not in found:
         raise LogError(f"{estimates} was written by an older vftcli; give the log, {log}")
-    return found
+    return {**found, **about}
 
 
 def stored_list(record: Mapping[str, Any]) -> ContactList:

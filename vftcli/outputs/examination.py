@@ -58,9 +58,8 @@ def largest_step(recording: Recording) -> float | None:
     return float(np.max(np.diff(recording.t))) if recording.samples > 1 else None
 
 
-def examination_text(examination: Examination) -> str:
-    """The report for people."""
-    recording = examination.recording
+def holdings(recording: Recording) -> list[str]:
+    """What a log holds, for people: its joints, samples, clock and signals."""
     source = recording.source
     rate, gap = rate_of(recording), largest_step(recording)
     lines = [
@@ -76,6 +75,14 @@ def examination_text(examination: Examination) -> str:
         lines.append(f"  wrench    {recording.wrench_frame}")
     if recording.payload_mass is not None:
         lines.append(f"  payload   {recording.payload_mass:.3g} kg, as the controller assumes")
+    return list(map(printable, lines))
+
+
+def examination_text(examination: Examination) -> str:
+    """The report for people."""
+    recording = examination.recording
+    source = recording.source
+    lines = [*holdings(recording)]
     lines.append(f"  robot     {recording.robot_hint or 'not settled by the log'}")
     lines += [
         f"  fit       {fit}{'' if fit.fits else ': does not fit'}"

@@ -19,12 +19,13 @@ from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
+    envelope,
     file_sha256,
     input_record,
+    log_entry,
     log_remarks,
     robot_record,
     seal,
-    versions,
 )
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
@@ -85,9 +86,7 @@ def identification_record(
 ) -> dict[str, Any]:
     """Everything `run.json` holds, and `--json` prints."""
     recordings = [one.recording for one in logs]
-    return {
-        "command": command,
-        "versions": versions(),
+    about = {
         "examination": health_record(logs, fitting=False),
         "method": found.method,
         "inputs": [input_record(log) for log in recordings],
@@ -101,8 +100,8 @@ def identification_record(
         "base_parameters": found.base.to_dicts() if found.base is not None else [],
         "conventions": CONVENTIONS,
         **log_remarks(recordings),
-        "remarks": list(found.remarks),
     }
+    return envelope(command, list(map(log_entry, recordings)), found.remarks, about)
 
 
 def render_identification(

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.log.run_record import seal, versions
+from vftcli.outputs.log.run_record import envelope, seal
 from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import to_toml
@@ -86,12 +86,11 @@ def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, co
 
 def run_record(run: Simulation, format: str, command: str) -> dict[str, Any]:
     """Record of a simulation; the scenario file says all of it."""
-    return {
-        "command": command,
-        "versions": versions(),
+    about = {
         "scenario": run.scenario.name,
         "seed": run.seed,
         "robot": run.scenario.robot,
         "format": format,
         "samples": len(run.measured.rows),
     }
+    return envelope(command, found=about)

@@ -168,7 +168,6 @@ def thresholds_record(
         "calls": calls(thresholds),
         "left_out": [one._asdict() for one in counted],
         "checks": list(map(check_record, checks)),
-        "remarks": list(thresholds.remarks),
     }
 
 

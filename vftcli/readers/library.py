@@ -42,19 +42,25 @@ class Library:
         """How many logs it knows of."""
         return len(self._labels)
 
-    def open(self, path: str | Path, choice: ReadChoice | None = None) -> Recording:
-        """Read a log once, and return the part of it that is chosen."""
-        choice, at, label = choice or ReadChoice(), absolute(path), self.label(path)
+    def open(self, path: str | Path | Recording, choice: ReadChoice | None = None) -> Recording:
+        """Read a log once unless it is read, and return the part of it that is chosen."""
+        choice = choice or ReadChoice()
+        if isinstance(path, Recording):
+            return choice.within(choice.taken(path))
+        at, label = absolute(path), self.label(path)
         read = replace(choice, interval=None)
         if (at, read) not in self._recordings:
             self._recordings[at, read] = read.taken(reading.read_chosen(path, read, label))
         return choice.within(self._recordings[at, read])
 
     def open_each(
-        self, paths: Iterable[str | Path], choice: ReadChoice, *, whole: bool = False
+        self, paths: Iterable[str | Path | Recording], choice: ReadChoice, *, whole: bool = False
     ) -> Iterator[Recording]:
         """Read some logs, each episode as a log of its own where all are chosen."""
         for path in paths:
+            if isinstance(path, Recording):
+                yield self.open(path, choice)
+                continue
             unasked = whole and choice.episode is None and reading.holds_episodes(path, choice)
             if not (choice.all_episodes or unasked):
                 yield self.open(path, choice)
@@ -68,7 +74,9 @@ class Library:
         # A log without a label gets one that no other has.
         return self._labels.setdefault(at, labelled([at, *self._labels])[at])
 
-    def open_logs(self, paths: Iterable[str | Path], choice: ReadChoice) -> tuple[Recording, ...]:
+    def open_logs(
+        self, paths: Iterable[str | Path | Recording], choice: ReadChoice
+    ) -> tuple[Recording, ...]:
         """Read the logs of a command."""
         logs = tuple(self.open_each(paths, choice))
         refuse_repeated_logs(logs)

@@ -1,9 +1,9 @@
-"""A user's choice for a complete log: the bias to subtract."""
+"""A user's choice for a complete log: the bias to subtract, whether contacts are listed."""
 
 from dataclasses import dataclass
 from typing import Annotated
 
-from vftcli.signals.option import ESTIMATE, Choice, setting
+from vftcli.signals.option import ESTIMATE, Choice, is_yes, setting
 from vftcli.signals.parsing import check_known
 
 #: The word for what the log allows: the whole log's bias for `best`, none for the others.
@@ -31,6 +31,9 @@ class RefinementChoice(Choice):
             "Whether the bias fitted to the whole log comes off; auto: for best alone.",
         ),
     ] = AUTOMATIC
+    contacts: Annotated[
+        bool, setting("contacts.list", "yes|no", "Whether contacts are listed.", is_yes)
+    ] = True
 
     def __post_init__(self) -> None:
         check_known(self.bias, REMOVALS, f"--set bias.method={self.bias}")

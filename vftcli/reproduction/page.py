@@ -11,7 +11,7 @@ from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import line_figure, plots_of
 from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
-from vftcli.outputs.log.run_record import seal, versions
+from vftcli.outputs.log.run_record import envelope, seal
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.reproduction.jobs import Job
@@ -184,11 +184,9 @@ def write_reproduction(
         }
         write_figures(folder, drawings, form)
     record = {
-        "command": command,
-        "versions": versions(),
         "paper": paper.name,
         "runs": [{"experiment": job.experiment, "seed": job.seed} for job in jobs],
         "values": {name: shown.values for name, shown in found.items()},
         "failures": {name: shown.failures for name, shown in found.items() if shown.failures},
     }
-    seal(folder, SEAL, record)
+    seal(folder, SEAL, envelope(command, found=record))

@@ -64,17 +64,22 @@ def built_in(path: Path) -> "Robot":
 ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
 
 
-def load_robot(robot: str | Path, *, tip: str = "") -> "Robot":
+def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
     """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
 
     Args:
-        robot: The name, or the file; arguments of a xacro follow it as ``NAME:=VALUE``.
+        robot: The name, or the file; arguments of a xacro follow it as ``NAME:=VALUE``. A robot is
+            loaded already.
         tip: The link or joint at the arm's end in a description with hands or several arms.
 
     Raises:
         RobotError: If there is no such profile or file, or it is not a valid description.
     """
     if not isinstance(robot, str | Path):
+        from vftcli.robots.robot import Robot
+
+        if isinstance(robot, Robot):
+            return robot
         raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
     from vftcli.robots.robot_file import DESCRIPTIONS
 

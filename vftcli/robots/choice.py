@@ -28,9 +28,9 @@ class RobotChoice(Choice):
 
     GROUP = LOG
 
-    #: Profile name, robot file or description, None to take what the log settles.
+    #: Profile name, robot file or description, a robot, None to take what the log settles.
     name: Annotated[
-        str | None,
+        "str | Robot | None",
         Option(
             "--robot",
             "NAME|FILE",

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -173,6 +174,21 @@ class Robot(Shown):
     def model(self) -> Any:  # noqa: ANN401 - Pinocchio is untyped
         """The Pinocchio model of the loaded chain, with a frame ``flange``."""
         return self.loaded_chain.to_pinocchio(self.name)
+
+    def with_gains(self, gains: Mapping[str, Mapping[str, Any]]) -> "Robot":
+        """Return the robot with other gains of its observers, in its file too."""
+        document = {**self.document, "observers": dict(gains)}
+        return replace(self, gains=gains, document=document)
+
+    def save(self, file: "str | Path", *, force: bool = False) -> None:
+        """Write its file, which `load_robot` reads.
+
+        Raises:
+            OutputError: If the file exists, unless it may be overwritten.
+        """
+        # The writers are several floors up; the robot itself knows nothing of them.
+        write = import_module("vftcli.outputs.files").write_text
+        write(Path(file), import_module("vftcli.robots.writing").robot_toml(self), force)
 
     def with_payload(self, payload: str | Payload | None) -> "Robot":
         """Return the robot with a load on its flange: a name from the file, a Payload, or None.

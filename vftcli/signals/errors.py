@@ -4,6 +4,8 @@ Every message is one line: what is wrong, what there is, what to do. The command
 exits with code 1; nothing else in the package prints or exits.
 """
 
+from typing import Any
+
 
 class VftError(Exception):
     """Base class of every error that is the input's fault rather than the program's."""
@@ -35,6 +37,18 @@ class MissingSignalError(VftError):
 
 class RobotError(VftError):
     """A robot description is missing, incomplete or unphysical."""
+
+
+class UnsettledRobotError(RobotError):
+    """No robot is named, and the log does not settle it.
+
+    Attributes:
+        recording: The log, of which a command prints what it holds.
+    """
+
+    def __init__(self, message: str, recording: object) -> None:
+        super().__init__(message)
+        self.recording: Any = recording
 
 
 class ParameterError(VftError):

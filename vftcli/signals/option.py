@@ -11,10 +11,12 @@ import re
 from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from inspect import get_annotations
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self, get_args
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import did_you_mean
 
 #: Headings of the options that commands share, in their order.
 LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
@@ -23,6 +25,23 @@ LOG, ESTIMATE, COMPARE, WRENCH, WRITE, OUTPUT = GROUPS = (
 
 
 WORD = re.compile("[a-z][a-z-]+")  #: A value in a metavar, as `svg`; numbers and paths are none.
+
+
+def text_of(value: object, name: str) -> str:
+    """A value of TOML or Python as it would be typed: yes or no, numbers apart by commas.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    each = value if isinstance(value, list | tuple) else [value]
+    if not each or any(isinstance(x, bool) or not isinstance(x, WORDS) for x in each):
+        raise ParameterError(f"{name} is {value!r}; expected a text or a number")
+    return ",".join(map(str, each))
+
+
+WORDS = str | int | float | Path  #: What a value is made of.
 
 
 class Option(NamedTuple):
@@ -51,6 +70,21 @@ class Option(NamedTuple):
     def read(self, typed: Any) -> Any:  # noqa: ANN401 - texts, numbers, lists of them
         """What a typed value means, None where nothing was typed."""
         return self.reads(typed) if self.reads and typed is not None else typed
+
+    def keyword(self, value: object) -> object:
+        """A keyword's value as it would be typed, several as a list; None as it is.
+
+        Raises:
+            ParameterError: If it is of another kind.
+        """
+        if value is None or (not self.metavar and isinstance(value, bool)):
+            return value
+        if not self.metavar:
+            raise ParameterError(f"{self.word} is {value!r}; expected True or False")
+        if not self.several:
+            return text_of(value, self.word)
+        each = value if isinstance(value, list | tuple) else [value]
+        return [text_of(one, self.word) for one in each]
 
     @property
     def is_setting(self) -> bool:
@@ -178,3 +212,21 @@ def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option,
         for field, _, option in kind.options().values()
         if option.is_setting
     }
+
+
+def settings_as_typed(
+    given: Mapping[str, object], choices: Iterable[type[Choice]]
+) -> dict[str, str]:
+    """Name → text of settings, each one of the choices'.
+
+    Raises:
+        ParameterError: If there is no such setting, or a value is none.
+    """
+    there = tuple(choices)
+    for name in given:
+        if not any(kind.takes(name) for kind in there):
+            near = did_you_mean(name, settings_by_name(there))
+            raise ParameterError(
+                f"{name}: this command has no such setting; vftcli help settings lists all.{near}"
+            )
+    return {name: text_of(value, name) for name, value in given.items()}

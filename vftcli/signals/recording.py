@@ -175,6 +175,8 @@ class Recording(Shown):
     payload_mass: float | None = None
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     source: Source = IN_MEMORY  #: Where it came from and what was repaired.
+    #: True torques and wrenches of a simulated log, the columns those of PATH.truth.parquet.
+    truth: "pl.DataFrame | None" = None
 
     def __post_init__(self) -> None:
         seal(self, "t", *MEANINGS)

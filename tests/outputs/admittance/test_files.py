@@ -26,7 +26,7 @@ def test_the_source_of_the_force_is_recorded_as_data(push: Replay) -> None:
     record = json.loads(to_json(admittance_record(push, None, None, "")))
     assert record["force"]["code"] == "force-of-sensor"
     assert record["force"]["values"] == {"frame": "a push"}
-    assert len(record["notes"]) == len(push.remarks) > 0
+    assert len(record["remarks"]) == len(push.remarks) > 0
 
 
 def test_the_motion_holds_every_controller_and_what_entered(push: Replay) -> None:

@@ -69,7 +69,7 @@ def catalogue(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_remark_is_recorded_as_data(analysis: Analysis) -> None:
     shift = caution("test-shift", Where("gmo", (2, 3), (1.0, 2.5)), shift_s=np.float64(0.25))
     record = json.loads(to_json(run_record(replace(analysis, remarks=(shift,)), "x")))
-    assert record["notes"][0] == {
+    assert record["remarks"][0] == {
         "code": "test-shift",
         "level": "caution",
         "message": "gmo: shifted by 0.25 s",

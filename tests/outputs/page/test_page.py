@@ -144,7 +144,7 @@ def test_nothing_is_said_twice(pushed: Analysis) -> None:
     made = replace(pushed, run=run_record(pushed, "vftcli report"))
     # The grounds above name the few that an answer rests on.
     text = Page(render(made)).text.partition("Details")[2]
-    for remark in made.run["notes"]:
+    for remark in made.run["remarks"]:
         assert text.count(explanation(remark)) == 1, remark.code
 
 

@@ -1,6 +1,6 @@
 """The figures of one log: torque, errors, wrench, spectra, tuning, responses; gains with theirs."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,12 +8,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Tuned, tuning_curves
 from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
-from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.figures.paper import (
+    WIDTHS,
+    Drawing,
+    figure_files,
+    paper_style,
+    write_figures,
+)
 from vftcli.outputs.figures.plots import (
     NARROW,
     DotPlot,
@@ -35,6 +42,9 @@ from vftcli.outputs.page.log_charts import (
     wrench_chart,
 )
 from vftcli.robots.writing import lines_of
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.packages import check_installed
+from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     import polars as pl
@@ -73,12 +83,62 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     return found
 
 
+#: What a notebook plots → its chart, None where it is no chart of lines over the log.
+PLOTS = {"contacts": None, "torques": torque_chart, "wrench": wrench_chart, "errors": None}
+
+
+def plot(
+    analysis: Analysis, what: str, joints: Sequence[int] | None, observers: Sequence[str]
+) -> "Figure":
+    """A figure for a notebook: `what` is one of `PLOTS`, joints count from 1, None for all."""
+    check_known(what, PLOTS, f"no plot {what!r}")
+    for name in observers:
+        check_known(name, [e.name for e in analysis.estimates], f"no estimate of {name!r}")
+    every = [str(j) for j in range(1, analysis.recording.joints + 1)]
+    for joint in joints or ():
+        check_known(str(joint), every, f"no joint {joint!r}")
+    if what == "contacts" and analysis.contacts is not None:
+        return contacts_figure(analysis.contacts, analysis.t)
+    if what == "errors" and analysis.errors is not None:
+        errors = analysis.errors
+        rows = [
+            observer in (observers or [observer]) and joint in (joints or [joint])
+            for observer, joint in errors.select("observer", "joint").iter_rows()
+        ]
+        return on_paper(error_figures(errors.filter(rows))["errors"].draw)
+    if (draw := PLOTS[what]) is None or (chart := draw(analysis)) is None:
+        raise ParameterError(f"the analysis holds no {what} to plot")
+    only = [j - 1 for j in joints] if joints and what == "torques" else None
+    plots = plots_of(drawn_lines(analysis, chart, observers), only=only)
+    return on_paper(partial(line_figure, plots=plots, numbers=numbers_of(analysis.contacts)))
+
+
+def on_paper(draw: "Callable[[float], Figure]") -> "Figure":
+    """A figure as wide as two columns of a paper."""
+    check_installed("matplotlib", "a plot")
+    with paper_style():
+        return draw(WIDTHS["double"])
+
+
+def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "Figure":
+    """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
+    courses = [c.course for c in found.contacts if c.course is not None]
+    lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
+    spans = [(c.start, c.stop) for c in found.contacts if not c.is_load]
+    clock = [*t] or [0.0, found.duration, *(at for span in spans for at in span)]
+    ends = np.array([min(clock), max(clock)])
+    title, least = "Force on the robot", np.array([found.detectable_force or np.nan])
+    chart = Chart("force", title, ("N",), ("|F|",), ends, tuple(lines), band=least, spans=spans)
+    chart = chart._replace(band_label="detectable force", lowest=0.0)
+    return on_paper(partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found)))
+
+
 def torque_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing:
     """External torque with the reference."""
     chart = drawn_lines(analysis, torque_chart(analysis), names)
     return Drawing(
         f"{analysis.recording.name}: external torque on the robot about each joint's axis",
-        partial(line_figure, plots=plots_of(chart), numbers=contact_numbers(analysis)),
+        partial(line_figure, plots=plots_of(chart), numbers=numbers_of(analysis.contacts)),
     )
 
 
@@ -90,7 +150,7 @@ def wrench_drawing(analysis: Analysis) -> Drawing | None:
     chart = drawn_lines(analysis, chart)
     return Drawing(
         f"{analysis.recording.name}: force and moment on the robot, {chart.title}",
-        partial(wrench_figure, chart, contact_numbers(analysis)),
+        partial(wrench_figure, chart, numbers_of(analysis.contacts)),
     )
 
 
@@ -127,9 +187,9 @@ def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> 
     return chart._replace(series=series)
 
 
-def contact_numbers(analysis: Analysis) -> dict[int, float]:
+def numbers_of(contacts: ContactList | None) -> dict[int, float]:
     """Number of every contact → the middle of it. [s]"""
-    found = analysis.contacts.contacts if analysis.contacts is not None else ()
+    found = contacts.contacts if contacts is not None else ()
     return {c.number: 0.5 * (c.start + c.stop) for c in found if not c.is_load}
 
 

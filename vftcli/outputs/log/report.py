@@ -20,8 +20,16 @@ from vftcli.outputs.log.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.log.rmse_tables import paper_bounds
-from vftcli.outputs.log.run_record import CONVENTIONS, jsonable, run_record, seal, versions
+from vftcli.outputs.log.run_record import (
+    CONVENTIONS,
+    envelope,
+    log_entry,
+    run_record,
+    seal,
+    to_json,
+)
 from vftcli.outputs.page.pages import render, render_index
+from vftcli.readers.jacobian import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed
@@ -97,7 +105,7 @@ def write_reports(
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
 
     Returns:
-        The texts of the logs' own `run.json`, as one JSON array.
+        One record as text, with the logs' own in it.
     """
     import polars as pl
 
@@ -105,7 +113,6 @@ def write_reports(
     places = places_of(labels)
     names = report_files(labels, choice.extras, form, several=True)
     pages = list(zip(places, analyses, strict=True))
-    logs = dict(zip(places, labels, strict=True))
     with OutputFolder(path, force, names) as folder:
         records = [
             fill(folder, f"{place}/", analysis, command, choice, form)
@@ -115,17 +122,13 @@ def write_reports(
         found = [a.errors for a in analyses if a.errors is not None]
         together = pl.concat(found, how="diagonal") if found else None
         put_errors(folder, "", together, analyses)
-        put_contacts(folder, "", analyses, several=True)
+        put_contacts(folder, "", analyses, command)
         if form is not None and together is not None:
             write_figures(folder, error_figures(together), form)
-        record = {
-            "command": command,
-            "versions": versions(),
-            "logs": logs,
-            "left_out": dict(failed),
-        }
-        seal(folder, SEAL, record)
-        return "[\n" + ",\n".join(record.rstrip("\n") for record in records) + "\n]\n"
+        left_out = {"left_out": dict(failed)}
+        logs = [log_entry(a.recording, {"folder": place}) for place, a in pages]
+        seal(folder, SEAL, envelope(command, logs, found=left_out))
+        return to_json(envelope(command, list(map(json.loads, records)), found=left_out))
 
 
 def fill(
@@ -153,7 +156,7 @@ def fill(
         else:
             write_estimates(path, analysis)
     put_errors(folder, place, analysis.errors, [analysis])
-    put_contacts(folder, place, [analysis])
+    put_contacts(folder, place, [analysis], command)
     write_extras(folder, place, analysis, choice)
     if form is not None:
         write_figures(folder, log_figures(analysis), form, f"{place}figures/")
@@ -161,17 +164,22 @@ def fill(
 
 
 def put_contacts(
-    folder: OutputFolder, place: str, analyses: Sequence[Analysis], *, several: bool = False
+    folder: OutputFolder, place: str, analyses: Sequence[Analysis], command: str
 ) -> None:
     """Write the lists of contacts, if there are any: as `vftcli contacts` prints them."""
     lists = [analysis.contacts for analysis in analyses if analysis.contacts is not None]
-    if not lists:
-        return
-    records = [jsonable(contacts_record(found)) for found in lists]
-    shown = records if several else records[0]
-    text = json.dumps(shown, indent=2, ensure_ascii=False, allow_nan=False)
-    folder.write(f"{place}contacts.json", f"{text}\n")
-    folder.write(f"{place}contacts.csv", contacts_csv(lists))
+    if lists:
+        folder.write(f"{place}contacts.json", to_json(contacts_envelope(analyses, command)))
+        folder.write(f"{place}contacts.csv", contacts_csv(lists))
+
+
+def contacts_envelope(
+    analyses: Sequence[Analysis], command: str, failed: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, Any]:
+    """What touched the arm along logs, for machines; what `failed` is left out."""
+    listed = [(a.recording, a.contacts) for a in analyses if a.contacts is not None]
+    logs = [log_entry(recording, contacts_record(found)) for recording, found in listed]
+    return envelope(command, logs, found={"left_out": dict(failed)} if failed else {})
 
 
 def put_errors(
@@ -231,9 +239,7 @@ def write_jacobian_folder(
 def jacobian_record(made: JacobianJudgement, command: str) -> dict[str, Any]:
     """What `run.json` holds."""
     log = made.log
-    return {
-        "command": command,
-        "versions": versions(),
+    found = {
         "input": {
             "path": str(log.path),
             "sha256": log.sha256,
@@ -247,5 +253,10 @@ def jacobian_record(made: JacobianJudgement, command: str) -> dict[str, Any]:
         "reference": None if made.sensor is None else {"name": made.sensor.torque.name},
         "conventions": CONVENTIONS,
         "repairs": list(log.remarks),
-        "notes": list(made.remarks),
     }
+    return envelope(command, [jacobian_entry(log)], made.remarks, found)
+
+
+def jacobian_entry(log: JacobianLog) -> dict[str, Any]:
+    """A log of a vendor's torques by name, path and digest."""
+    return {"recording": log.name, "path": str(log.path), "sha256": log.sha256}

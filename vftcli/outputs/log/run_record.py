@@ -5,9 +5,10 @@ import json
 import platform
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -51,9 +52,7 @@ PACKAGES = {
 def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
     """Everything `run.json` holds, the command line as the user typed it."""
     reference = analysis.reference
-    return {
-        "command": command,
-        "versions": versions(),
+    found = {
         # Before any number: what may make all of them wrong.
         "examination": health_record(analysis.examinations),
         "input": input_record(analysis.recording),
@@ -75,8 +74,35 @@ def run_record(analysis: Analysis, command: str) -> dict[str, Any]:
         "complete_log": refinement_record(analysis),
         "conventions": CONVENTIONS,
         **log_remarks([analysis.recording]),
-        "notes": all_remarks(analysis),
     }
+    return envelope(command, [log_entry(analysis.recording)], all_remarks(analysis), found)
+
+
+def envelope(
+    command: str,
+    logs: Sequence[Mapping[str, Any]] = (),
+    remarks: Iterable[Remark] = (),
+    found: Mapping[str, Any] = MappingProxyType({}),
+) -> dict[str, Any]:
+    """The answer of any command, as `--json` prints it and `run.json` holds it.
+
+    Args:
+        command: The command line.
+        logs: An entry a log (`log_entry`); of one log its keys stand at the top too.
+        remarks: What a reader of the numbers should know.
+        found: The result; a table is its `rows`.
+    """
+    about = {"command": command, "versions": versions(), "logs": list(logs)}
+    return {**about, "remarks": list(remarks), **(logs[0] if len(logs) == 1 else {}), **found}
+
+
+def log_entry(
+    recording: Recording, found: Mapping[str, Any] = MappingProxyType({})
+) -> dict[str, Any]:
+    """A log by name, path and digest, and what was found in it."""
+    source = recording.source
+    path = str(source.path) if source.path is not None else None
+    return {"recording": recording.name, "path": path, "sha256": source.sha256 or None, **found}
 
 
 def seal(

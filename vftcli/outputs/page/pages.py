@@ -87,7 +87,7 @@ def render(analysis: Analysis) -> str:
         observers=details.observers_view(analysis),
         responses=log_charts.response_charts(analysis),
         guide=details.selection_guide(analysis),
-        remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["notes"]],
+        remarks=[*record.get("warnings", ()), *record.get("repairs", ()), *record["remarks"]],
         **view,
     )
 

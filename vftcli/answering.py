@@ -1,0 +1,310 @@
+"""What commands and notebooks answer alike, behind what one log's `pipeline` makes."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from vftcli.admittance.choice import FILE, ControlChoice
+from vftcli.analysis import Analysis
+from vftcli.identification.choice import Task
+from vftcli.observers.choice import LOG_GAINS, GoalChoice, ObserverChoice
+from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
+from vftcli.readers.estimates import estimates_columns
+from vftcli.robots.robot import Robot
+from vftcli.robots.run import Run, Runs
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.virtual_sensor.choice import WrenchChoice
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from vftcli.admittance.closed_loop import ClosedLoop
+    from vftcli.admittance.driving_force import DrivingForce
+    from vftcli.admittance.replay import Replay
+    from vftcli.doctor.examination import Examination
+    from vftcli.evaluation.logged_jacobian import JacobianJudgement
+    from vftcli.identification import Identification
+    from vftcli.observers.spectra import Spectra
+    from vftcli.observers.tuning import Goal, Tuned
+
+Opened = Path | Recording  #: A log as a call has it: a file, or read already.
+
+
+def errors_of(
+    analyses: Sequence[Analysis], others: "Sequence[JacobianJudgement]" = ()
+) -> "pl.DataFrame":
+    """The errors of several logs in one table, pooled rows of each arm last."""
+    import polars as pl
+
+    from vftcli.evaluation.errors import PoolMember, evaluate_pooled
+    from vftcli.outputs.log.tables import marked
+
+    errors = [*(made.errors for made in analyses), *(made.errors for made in others)]
+    judged = [
+        PoolMember(a.robot.name, a.estimates, a.reference)
+        for a in analyses
+        if a.reference is not None
+    ]
+    return marked(
+        pl.concat([e for e in (*errors, evaluate_pooled(judged)) if e is not None], how="diagonal"),
+        analyses,
+    )
+
+
+def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:
+    """A log with its robot, examined.
+
+    Raises:
+        ExaminationError: If a finding makes every result meaningless.
+    """
+    run = models.of(recording, robot)
+    choice.examiner.examine(run.recording, run.robot)
+    return run
+
+
+def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
+    """A remark where a log that is to be free shows contact.
+
+    Raises:
+        ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
+    """
+    from vftcli.contacts.tail import SETTLING
+    from vftcli.evaluation.references import PLAIN, touches
+
+    known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()
+    found = [touch for touch in known if touch.stop > run.t[0] + SETTLING]
+    if not found:
+        return ()
+    worst = max(found, key=lambda touch: touch.excess)
+    where = Where(run.name, (worst.joint + 1,), (worst.start, worst.stop))
+    sizes = {"torque_Nm": worst.torque, "quiet_Nm": worst.quiet}
+    remark = caution("free-log-touched", where, count=len(found), **sizes)
+    if worst.excess > PLAIN and not anyway:
+        raise ParameterError(
+            f"{remark}. Give motion that nobody touches, a part of this log with --interval, or "
+            "take it all with --anyway"
+        )
+    return (remark,)
+
+
+def identified(
+    logs: Sequence[Opened],
+    check: Sequence[Opened],
+    choice: AnalysisChoice,
+    task: Task,
+    tell: Callable[[Recording], None] | None = None,
+) -> "Identification":
+    """The robot that logs show, tried on those to `check`; what is free is without the load."""
+    from vftcli.identification import identify
+
+    examiner, library = choice.examiner, choice.library
+    profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
+    # An episode is one of LOG's; the others are logs of their own.
+    whole = choice.read.whole
+    held_out, unloaded = (
+        replace(whole, interval=span) for span in (task.check_interval, choice.read.interval)
+    )
+    every: list[list[Recording]] = []
+    for paths, how in ((logs, choice.read), (check, held_out), (choice.free.logs, unloaded)):
+        episodes = paths is logs and task.method == "payload"
+        opened = library.open_each(paths, how, whole=episodes)
+        every.append([examiner.taken(log, profile, how) for log in opened])
+    for recording in (one for some in every for one in some):
+        if tell is not None:
+            tell(recording)
+        examiner.examine(recording, profile)
+    train, tried, free = every
+    task = replace(task, friction=choice.robot.friction != "none")
+    return identify(train, profile, task, tried, free[0] if free else None)
+
+
+#: Observers from whose spectra gains are found.
+TUNED = ObserverChoice(gains=LOG_GAINS, causal=True)
+
+
+class FoundGains(NamedTuple):
+    """Gains that a goal asks for, and what they rest on."""
+
+    robot: Robot  #: The arm.
+    recording: Recording  #: The log.
+    goal: "Goal"  #: What they are for.
+    tuned: "Sequence[Tuned]"  #: The gains of every observer.
+    spectra: "Spectra"  #: What shows the error that every gain makes.
+    remarks: tuple[Remark, ...]  #: What limits them.
+    examinations: "tuple[Examination, ...]"  #: What is wrong with the log and its free runs.
+
+
+def gains_of(log: Opened, choice: AnalysisChoice, asked: GoalChoice) -> FoundGains:
+    """The gains that a goal asks for, by the spectra of a log."""
+    from vftcli.observers.tuning import bounds_reached, parse_goal, tune_all
+
+    goal = parse_goal(asked.gains, asked.threshold)
+    recording, robot = prepared(choice.library.open(log, choice.read), choice)
+    motion = read(recording, robot, choice, Runs())
+    examinations = examine(motion, choice)
+    found = model(motion, choice)
+    if found is None or (spectra := found.plain.spectra) is None:
+        why = found.plain.missing if found else "no free part"
+        raise ParameterError(f"nothing to find gains from: {why}")
+    tuned = tune_all(spectra, goal)
+    remarks = (*found.remarks, *bounds_reached(tuned, spectra, goal))
+    return FoundGains(robot, recording, goal, tuned, spectra, remarks, examinations)
+
+
+#: Whose estimate is the force unless another is named: the paper drives its controller with it.
+DRIVER = "kfo-fe"
+
+
+class Replayed(NamedTuple):
+    """A force through admittance controllers, and what it is of."""
+
+    replay: "Replay"  #: The comparison.
+    recording: Recording | None = None  #: The log, None without one.
+    run: "ClosedLoop | None" = None  #: A scenario with the controller in the loop, or None.
+    examinations: "tuple[Examination, ...]" = ()  #: What is wrong with the log.
+
+
+def replayed(
+    log: Opened | None,
+    words: Mapping[str, Any],
+    choice_of: Callable[..., AnalysisChoice],
+    control: ControlChoice,
+    release: Sequence[str] = (),
+    seed: int | None = None,
+    anyway: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Replayed:
+    """A log's force, a scenario in the loop, or a release through every controller.
+
+    Args:
+        log: The log or scenario, None for a release.
+        words: What was typed of the options.
+        choice_of: What is asked with an observer, and with other words.
+        control: The controllers.
+        release: Where a release begins, as ``x=0.3``.
+        seed: Seed of a scenario.
+        anyway: Whether unstable controllers run too.
+        progress: Called with the steps of a simulation that are done, and all.
+    """
+    from vftcli.admittance.choice import released_robot
+    from vftcli.admittance.parameters import release_deviation
+    from vftcli.admittance.replay import replay, replay_release
+    from vftcli.signals.packages import check_installed
+
+    check_installed("pinocchio", "vftcli admit")
+    named = words.get("observer") or [DRIVER]
+    if len(named) > 1:
+        raise ParameterError("one observer's force drives the replay; give --observer once")
+    stored = None
+    if isinstance(log, Path) and words.get("columns") is None:
+        stored = estimates_columns(log, named[0]) if log.exists() else None
+    # A table of estimates may hold those of an observer that is none of ours.
+    choice = choice_of(named[0]) if stored is None else choice_of(DRIVER, columns=stored)
+    if words.get("frame") not in {None, "base"}:
+        raise ParameterError(
+            "the replay is in base axes about the flange point; leave --frame away"
+        )
+    choice = replace(choice, wrench=replace(choice.wrench or WrenchChoice(), frame="base"))
+    control = replace(control, as_printed=choice.observers.as_printed)
+    if log is None:
+        deviation, arm = release_deviation(release), released_robot(choice.robot)
+        law = control.parameters(arm)
+        start, controllers = control.start_pose(arm), control.controllers(law)
+        made = replay_release(
+            deviation,
+            arm,
+            law,
+            controllers,
+            start=start,
+            duration=control.duration,
+            anyway=anyway,
+        )
+        return Replayed(made)
+    if isinstance(log, Path) and is_scenario(log):
+        return looped(str(log), seed, choice, control, anyway=anyway, progress=progress)
+    recording, arm = prepared(choice.library.open(log, choice.read), choice)
+    check_logged(recording, "admit runs a controller that must not see the future")
+    if stored is None:  # estimates of an earlier run were examined in it
+        choice.examiner.examine(recording, arm)
+    law = control.parameters(arm)
+    force = force_of(recording, arm, choice, control.force, named[0] if stored else None)
+    controllers = control.controllers(law)
+    made = replay(
+        force.wrench, recording.q, arm, law, controllers, source=force.source, anyway=anyway
+    )
+    made = replace(made, remarks=(*force.remarks, *made.remarks))
+    return Replayed(made, recording, None, choice.examiner.examinations)
+
+
+def is_scenario(log: Path) -> bool:
+    """Whether a word names a scenario: a file of one, or what has no ending and is no file."""
+    return log.suffix == ".toml" or not (log.exists() or log.suffix or len(log.parts) > 1)
+
+
+def force_of(
+    recording: Recording,
+    robot: Robot,
+    choice: AnalysisChoice,
+    source: str | None,
+    stored: str | None,
+) -> "DrivingForce":
+    """The wrench that drives a replay: the log's own, a file's, an estimate's or a new one."""
+    from vftcli.admittance import driving_force
+
+    assert choice.wrench is not None, "`replayed` asks for one"
+    if source == "sensor":
+        return driving_force.sensor_force(recording, robot, choice.wrench)
+    if source is not None:
+        truth = Path(source.removeprefix(FILE))
+        return driving_force.truth_force(recording, robot, choice.wrench, truth)
+    if stored is not None:
+        return driving_force.stored_force(recording, robot, choice.wrench, stored)
+    reading = analyse(recording, robot, choice).virtual_sensor
+    assert reading is not None, "a wrench was asked for"
+    return driving_force.observed_force(reading)
+
+
+def looped(
+    name: str,
+    seed: int | None,
+    choice: AnalysisChoice,
+    control: ControlChoice,
+    *,
+    anyway: bool,
+    progress: Callable[[int, int], None] | None,
+) -> Replayed:
+    """A scenario with a controller in the loop, and the force it acted on through all of them."""
+    from vftcli.admittance.closed_loop import UNLOADED, run_closed_loop
+    from vftcli.admittance.replay import replay
+    from vftcli.observers import KalmanObserver
+    from vftcli.robots import load_robot
+    from vftcli.simulation import load_scenario
+    from vftcli.simulation.sensing import log_rate
+
+    assert choice.wrench is not None, "`replayed` asks for one"
+    zero = choice.wrench.zero
+    if zero.start:
+        raise ParameterError("the closed loop holds still over a span: give it as --zero A:B")
+    scenario = load_scenario(name, ())
+    arm = load_robot(scenario.robot)
+    law = control.parameters(arm)
+    observer = choice.observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
+    if not isinstance(observer, KalmanObserver):
+        raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
+    controllers = control.controllers(law)
+    run = run_closed_loop(
+        scenario,
+        controllers[-1],
+        observer,
+        seed=seed,
+        torque=control.loop_torque,
+        zero=zero.spans[0] if zero.spans else UNLOADED,
+        anyway=anyway,
+        progress=progress,
+    )
+    source = fact("force-of-loop")
+    made = replay(run.wrench, run.q, arm, law, controllers, source=source, anyway=anyway)
+    return Replayed(made, run=run)
