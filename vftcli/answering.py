@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from vftcli.admittance.closed_loop import ClosedLoop
     from vftcli.admittance.driving_force import DrivingForce
     from vftcli.admittance.replay import Replay
+    from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.logged_jacobian import JacobianJudgement
     from vftcli.identification import Identification
@@ -52,6 +53,28 @@ def errors_of(
         pl.concat([e for e in (*errors, evaluate_pooled(judged)) if e is not None], how="diagonal"),
         analyses,
     )
+
+
+class FreeThresholds(NamedTuple):
+    """Thresholds that contact-free logs show."""
+
+    runs: list[Run]  #: The logs.
+    signals: "list[ComparedSignals]"  #: What is compared with the thresholds along each.
+    found: "Thresholds"  #: The thresholds, with what limits them.
+
+
+def free_thresholds(
+    logs: Sequence[Opened], choice: AnalysisChoice, rate: float, *, anyway: bool
+) -> FreeThresholds:
+    """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
+    from vftcli.contacts.thresholds import compared_signals, find_thresholds
+
+    models, opened = Runs(), choice.library.open_logs(logs, choice.read)
+    runs = [modelled(*prepared(log, choice), choice, models) for log in opened]
+    shown = [remark for run in runs for remark in touched(run, anyway=anyway)]
+    signals = [compared_signals(run) for run in runs]
+    found = find_thresholds(signals, rate)
+    return FreeThresholds(runs, signals, replace(found, remarks=(*found.remarks, *shown)))
 
 
 def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:

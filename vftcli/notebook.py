@@ -19,11 +19,10 @@ from vftcli.answering import (
     TUNED,
     Opened,
     errors_of,
+    free_thresholds,
     gains_of,
     identified,
-    modelled,
     replayed,
-    touched,
 )
 from vftcli.batch.log_work import for_comparison, for_estimates
 from vftcli.doctor.examination import Examiner, examine
@@ -37,7 +36,6 @@ from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import Runs
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import Choice, settings_as_typed
 from vftcli.signals.parsing import did_you_mean
@@ -73,10 +71,10 @@ class Asked(NamedTuple):
     settings: Mapping[str, str]  #: Name → value of the settings.
     anyway: bool = False  #: Whether to continue despite errors.
 
-    def of(self, kind: type[C], **others: object) -> C:
-        """The choice of a room that they state, with other words for some of them."""
+    def of(self, kind: type[C]) -> C:
+        """The choice of a room that they state."""
         own = {word: self.words[word] for word in kind.options() if word in self.words}
-        return kind.parsed(settings=self.settings, **{**own, **others})
+        return kind.parsed(settings=self.settings, **own)
 
     def analysis(
         self,
@@ -240,15 +238,8 @@ def compare(
 @call(*OF_LOG)
 def thresholds(free: Opened | Sequence[Opened], asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
-    from vftcli.contacts.thresholds import compared_signals, find_thresholds
-
-    logs, models = several(free), Runs()
-    choice = asked.analysis(logs)
-    opened = choice.library.open_logs(logs, choice.read)
-    runs = [modelled(*prepared(log, choice), choice, models) for log in opened]
-    found = find_thresholds([compared_signals(run) for run in runs], rate)
-    shown = (remark for run in runs for remark in touched(run, anyway=asked.anyway))
-    return replace(found, remarks=(*found.remarks, *shown))
+    logs = several(free)
+    return free_thresholds(logs, asked.analysis(logs), rate, anyway=asked.anyway).found
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))

@@ -15,7 +15,14 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
-from vftcli.cli.config import begin, config_option, forget, is_configured, settle
+from vftcli.cli.config import (
+    begin,
+    config_option,
+    forget,
+    is_configured,
+    known_options,
+    settle,
+)
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
@@ -281,10 +288,7 @@ def formats(name: str | None) -> Iterator[str]:
 
 def settings() -> Iterator[str]:
     """Every setting of all commands: name, unit, meaning and default."""
-    from vftcli.cli import app
-
-    commands: dict[str, Any] = vars(typer.main.get_command(app))["commands"]
-    every = {kind: None for c in commands.values() for kind in vars(c.callback)["choices"]}
+    _, every = known_options()
     rows = sorted(row for kind in every for row in settings_of(kind))
     yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
     yield from two_columns(rows, columns())

@@ -38,10 +38,10 @@ def contact_thresholds(
 
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
-    from vftcli.answering import modelled, touched
+    from vftcli.answering import free_thresholds, modelled
     from vftcli.cli.console import say, say_json, say_recording, say_robots
     from vftcli.contacts.threshold_check import check_contacts
-    from vftcli.contacts.thresholds import check_alike, compared_signals, find_thresholds, left_out
+    from vftcli.contacts.thresholds import check_alike, compared_signals, left_out
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.pipeline import prepared
@@ -54,30 +54,24 @@ def contact_thresholds(
         raise ParameterError("--reference says where a log was touched: name that with --check LOG")
     library = Library([*logs, *(check or ())])
     choice = logged.asked(library, anyway=anyway)
-    models = Runs()
-    opened = library.open_logs(logs, choice.read)
-    free = [modelled(*prepared(log, choice), choice, models) for log in opened]
-    shown = [remark for run in free for remark in touched(run, anyway=anyway)]
-    signals = [compared_signals(run) for run in free]
-    thresholds = find_thresholds(signals, rate)
+    free, signals, thresholds = free_thresholds(logs, choice, rate, anyway=anyway)
     counted = left_out(signals, rate)
     checks = []
     for log in check or ():
         touching = library.open(log, choice.read.whole)
-        pushed = modelled(*prepared(touching, choice), choice, models)
+        pushed = modelled(*prepared(touching, choice), choice, Runs())
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, asked or settled_reference(pushed.recording))
         checks.append(check_contacts(compared, thresholds, *truth))
-    remarks = (*thresholds.remarks, *shown)
     if json:
         record = thresholds_record(thresholds, counted, checks)
         health = health_record(choice.examiner.examinations)
-        say_json([run.recording for run in free], remarks, **record, examination=health)
+        say_json([run.recording for run in free], thresholds.remarks, **record, examination=health)
         return
     for run in free:
         say_recording(run.recording)
     say_robots(choice.examiner.robots)
-    for remark in (*remarks, *(remark for one in checks for remark in one.remarks)):
+    for remark in (*thresholds.remarks, *(remark for one in checks for remark in one.remarks)):
         say(f"{'warning' if remark.level == 'warning' else 'note'}: {remark}")
     echo(thresholds_text(thresholds, counted, checks), nl=False)
 
