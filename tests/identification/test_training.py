@@ -15,7 +15,6 @@ from vftcli.identification.methods import (
     friction_method,
     initial_columns,
     rotor_number,
-    rotor_remarks,
     whole_arm,
     with_links,
     with_vector,
@@ -24,7 +23,6 @@ from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
-from vftcli.signals.remarks import Where
 from vftcli.signals.rest import MOVES
 
 RUBBING = JointFriction(
@@ -157,7 +155,7 @@ def test_joints_that_are_held_are_told(data):
     ("value", "sd", "known"), [(1.0, 0.29, True), (1.0, 0.34, False), (-1.0, 1.1, False)]
 )
 def test_a_rotor_inertia_is_known_to_thirty_per_cent(value, sd, known):
-    found = rotor_number(3, value, sd, 2.0)
+    found, _ = rotor_number(3, value, sd, 2.0)
     assert (found.joint, found.unit, found.determined) == (4, "kg·m²", known)
     assert found.value == value
 
@@ -167,11 +165,11 @@ def test_a_rotor_inertia_is_known_to_thirty_per_cent(value, sd, known):
 )
 def test_a_rotor_inertia_three_standard_deviations_off_is_taken(value, sd, taken):
     """The profile's 2 kg·m² is wrong then, whatever the right one; none is below zero."""
-    found = rotor_number(3, value, sd, 2.0)
+    found, remarks = rotor_number(3, value, sd, 2.0)
     assert found.determined is (taken is not None)
     assert found.value == (value if taken is None else taken)
     code = "undetermined-rotor-inertia" if taken is None else "refuted-rotor-inertia"
-    assert [remark.code for remark in rotor_remarks(found, Where(joints=(4,)))] == [code]
+    assert [(r.code, r.where.joints) for r in remarks] == [(code, (4,))]
 
 
 def test_a_current_that_falls_with_the_torque_is_refused(data):

@@ -51,8 +51,7 @@ class CleanFit(NamedTuple):
 def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     """Friction fitted twice, the second time without contacts.
 
-    Raises:
-        IdentificationError: If it is `strict` and only other links explain the torque.
+    If it is `strict`, torque that other links alone explain is refused.
     """
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
@@ -103,14 +102,9 @@ class ContactSpan(NamedTuple):
 
 
 def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[ContactSpan]:
-    """Stretches with a residual far above the log's, neighbours joined.
+    """Stretches with a residual (M, n) far above the log's, neighbours joined. [N·m]
 
-    Near a reversal a joint may stick: only torque above dry friction counts.
-
-    Args:
-        motion: The prepared log.
-        residual: Torque that the model leaves. (M, n) [N·m]
-        dry: Coulomb torque of each joint. (M, n) [N·m]
+    Near a reversal a joint may stick: only torque above dry friction (M, n) counts.
     """
     usable = motion.usable
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
@@ -205,10 +199,7 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 
 
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """Remarks on logs in which friction falls from third to third.
-
-    The fit's rest along the direction is a third's dry friction beyond the log's.
-    """
+    """Remarks on logs in which dry friction, beyond the log's, falls from third to third."""
     models = [JointFriction() if fit is None else fit.friction for fit in fits]
     dry = dry_friction(models, data.robot.joints)
     remarks = []

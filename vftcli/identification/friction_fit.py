@@ -260,10 +260,6 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
     First the richest plain model decides the smoothing, then the logarithm's bend, then the
     terms. A parabola competes only if it rises up to the joint's own speed.
-
-    Args:
-        data: The joint's equations.
-        length: Presliding length of the arm, 0 for none. [rad]
     """
     length = length if data.reverses else 0.0
     rich, plain = tellable_terms(RICHEST, data), Shape(tellable_terms(PLAIN, data))
@@ -297,13 +293,7 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
 
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
-    """A joint's competing friction shapes, with `best`'s smoothing and bend.
-
-    Args:
-        best: Its smoothing, bend and presliding length stay.
-        data: The joint's equations.
-        speed: The joint's highest speed, for the points of a bent line. [rad/s]
-    """
+    """A joint's competing shapes up to its highest speed [rad/s]; `best`'s numbers stay."""
     shapes: list[Shape] = []
     line = bent(speed)
     for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
@@ -334,10 +324,7 @@ def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
 
 
 def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
-    """A shape less the terms at zero, Coulomb and viscous friction bounded.
-
-    Also whether velocities seem reversed, see `TURNED`.
-    """
+    """A shape less bounded terms at zero; whether velocities seem reversed (`TURNED`)."""
     powers: dict[Shape, float] = {}
     for without in ((), *((term,) for term in BOUNDED), BOUNDED):
         one = shape._replace(terms=tuple(t for t in shape.terms if t not in without))
@@ -358,8 +345,7 @@ def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
 def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
     """A shape's fit; with presliding, without negative dry terms.
 
-    Presliding and the smoothed sign share one dry torque: too much of one excludes the
-    other.
+    The two share one dry torque: too much of one excludes the other.
     """
     fit = data.fit(shape)
     pushing = pushing_terms(shape, fit.values)
@@ -370,12 +356,6 @@ def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
 
 
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
-    """Whether no dry term is negative and friction rises up to `speed_limit`.
-
-    Args:
-        shape: The structure.
-        values: Its coefficients, others may follow. (k,)
-        speed_limit: It may not fall below this speed. [rad/s]
-    """
+    """Whether no dry term is negative and friction rises up to `speed_limit` [rad/s]."""
     friction = shape.friction(values[: len(shape.terms)])
     return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

@@ -123,14 +123,7 @@ def round_digits(value: float, digits: int = 7) -> float:
 
 
 def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One friction term at every sample: the law with its coefficient at 1.
-
-    Args:
-        term: Its key.
-        shape: The structure.
-        dq: Velocities as recorded. [rad/s]
-        load: Absolute gravity torque. [N·m]
-    """
+    """One term at recorded velocities [rad/s] and loads [N·m], its coefficient at 1."""
     if term in shape.points:
         torques = np.eye(len(shape.speeds))[shape.points.index(term)].tolist()
         return bent_line(dq, shape.speeds, torques, smoothing=shape.smoothing)
@@ -144,11 +137,8 @@ def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
 class FrictionColumns:
     """Filtered friction columns of one prepared log, each made once.
 
-    Args:
-        motion: The prepared log.
-        load: Absolute gravity torques along the whole log. (T, n) [N·m]
-        warmth: What each joint's friction is multiplied with by its temperature; None where that is
-            not known. (T, n) [1]
+    `load` is the absolute gravity torque along the whole log (T, n) [N·m], `warmth` the factor on
+    each joint's friction by its temperature (T, n), None where that is not known.
     """
 
     def __init__(self, motion: PreparedLog, load: Array, warmth: Array | None = None) -> None:

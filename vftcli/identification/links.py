@@ -123,10 +123,7 @@ def residuals(layout: ParameterColumns, log: TrainingLog, x: Array) -> Array:
 def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -> Triangles:
     """All logs weighed and stacked; the last solution weighs outliers down.
 
-    Args:
-        layout: The unknowns.
-        logs: The training logs.
-        start: A first solution: the profile with fitted friction. (size,)
+    The first one is the profile's with fitted friction, `start`. (size,)
     """
     rows = sum(int(np.count_nonzero(log.weights)) for log in logs)
     if rows < 4 * layout.size:
@@ -174,9 +171,7 @@ def triangulate(
 def truncated_step(R: Array, rest: Array) -> tuple[Array, Array, Array]:
     """Least squares R x ≈ rest in directions with data (truncated SVD).
 
-    Returns:
-        The step (k,), its standard deviations for unit equations (k,), and each unknown's
-        share in directions without data (k,).
+    Step, standard deviation for unit equations, share in directions without data. (k,) each
     """
     scale = np.linalg.norm(R, axis=0)
     scale[scale == 0.0] = 1.0
@@ -247,10 +242,6 @@ def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     """Base parameters by weighted least squares, as rows of `BASE`.
 
     Directions without data keep the start; a parameter mostly in them has infinite deviation.
-
-    Args:
-        triangles: The stacked equations.
-        start: The profile's parameters. (size,)
     """
     layout = triangles.layout
     grouping = group_parameters(layout)

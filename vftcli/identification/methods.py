@@ -80,9 +80,9 @@ def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodRes
             numbers.append(K)
             constants[j] = round_digits(K.value)
         if data.rotor:
-            J = rotor_number(j, values[count], sd[count], rotor[j])
+            J, doubts = rotor_number(j, values[count], sd[count], rotor[j])
             numbers.append(J)
-            remarks += rotor_remarks(J, where)
+            remarks += doubts
             rotor[j] = round_digits(J.value) if J.determined else rotor[j]
         if data.rubs:
             frictions[j], more = identified_friction(data, j, fit.shape, values, sd, "friction")
@@ -115,24 +115,20 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
     return values / scale, sd / scale, number(j, "torque_constant", K, K_sd, before, True)
 
 
-def rotor_number(j: int, value: float, sd: float, before: float) -> Number:
-    """The rotor inertia of joint j (from 0) as a number, determined or not. [kg·m²]
+def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
+    """Rotor inertia of joint j (from 0) [kg·m²], and a remark where it is not known well.
 
-    It counts as determined too where it is `REFUTED` standard deviations from the profile's.
+    The logs determine it too where it is `REFUTED` sd off the profile's.
     """
     if refuted := abs(value - before) >= REFUTED * sd:
         value = max(value, 0.0)
-    known = refuted or (value > 0 and sd < DETERMINED * value)
-    return number(j, "rotor_inertia", value, sd, before, known)
-
-
-def rotor_remarks(J: Number, where: Where) -> list[Remark]:
-    """A remark on a rotor inertia that is not known to `DETERMINED`."""
-    if J.determined and J.sd < DETERMINED * J.value:
-        return []
+    known = value > 0 and sd < DETERMINED * value
+    J = number(j, "rotor_inertia", value, sd, before, refuted or known)
+    if known:
+        return J, []
     values = {"found_kgm2": J.value, "sd_kgm2": J.sd, "profile_kgm2": J.profile}
-    code = "refuted-rotor-inertia" if J.determined else "undetermined-rotor-inertia"
-    return [caution(code, where, **values)]
+    code = "refuted-rotor-inertia" if refuted else "undetermined-rotor-inertia"
+    return J, [caution(code, Where(joints=(j + 1,)), **values)]
 
 
 def identified_friction(

@@ -324,14 +324,10 @@ def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFi
 
 
 def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Array, float]:
-    """A load weighed in motion, beside the load already known.
+    """A load weighed in motion, beside the load in its models. (4,) [kg, kg·m]
 
     A joint counts where it moves; its friction is free: a tanh(q̇/v₀) + b q̇ + o. Nothing
     through these drives is subtracted: their errors act on the arm's own weight.
-
-    Args:
-        runs: Logs with the load.
-        carried: Mass and first moment in their models. (4,) [kg, kg·m]
 
     Returns:
         Mass and first moment in flange axes (4,) [kg, kg·m], their covariance (4, 4), RMS left in

@@ -179,13 +179,7 @@ def pulled_links(
 def nearest_physical_links(
     triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]
 ) -> Array:
-    """The physical parameters that predict nearly what least squares predicts. (size,)
-
-    Args:
-        triangles: The stacked equations.
-        profile: The profile's parameters with fitted friction. (size,)
-        weight: Pull to the profile, one of `WEIGHTS`.
-    """
+    """Physical parameters that predict nearly as least squares, by one of `WEIGHTS`. (size,)"""
     return next(x for pull, x in pulled_links(triangles, profile) if pull <= weight)
 
 

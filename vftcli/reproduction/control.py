@@ -159,10 +159,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
 def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
 ) -> RunResult:
-    """Parameters of the robot's table, and how it returns from rest by the law alone.
-
-    It starts off by `deviation` [m] along x; without `alphas` α is the table's own.
-    """
+    """Parameters of a table, and how the arm returns from `deviation` [m] by the law alone."""
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):

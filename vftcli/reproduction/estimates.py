@@ -50,10 +50,7 @@ UNTOUCHED = 0.5  #: True force on the flange below which nothing touches the arm
 
 
 def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) -> RunResult:
-    """RMSE of the virtual sensor against the real one, axis by axis, in flange axes.
-
-    The file of the paper explains the arguments.
-    """
+    """RMSE of the virtual sensor against the real one, axis by axis, in flange axes."""
     hard = simulate(load_scenario("ur5-sensor", ()), seed)
     # A soft position loop: joints slide where a stiff one holds them.
     soft = simulate(load_scenario("ur5-sensor", ("servo.stiffness=soft",)), seed)
@@ -118,10 +115,7 @@ def assembled_bearing(
     phases: Mapping[str, Sequence[float]],
     sampled: float,
 ) -> RunResult:
-    """Zero drift, the bearing's weight, errors by phase, controllers' results.
-
-    The file of the paper explains the arguments.
-    """
+    """Zero drift, the bearing's weight, errors by phase, controllers' results."""
     run = simulate(load_scenario("panda-bearing", ()), seed)
     recording, robot, models = run.recording, load_robot("panda"), Runs()
     vendor = stored_force(recording, robot, WrenchChoice(frame="base"), "libfranka").wrench
@@ -212,10 +206,7 @@ def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence
 
 
 def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
-    """Errors joint by joint, lags, rms of the free cycle, and the guidelines' facts.
-
-    The first cycle of `period` [s] is free.
-    """
+    """Errors joint by joint, lags, rms of the first, free cycle, the guidelines' facts."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
     robot, models, result = load_robot("ur5"), Runs(), RunResult()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.

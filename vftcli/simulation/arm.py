@@ -37,11 +37,6 @@ class Servo:
 
     With the nominal inertia as gain one number sets the stiffness, and every mode of the arm has
     the same bandwidth; gains joint by joint would leave a redundant arm a mode that chatters.
-
-    Attributes:
-        omega: Natural frequency ω of the loop. [rad/s]
-        limit: Torque limits; infinite where unknown. (n,) [N·m]
-        q_min, q_max: Joint limits, likewise. (n,) [rad]
     """
 
     def __init__(self, spec: ServoSpec, robot: Robot, step: float) -> None:
@@ -129,17 +124,8 @@ class History(JointSignals):
 class Arm:
     """An arm under its servo, touched by its scenario's contacts.
 
-    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`.
-
-    Attributes:
-        scenario: The experiment.
-        robot: The profile.
-        true: The arm as it is.
-        plant: Its dynamics.
-        servo: Its position controller.
-        touching: Its contacts.
-        history: What happened so far, room for the rest.
-        steps, made: Inner steps of the run, and those made so far.
+    A controller in the loop calls `command` and reads `q`, `v` and `mean_torque`. Of the `steps` of
+    the run so many are `made`.
     """
 
     def __init__(self, scenario: Scenario, seed: int, start: Reference, duration: float) -> None:
@@ -285,10 +271,7 @@ def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:
 
 
 def build_arm(scenario: Scenario, robot: Robot, rng: np.random.Generator) -> TrueArm:
-    """Draw the arm of a scenario.
-
-    Whatever the sizes are, the same numbers are drawn: errors stay when one is off.
-    """
+    """The arm of a scenario: whatever the sizes are, the same numbers are drawn."""
     sizes, n = scenario.mismatch, robot.joints
     for name, size in vars(sizes).items():
         most = ABSOLUTE.get(name, LARGEST_SHARE)

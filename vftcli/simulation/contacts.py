@@ -249,10 +249,7 @@ def draw_walk(
 class Touching:
     """Everything that touches the arm during a run, evaluated at the middle of each step.
 
-    Attributes:
-        mounted: Contacts that exert wrenches.
-        walks: Name → joint torque of each random walk at each inner step. (N, n) [N·m]
-        wrenches: The last wrench of each mounted contact about its point, base axes. (C, 6)
+    `wrenches` are the last ones of each mounted contact about its point, base axes. (C, 6)
     """
 
     def __init__(

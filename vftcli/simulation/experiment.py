@@ -110,7 +110,7 @@ class Simulation:
 
 
 def prepare(scenario: Scenario, seed: int) -> tuple[Arm, Reference]:
-    """Plan a scenario's motion and build its arm, ready for the first step.
+    """A scenario's arm, ready for the first step, and its planned motion.
 
     Raises:
         ParameterError: If the scenario is impossible.

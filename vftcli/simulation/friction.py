@@ -68,10 +68,7 @@ class TrueFriction:
         return dry
 
     def creep(self, dq: Array, dry: Array) -> tuple[Array, Array, Array]:
-        """What fades of the dry friction, of joints that give, its slope, and what sticks.
-
-        (n,) each [N·m, N·m·s/rad, N·m], at velocities [rad/s].
-        """
+        """What fades of the dry friction where joints give, its slope, what sticks. (n,) each"""
         gives = self.presliding > 0.0
         fading, sign = np.where(gives, dry, 0.0), np.tanh(dq / CREEP)
         return fading * sign, fading * (1.0 - sign**2) / CREEP, np.where(gives, 0.0, dry)
@@ -160,10 +157,7 @@ def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
 
 
 def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:
-    """Where bent lines bend, and by how much their slopes change there. (K, n), (K, n)
-
-    Lines of fewer points than others bend by nothing at speed zero.
-    """
+    """Speeds at which bent lines bend, the change of slope there, or nothing. (K, n) each"""
     most = max(max(len(joint.speeds) for joint in joints) - 1, 0)
     bends, changes = np.zeros((2, most, len(joints)))
     for j, joint in enumerate(joints):

@@ -30,15 +30,9 @@ class Plant:
     (M(q_m) + h/2 D) (v⁺ − v) = h (τ + τ_ext − C v_m − g − f_smooth(v)) − λ,   q⁺ = q + h/2 (v + v⁺)
 
     λ is the impulse of dry friction, D the slope of the smooth one; of second order in h while no
-    joint begins to stick or slide. Presliding friction is evaluated at q_m.
-
-    Attributes:
-        q, v: Positions and velocities now. (n,) [rad, rad/s]
-        q_mid, v_mid, a: Positions, velocities and accelerations for which the last step's balance M
-            a + C v + g = τ + τ_ext − τ_f holds exactly. (n,)
-        friction: Friction torque over the last step, against positive motion. (n,) [N·m]
-        external: Torque of the contacts over the last step. (n,) [N·m]
-        centre: c of the play operator. (n,) [rad]
+    joint begins to stick or slide. Presliding friction is evaluated at q_m. For q_mid, v_mid and a
+    the last step's balance M a + C v + g = τ + τ_ext − τ_f holds exactly; `friction` is against
+    positive motion, `centre` the c of the play operator.
     """
 
     def __init__(
@@ -116,15 +110,8 @@ def slide_or_stick(
 ) -> tuple[Array, Array, Array]:
     """Velocities after the step, friction impulses, and the direction each joint slides in.
 
-    Args:
-        M: Joint-space inertia with the implicit damping, M̃. (n, n) [kg·m²]
-        impulse: Impulse g of everything but dry friction. (n,) [N·m·s]
-        v: Velocities before the step. (n,) [rad/s]
-        limit: Largest dry friction impulses ℓ. (n,) [N·m·s]
-        signs: Directions guessed: those of the step before; 0 sticks. (n,)
-
-    Returns:
-        v⁺ (n,) [rad/s], λ (n,) [N·m·s] and the directions (n,).
+    M̃ (n, n) [kg·m²], impulse g of everything but dry friction, velocities v before the step,
+    largest impulses ℓ of dry friction, directions of the step before as a guess, 0 sticks. (n,)
     """
     from scipy.linalg.lapack import dposv
 
@@ -138,33 +125,24 @@ def slide_or_stick(
                 return after, limit * signs, signs
             signs = np.where(wrong, 0.0, signs)
             continue
-        after, friction, better = step_with_stuck_joints(M, impulse, v, limit, signs)
+        # Else those with sign 0 stop.
+        stuck, free = signs == 0.0, signs != 0.0
+        stop, step = -v[stuck], np.zeros(np.count_nonzero(free))
+        after, friction, better = np.zeros_like(v), limit * signs, signs.copy()
+        if step.size:
+            rows = M[free]
+            right = impulse[free] - friction[free] - rows[:, stuck] @ stop
+            step = np.linalg.solve(rows[:, free], right)
+            after[free] = v[free] + step
+        rows = M[stuck]
+        friction[stuck] = impulse[stuck] - rows[:, free] @ step - rows[:, stuck] @ stop
+        better[free & (after * signs < 0.0) & (limit > 0.0)] = 0.0
+        breaks = stuck & (np.abs(friction) > limit)
+        better[breaks] = np.where(friction[breaks] < 0.0, -1.0, 1.0)
         if np.array_equal(better, signs):
             return after, friction, signs
         signs = better
     return gauss_seidel(M, impulse, v, limit)
-
-
-def step_with_stuck_joints(
-    M: Array, impulse: Array, v: Array, limit: Array, signs: Array
-) -> tuple[Array, Array, Array]:
-    """The step if exactly the joints with sign 0 stick, and the directions that result."""
-    stuck, free = signs == 0.0, signs != 0.0
-    stop = -v[stuck]
-    after, friction = np.zeros_like(v), limit * signs
-    step = np.zeros(int(free.sum()))
-    if step.size:
-        rows = M[free]
-        right = impulse[free] - friction[free] - rows[:, stuck] @ stop
-        step = np.linalg.solve(rows[:, free], right)
-        after[free] = v[free] + step
-    rows = M[stuck]
-    friction[stuck] = impulse[stuck] - rows[:, free] @ step - rows[:, stuck] @ stop
-    better = signs.copy()
-    better[free & (after * signs < 0.0) & (limit > 0.0)] = 0.0
-    breaks = stuck & (np.abs(friction) > limit)
-    better[breaks] = np.where(friction[breaks] < 0.0, -1.0, 1.0)
-    return after, friction, better
 
 
 def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:

@@ -23,10 +23,7 @@ USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
 
 @dataclass(frozen=True, kw_only=True)
 class Samples(JointSignals):
-    """The sampling of a run: when, and the true signals then, one row a sample.
-
-    The drive torque is averaged over the sampling interval, or that at the instant.
-    """
+    """The true signals at sampling instants, drive torque as the scenario averages it."""
 
     time: Array  #: True time of each sample. (M,) [s]
     stamp: Array  #: The same on the log's clock, before jitter. (M,) [s]
@@ -170,7 +167,7 @@ def rounded(q: Array, step: float) -> Array:
 
 
 def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
-    """Evaluate the controller's nominal model along a run.
+    """The controller's nominal model along a run.
 
     As Universal Robots', its friction knows load and temperature, no presliding.
     """

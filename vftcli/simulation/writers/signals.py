@@ -59,10 +59,7 @@ def joint_signals(simulation: Simulation) -> dict[str, Array]:
 
 
 def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
-    """Every signal of a vendor's table by name, to be called for its columns. (M, …) each
-
-    With no tool set the TCP is the flange.
-    """
+    """Signals of vendors' tables by name, to be called; the TCP is the flange. (M, …) each"""
     import pinocchio as pin
 
     samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
