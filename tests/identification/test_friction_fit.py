@@ -14,7 +14,7 @@ from vftcli.identification.friction_fit import (
     non_negative_fit,
     tellable_terms,
 )
-from vftcli.identification.friction_shapes import FrictionColumns, Shape, term_values
+from vftcli.identification.training import FrictionColumns, Shape, term_values
 
 LIMIT = 1.2
 """Speed up to which friction may not fall: 5 − 2·2 v = 0 lies above it, at 1.25. [rad/s]"""

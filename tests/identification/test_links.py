@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import FrictionColumns, Shape
 from vftcli.identification.links import (
     DOUBTFUL,
     Grouping,
@@ -18,7 +17,7 @@ from vftcli.identification.links import (
     triangle,
     triangulate,
 )
-from vftcli.identification.training import TrainingLog
+from vftcli.identification.training import FrictionColumns, Shape, TrainingLog
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 

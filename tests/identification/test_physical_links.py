@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.links import ParameterColumns, Triangles, triangle
 from vftcli.identification.physical_links import (
     Problem,
@@ -15,6 +14,7 @@ from vftcli.identification.physical_links import (
     starting_point,
     thicken_links,
 )
+from vftcli.identification.training import Shape
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor, with_parameters
 

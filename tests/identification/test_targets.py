@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import LOGARITHMIC_VELOCITIES, FrictionColumns
 from vftcli.identification.targets import (
     UNKNOWN,
     WRITTEN,
@@ -24,6 +23,7 @@ from vftcli.identification.targets import (
     target_remarks,
     targets_method,
 )
+from vftcli.identification.training import LOGARITHMIC_VELOCITIES, FrictionColumns
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import IdentificationError

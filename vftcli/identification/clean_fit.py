@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, fit_frictions
-from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.links import ParameterColumns, residuals
 from vftcli.identification.processing import PreparedLog
 from vftcli.identification.result import apparent_load
-from vftcli.identification.training import Training, TrainingLog
+from vftcli.identification.training import Shape, Training, TrainingLog
 from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask

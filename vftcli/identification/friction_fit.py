@@ -5,16 +5,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.friction_shapes import (
+from vftcli.identification.processing import root_mean_square
+from vftcli.identification.training import (
     LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
     FrictionColumns,
     Shape,
+    Training,
+    TrainingLog,
     bent,
 )
-from vftcli.identification.processing import root_mean_square
-from vftcli.identification.training import Training, TrainingLog
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array

@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.identification.friction_shapes import Shape
 from vftcli.identification.result import BASE
-from vftcli.identification.training import TrainingLog
+from vftcli.identification.training import Shape, TrainingLog
 from vftcli.robots.chain import Chain
 from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
 from vftcli.signals.arrays import Array

@@ -24,7 +24,6 @@ from vftcli.identification.friction_fit import (
     fit_frictions,
     is_dissipative,
 )
-from vftcli.identification.friction_shapes import Shape, friction_columns, round_digits
 from vftcli.identification.links import ParameterColumns, base_parameters, stack
 from vftcli.identification.physical_links import (
     TABLE,
@@ -34,7 +33,7 @@ from vftcli.identification.physical_links import (
 )
 from vftcli.identification.processing import rigid_torque
 from vftcli.identification.result import MethodResult, Number, number
-from vftcli.identification.training import Training
+from vftcli.identification.training import Shape, Training, friction_columns, round_digits
 from vftcli.robots.friction import SMOOTHING, falling_speed, steady_torque
 from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot

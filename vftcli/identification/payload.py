@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.friction_shapes import round_digits
 from vftcli.identification.processing import (
     STATIC,
     PreparedLog,
@@ -15,6 +14,7 @@ from vftcli.identification.processing import (
     prepare,
     root_mean_square,
 )
+from vftcli.identification.training import round_digits
 from vftcli.readers.table import listed
 from vftcli.repetition.free_load import LEAST, PARTLY, SURE, columns, weighed
 from vftcli.robots.chain import Payload

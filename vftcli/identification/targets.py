@@ -13,14 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, is_dissipative
-from vftcli.identification.friction_shapes import (
-    LOGARITHMIC_VELOCITIES,
-    FrictionColumns,
-    Shape,
-    bent,
-    friction_columns,
-    round_digits,
-)
 from vftcli.identification.methods import (
     identified_friction,
     profile_constant,
@@ -29,7 +21,15 @@ from vftcli.identification.methods import (
 )
 from vftcli.identification.processing import gravity_torque, prepare, rigid_torque
 from vftcli.identification.result import MethodResult, Number, number
-from vftcli.identification.training import Training
+from vftcli.identification.training import (
+    LOGARITHMIC_VELOCITIES,
+    FrictionColumns,
+    Shape,
+    Training,
+    bent,
+    friction_columns,
+    round_digits,
+)
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array

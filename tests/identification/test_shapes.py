@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification.friction_shapes import (
+from vftcli.identification.training import (
     BENDS,
     FrictionColumns,
     Shape,
