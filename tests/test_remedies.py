@@ -400,7 +400,7 @@ def dropped(words: list[Any], option: str) -> list[Any]:
 UNREAD = "the reader refuses such a file first; only a log made in memory gets as far"
 NAMED = "says which option did it; there is nothing to mend"
 OWN_ARM = "asks for a description of the user's own arm"
-PRINT = "about Table I; tried in tests/evaluation/test_print_table.py"
+PRINT = "about Table I; tried in tests/evaluation/test_published.py"
 WITHOUT_ROW = {
     "absurd-clock": UNREAD,
     "absurd-steps": UNREAD,

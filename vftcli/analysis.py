@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
-    from vftcli.evaluation.print_table import Comparison
+    from vftcli.evaluation.published import Comparison
     from vftcli.refinement.refine import Refinement
     from vftcli.repetition.free_motion import FreeMotion
     from vftcli.robots.run import Run

@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.selection import (
+from vftcli.evaluation.published import (
     Facts,
     advice,
     best,

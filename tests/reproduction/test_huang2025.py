@@ -2,7 +2,7 @@
 
 import inspect
 
-from vftcli.evaluation.print_table import TABLE_1
+from vftcli.evaluation.published import TABLE_1
 from vftcli.reproduction.jobs import RUNS
 from vftcli.reproduction.paper import PAPERS
 

@@ -51,7 +51,7 @@ def report(
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
     from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_left_out
-    from vftcli.evaluation.print_table import check_published, compare_with
+    from vftcli.evaluation.published import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.report import FILES, report_files
     from vftcli.pipeline import WRITING, analyse_logs

@@ -139,7 +139,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
     names = tuple(estimate.name for estimate in estimates)
     step = median_step(reference.t) if len(reference.t) > 1 else 1.0
     lag = lags_of_each([e.tau for e in estimates], reference.tau, step)
-    covered = [covered_samples(e, reference) for e in estimates]
+    covered = np.array([covered_samples(e, reference) for e in estimates])
     moving = reference.moving if reference.moving is not None else reference.known
     for j in steps(range(reference.joints if estimates else 0)):
         y = reference.tau[:, j]
@@ -169,28 +169,24 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             paired=paired,
             own=own or (paired,) * len(names),
             lag=lag[:, j],
-            within=np.array([within[j] for within, _ in covered]),
-            banded=np.array([banded[j] for _, banded in covered]),
+            within=covered[:, 0, j],
+            banded=covered[:, 1, j],
         )
 
 
-def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> tuple[Array, Array]:
-    """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (n,), (n,)
+def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Array:
+    """Samples within ±1.96 `error_sd` of the estimate, and samples that were asked. (2, n)
 
     Where the joint rests, or without a band, none counts; one without an answer is in no band.
     """
     if estimate.error_sd is None:
-        return np.zeros(estimate.joints), np.zeros(estimate.joints)
-    error = estimate.tau - reference.tau
+        return np.zeros((2, estimate.joints))
     counted = np.isfinite(reference.tau)
     for torque in (estimate, reference):
         if torque.moving is not None:
             counted &= torque.moving
-    within = counted & (np.abs(error) <= COVERS * estimate.error_sd)
-    return (
-        np.count_nonzero(within, axis=0).astype(np.float64),
-        np.count_nonzero(counted, axis=0).astype(np.float64),
-    )
+    within = np.abs(estimate.tau - reference.tau) <= COVERS * estimate.error_sd
+    return np.array([np.count_nonzero(x, axis=0) for x in (counted & within, counted)], np.float64)
 
 
 def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFrame:
@@ -205,6 +201,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
     """One row an observer on one joint."""
     error, lines = joint.error, list[dict[str, object]]()
     best = int(np.argmin(np.mean(error**2, axis=0))) if len(error) else 0
+    share = float(np.mean(joint.moving)) if len(error) else 0.0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
             "recording": recording,
@@ -215,48 +212,27 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
             "samples": len(joint.reference),
         }
         if len(error):
-            own = np.ascontiguousarray(error[:, k])
-            here |= {"missing": joint.missing[k] / len(own)}
-            here |= sizes(joint, k, own, best) | trust(joint, k, own)
+            x, draws, paired = np.ascontiguousarray(error[:, k]), joint.own[k], joint.paired.draws
+            square, moving = float(np.mean(x**2)), x[joint.moving]
+            low, high = interval(square, draws.draws[:, 0], draws.blocks)
+            covered = joint.within[k] / joint.banded[k] if joint.banded[k] >= LEAST else np.nan
+            here |= {
+                "rmse_Nm": number(np.sqrt(square)),
+                "rmse_low_Nm": number(low),
+                "rmse_high_Nm": number(high),
+                "bias_Nm": number(x.mean()),
+                "max_Nm": number(np.max(np.abs(x))),
+                "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
+                "lag_s": number(joint.lag[k]),
+                "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
+                "reference_trusted": share >= TRUSTED_SHARE,
+                "at_rest": 1.0 - share,
+                "rmse_moving_Nm": number(np.sqrt(np.mean(moving**2))) if len(moving) else None,
+                "coverage_95": number(covered),
+                "missing": joint.missing[k] / len(x),
+            }
         lines.append(here)
     return lines
-
-
-def sizes(joint: Scored, k: int, error: Array, best: int) -> dict[str, object]:
-    """Size of the error with its interval, its bias, correlation, lag and rank.
-
-    Args:
-        joint: The scored joint.
-        k: Which observer.
-        error: Its error. (T,) [N·m]
-        best: The observer with the smallest one.
-    """
-    own, paired = joint.own[k], joint.paired.draws
-    square = float(np.mean(error**2))
-    low, high = interval(square, own.draws[:, 0], own.blocks)
-    return {
-        "rmse_Nm": number(np.sqrt(square)),
-        "rmse_low_Nm": number(low),
-        "rmse_high_Nm": number(high),
-        "bias_Nm": number(error.mean()),
-        "max_Nm": number(np.max(np.abs(error))),
-        "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
-        "lag_s": number(joint.lag[k]),
-        "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
-    }
-
-
-def trust(joint: Scored, k: int, error: Array) -> dict[str, object]:
-    """Trust in the reference of this joint, and the error where it moves."""
-    share = float(np.mean(joint.moving))
-    error = error[joint.moving]
-    enough = joint.banded[k] >= LEAST
-    return {
-        "reference_trusted": share >= TRUSTED_SHARE,
-        "at_rest": 1.0 - share,
-        "rmse_moving_Nm": number(np.sqrt(np.mean(error**2))) if len(error) else None,
-        "coverage_95": number(joint.within[k] / joint.banded[k]) if enough else None,
-    }
 
 
 def number(value: float) -> float | None:

@@ -42,9 +42,7 @@ def with_measured_gap(
     """Remarks on the measured cost of the paper's gains, where both sides ran."""
     means = joint_means(errors).errors
     delays = {name: tunings[name].delay for name in PAPER if name in means}
-    if not delays or BEST not in means:
-        return tuple(remarks)
-    gap = gap_remark(MEASURED, means, delays)
+    gap = gap_remark(MEASURED, means, delays) if delays and BEST in means else None
     if gap is None:
         return tuple(remarks)
     return (*(remark for remark in remarks if remark.code not in EXPECTED), gap)

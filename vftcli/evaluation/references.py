@@ -73,12 +73,9 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
     found = []
     for start, stop in runs_of(np.asarray((level > limit).any(axis=1))):
         excess = (level[start:stop] / limit).max(axis=0)
-        joint = int(np.argmax(excess))
-        torque = float(level[start:stop, joint].max())
-        begin, end = float(run.t[start]), float(run.t[stop - 1])
-        found.append(
-            ShownContact(joint, begin, end, torque, float(quiet[joint]), float(excess[joint]))
-        )
+        j = int(np.argmax(excess))
+        sizes = float(level[start:stop, j].max()), float(quiet[j]), float(excess[j])
+        found.append(ShownContact(j, float(run.t[start]), float(run.t[stop - 1]), *sizes))
     return tuple(found)
 
 
@@ -115,28 +112,16 @@ class ReferenceLoad:
 
 
 def zero_reference(log: Run) -> ReferenceLoad:
-    """No contact at all: the reference of a free motion.
-
-    Its error is not known; where the log shows contact a warning says so.
-    """
-    recording = log.recording
-    return ReferenceLoad(
-        torque=ExternalTorque(
-            name="zero",
-            t=recording.t,
-            tau=np.zeros(recording.q.shape),
-            remarks=(caution("reference-zero"), *touched_remarks(log)),
-        )
-    )
+    """No contact at all: the reference of a free motion, of unknown error, with its contacts."""
+    zero, remarks = np.zeros(log.q.shape), (caution("reference-zero"), *touched_remarks(log))
+    return ReferenceLoad(torque=ExternalTorque(name="zero", t=log.t, tau=zero, remarks=remarks))
 
 
 def vendor_reference(recording: Recording) -> ReferenceLoad:
     """The vendor's estimate in the log, torque on the robot, of unknown error."""
-    tau = recording.require("tau_ext")
-    remarks = (caution("reference-vendor"),)
-    return ReferenceLoad(
-        torque=ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
-    )
+    tau, remarks = recording.require("tau_ext"), (caution("reference-vendor"),)
+    torque = ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
+    return ReferenceLoad(torque=torque)
 
 
 def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
@@ -196,14 +181,7 @@ def file_reference(
 
 
 def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path) -> Array:
-    """Columns interpolated linearly to the log's samples, NaN beyond the file. (T, k)
-
-    Args:
-        t: The file's time, from the log's first sample. (M,) [s]
-        columns: Its values. (M, k)
-        recording: The log.
-        path: The file, for the error.
-    """
+    """Columns (M, k) at a file's times [s], interpolated to the log's, NaN beyond. (T, k)"""
     # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
     slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
@@ -233,12 +211,9 @@ REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
 def make_reference(
     motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
-    """The reference that is asked for, on the log's clock.
+    """The reference that is asked for, on the clock of the log that is compared.
 
-    Args:
-        motion: The log that is compared, its robot, and its free motion.
-        choice: Which reference.
-        mounting: Where tool and sensor sit on the flange.
+    The mounting says where tool and sensor sit on the flange.
     """
     if choice.path is not None:
         log = motion.log

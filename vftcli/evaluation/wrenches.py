@@ -6,7 +6,6 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
-from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.wrench import AXES, COVERS, Wrench
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.sensor_reading import SensorReading
@@ -41,36 +40,30 @@ def evaluate_wrenches(
         answers = np.where(answered, wrench.known, 0.0)
         overall = rmse(answers, reference.known)
         for k, axis in enumerate(AXES):
-            x, y = answers[:, k], reference.known[:, k]
-            known = np.isfinite(y)
-            error, unit = (x - y)[known], "N" if k < 3 else "Nm"
-            some = len(error) > 0
-            rows.append(
-                {
-                    "recording": recording,
-                    "observer": wrench.name,
-                    "axis": axis,
-                    f"rmse_{unit}": number(overall[k]),
-                    f"bias_{unit}": number(error.mean()) if some else None,
-                    f"max_{unit}": number(np.max(np.abs(error))) if some else None,
-                    "band_share": band_share(wrench, k, wrench.known[:, k] - y, known),
-                    "correlation": number(correlation(x[known], y[known])) if some else None,
-                    "reference": reference.name,
-                    "missing": float(np.mean(~answered[known, k])) if some else None,
-                    "samples": len(error),
+            known = np.isfinite(reference.known[:, k])
+            x, y = answers[known, k], reference.known[known, k]
+            error, unit = x - y, "N" if k < 3 else "Nm"
+            row: dict[str, object] = {
+                "recording": recording,
+                "observer": wrench.name,
+                "axis": axis,
+                f"rmse_{unit}": number(overall[k]),
+                "reference": reference.name,
+                "samples": len(error),
+            }
+            if len(error):
+                row |= {
+                    f"bias_{unit}": number(error.mean()),
+                    f"max_{unit}": number(np.max(np.abs(error))),
+                    "correlation": number(correlation(x, y)),
+                    "missing": float(np.mean(~answered[known, k])),
                 }
-            )
+                if wrench.sd is not None:
+                    # An error of NaN lies in no band.
+                    inside = np.abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
+                    row["band_share"] = float(np.mean(inside))
+            rows.append(row)
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
-
-
-def band_share(wrench: Wrench, k: int, error: Array, known: Mask) -> float | None:
-    """Share of the known samples with an error within 1.96 standard deviations.
-
-    An error of NaN lies in no band.
-    """
-    if wrench.sd is None or not known.any():
-        return None
-    return float(np.mean(np.abs(error[known]) <= COVERS * wrench.sd[known, k]))
 
 
 def with_wrenches(errors: pl.DataFrame, recording: str, sensed: SensorReading) -> pl.DataFrame:

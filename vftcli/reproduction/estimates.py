@@ -13,8 +13,8 @@ from vftcli.admittance.motion import SHARES, Drag, return_time
 from vftcli.admittance.replay import Replay, replay
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
+from vftcli.evaluation.published import facts
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.evaluation.selection import facts
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import PAPER
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine

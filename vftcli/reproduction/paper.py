@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from vftcli.evaluation.print_table import TABLES
+from vftcli.evaluation.published import TABLES
 from vftcli.outputs.charts import Chart
 from vftcli.signals.errors import ParameterError
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from vftcli.analysis import Analysis
-    from vftcli.evaluation.print_table import Comparison
+    from vftcli.evaluation.published import Comparison
 
 OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted anyway.
 SURE = 0.05  #: Below this p a difference between two observers is called sure.

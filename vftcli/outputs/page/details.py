@@ -10,8 +10,7 @@ import polars as pl
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.evaluation.print_table import Comparison
-from vftcli.evaluation.selection import Facts, advice, facts
+from vftcli.evaluation.published import Comparison, Facts, advice, facts
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns
 from vftcli.outputs.log.run_record import observer_record

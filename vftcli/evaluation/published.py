@@ -1,15 +1,20 @@
-"""Published error tables, to set beside one's own."""
+"""What the paper prints, beside one's own log: its error table and its guidelines (Sec. IV-A)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
+from vftcli.evaluation.errors import joint_means
 from vftcli.observers.observer import Observer, Tuning
+from vftcli.robots.run import Run
+from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.remarks import Remark, Where, fact
+from vftcli.signals.remarks import Remark, fact, on_joints
+from vftcli.signals.series import median_step
 
 #: Errors that differ by less than this share are one filter's, computed in two ways.
 SAME_FILTER = 1e-6
@@ -62,15 +67,12 @@ class Comparison:
     @property
     def remarks(self) -> tuple[Remark, ...]:
         """Differences of the two, and why a computation need not give these numbers."""
-        both = (*self.sizes(), *self.one_filter(), *self.kalman_delay()) if self.names else ()
         last = [row[5] for row in self.published.rmse.values()]
-        at_floor = fact(
-            "print-noise-floor",
-            least_Nm=min(last),
-            most_Nm=max(last),
-            floor_Nm=float(self.floor[5]),
-        )
-        return (*both, at_floor)
+        floor = float(self.floor[5])
+        at_floor = fact("print-noise-floor", least_Nm=min(last), most_Nm=max(last), floor_Nm=floor)
+        if not self.names:
+            return (at_floor,)
+        return (*self.sizes(), *self.one_filter(), *self.kalman_delay(), at_floor)
 
     def sizes(self) -> tuple[Remark, Remark]:
         """Joints on which another observer is best than in print, and ours over the print."""
@@ -78,37 +80,30 @@ class Comparison:
         ours = np.array([self.ours[name] for name in self.names])
         # Of a joint on which no observer is known the first is named.
         here = np.argmin(np.where(np.isfinite(ours), ours, np.inf), axis=0)
+        pairs = zip(printed.argmin(axis=0), here, strict=True)
         other = [
             f"J{j} ({self.names[theirs]} in print, {self.names[own]} here)"
-            for j, (theirs, own) in enumerate(
-                zip(printed.argmin(axis=0), here, strict=True), start=1
-            )
+            for j, (theirs, own) in enumerate(pairs, start=1)
             if theirs != own
         ]
-        joints = len(here)
+        joints, ratio = len(here), ours / printed
         winners = fact("print-same-best", joints=joints)
         if other:
             same = joints - len(other)
             winners = fact("print-other-best", same=same, joints=joints, differing=other)
-        ratio = ours / printed
-        return winners, fact(
-            "print-sizes",
-            median=float(np.nanmedian(ratio)),
-            least=float(np.nanmin(ratio)),
-            most=float(np.nanmax(ratio)),
-        )
+        sizes = [float(size(ratio)) for size in (np.nanmedian, np.nanmin, np.nanmax)]
+        return winners, fact("print-sizes", median=sizes[0], least=sizes[1], most=sizes[2])
 
     def one_filter(self) -> list[Remark]:
         """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
         if not {"fdo", "gmo"} <= set(self.names):
             return []
         gap = np.abs(self.ours["fdo"] - self.ours["gmo"])
-        alike = np.flatnonzero(gap <= SAME_FILTER * self.ours["fdo"])
-        if not len(alike):
+        alike = gap <= SAME_FILTER * self.ours["fdo"]
+        if not alike.any():
             return []
         printed = np.abs(self.printed("fdo") - self.printed("gmo"))[alike]
-        where = Where(joints=tuple(int(j) + 1 for j in alike))
-        return [fact("print-one-filter", where, printed_Nm=float(printed.max()))]
+        return [fact("print-one-filter", on_joints(alike), printed_Nm=float(printed.max()))]
 
     def kalman_delay(self) -> list[Remark]:
         """The noise convention decides the Kalman bandwidth, and the ranking."""
@@ -161,3 +156,107 @@ def compare_with(
         observers={observer.name: observer for observer in observers},
         tunings=tunings,
     )
+
+
+STEP_TIME = 3.0  #: Length of the step that response times are read from. [s]
+REACHED = 0.9  #: Share of a step at which it counts as seen.
+#: Contacts by a person's deliberate action lie below this frequency, the rest is noise. [Hz]
+FAST = 5.0
+
+
+class Facts(NamedTuple):
+    """Speed, noise and error of one observer on one log."""
+
+    name: str  #: The observer.
+    response: float  #: Time until 90 % of a step is seen, the slowest joint. [s]
+    delay: float  #: Delay behind a slow ramp, the slowest joint. [s]
+    #: Noise of the estimate, mean of joints: the drive torque's white noise through the observer's
+    #: own response. [N·m]
+    noise: float
+    #: Share of the drive torque's noise above `FAST` that comes through, mean of joints.
+    passed: float
+    rmse: float  #: Root-mean-square error against the reference, mean of joints, NaN without. [N·m]
+    parameter_count: int  #: Numbers to tune.
+
+
+class Advice(NamedTuple):
+    """One guideline and what this log says of it."""
+
+    purpose: str  #: Use of the observer.
+    criterion: str  #: Deciding number.
+    best: tuple[str, ...]  #: The observers that are best by it, alike within 2 %.
+    paper: str  #: Advice of the paper.
+
+
+def facts(
+    observers: Sequence[Observer],
+    tunings: Mapping[str, Tuning],
+    run: Run,
+    errors: pl.DataFrame | None,
+) -> tuple[Facts, ...]:
+    """The facts of every observer that has a response of its own."""
+    step, noise, each = median_step(run.recording.t), run.noise, list[Facts]()
+    means = {} if errors is None else joint_means(errors).errors
+    frequency = np.linspace(0.0, 0.5 / step, 513)[1:]
+    fast = frequency >= min(FAST, frequency[-1])
+    for observer in observers:
+        if (tuning := tunings.get(observer.name)) is None:
+            continue
+        gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
+        one = Facts(
+            name=observer.name,
+            response=float(np.max(step_response(observer, step, len(noise)))),
+            delay=float(np.max(tuning.delay)),
+            noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
+            passed=float(np.mean(np.sqrt(gain[fast].mean(axis=0)))),
+            rmse=means.get(observer.name, float("nan")),
+            parameter_count=tuning.parameter_count,
+        )
+        each.append(one)
+    return tuple(each)
+
+
+def step_response(observer: Observer, step: float, joints: int) -> Array:
+    """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]
+
+    The step begins after the first sample; its momentum is the integral of it.
+    """
+    t = np.arange(0.0, STEP_TIME, step)
+    p = np.repeat(t[:, None], joints, axis=1)
+    seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
+    times: Array = np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
+    return times
+
+
+#: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's advice.
+GUIDELINES = (
+    (
+        *("collision detection", "shortest response", "response"),
+        "GMO or FDO: fast to compute and to respond",
+    ),
+    (
+        *("safe response", f"least noise above {FAST:g} Hz", "passed"),
+        "FDO: its one cutoff chooses what passes",
+    ),
+    (
+        *("force estimation", "smallest RMSE against the reference", "rmse"),
+        "KFO: ZOH for accuracy, FE for computation",
+    ),
+)
+
+
+def advice(found: Sequence[Facts]) -> tuple[Advice, ...]:
+    """The paper's three guidelines with the best observers on this log."""
+    return tuple(
+        Advice(purpose, criterion, best(found, [getattr(f, name) for f in found]), paper)
+        for purpose, criterion, name, paper in GUIDELINES
+    )
+
+
+def best(found: Sequence[Facts], values: Sequence[float]) -> tuple[str, ...]:
+    """Names of those within 2 % of the smallest value; none where no value is known."""
+    known = [v for v in values if np.isfinite(v)]
+    if not known:
+        return ()
+    least = min(known)
+    return tuple(f.name for f, v in zip(found, values, strict=True) if v <= 1.02 * least)

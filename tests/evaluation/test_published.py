@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation.print_table import TABLE_1, check_published, compare_with
+from vftcli.evaluation.published import TABLE_1, check_published, compare_with
 from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.signals.errors import ParameterError
 
