@@ -10,7 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.identification.choice import Task
 from vftcli.observers.choice import LOG_GAINS, GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, check_logged, examine, model, prepared, read
-from vftcli.readers.estimates import estimates_columns
+from vftcli.readers.references import estimates_columns
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, Runs
 from vftcli.signals.errors import ParameterError

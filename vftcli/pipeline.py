@@ -10,9 +10,9 @@ import numpy as np
 from vftcli.doctor.examination import Examiner
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
-from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.references import refuse_estimates
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion, FreeRun

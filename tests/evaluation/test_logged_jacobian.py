@@ -8,8 +8,8 @@ import pytest
 
 from vftcli.evaluation.logged_jacobian import JacobianJudgement, judge_jacobian
 from vftcli.readers import read
-from vftcli.readers.jacobian import JacobianLog, jacobian_log
 from vftcli.readers.reader import ReadChoice
+from vftcli.readers.references import JacobianLog, jacobian_log
 from vftcli.readers.table import JacobianError
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian

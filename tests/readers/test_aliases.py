@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.readers.joints import UR_NAMES
+from vftcli.readers.aliases import UR_NAMES
 from vftcli.signals.errors import ClockError, LogError
 
 ROWS = 30

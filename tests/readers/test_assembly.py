@@ -4,8 +4,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.readers.estimates import estimates_columns
 from vftcli.readers.reading import assemble
+from vftcli.readers.references import estimates_columns
 from vftcli.signals.errors import LogError, MissingSignalError
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.readers.cleaning import cleaned, last_jump, without_leading_garbage
+from vftcli.readers.cleaning import cleaned, without_leading_garbage
 from vftcli.readers.reader import RawLog
 from vftcli.signals.errors import ClockError, LogError
 
@@ -40,13 +40,11 @@ def test_what_lies_before_the_clocks_last_jump_goes_with_the_garbage():
     assert dropped(raw({4: 1000.0})) == 4
     assert dropped(raw({4: -5.0})) == 4
     assert dropped(raw({4: 1000.0, 8: 1000.0})) == 8
-    assert last_jump(raw({4: 1000.0, 8: 1000.0}), 100) == 8
 
 
 def test_a_pause_is_no_jump():
     """Up to a minute, and to a thousand steps of a slow log: 30 s here."""
     assert dropped(raw({4: 30.0})) == 1
-    assert last_jump(raw({4: 30.0}), 100) == 0
 
 
 def test_a_jump_without_garbage_is_left_to_be_told():

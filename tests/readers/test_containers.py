@@ -15,9 +15,8 @@ from seed_logs import ROWS, motion
 
 from vftcli.readers import ReadChoice, episode_numbers, read, read_first_recording, recognise
 from vftcli.readers.hdf5 import numbers_of
-from vftcli.readers.opening import natural
+from vftcli.readers.opening import natural, open_log
 from vftcli.readers.parquet import ArrowTable, claims
-from vftcli.readers.reader import open_log
 from vftcli.signals.errors import LogError, ParameterError, UnknownFormatError
 
 FORMATS = {

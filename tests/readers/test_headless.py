@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.readers.headless import Guess, guessed
+from vftcli.readers.columns import Guess, guessed
 from vftcli.signals.errors import LogError
 
 T31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"

@@ -17,10 +17,10 @@ from vftcli.signals.recording import Recording
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 PARTS = {
-    "picking.WHOLE_ROWS": 0,
+    "tables.WHOLE_ROWS": 0,
     "parquet.BLOCK_ROWS": 7,
     "delimited.BLOCK_BYTES": 3000,
-    "joining.HELD": 500,
+    "table.HELD": 500,
     "bags.container.BATCH_BYTES": 10_000,
 }
 
@@ -140,7 +140,7 @@ def test_odd_logs_are_told_by_the_whole(
     rows.write_parquet(path)
     said = []
     for size in (1 << 30, 0):
-        monkeypatch.setattr(importlib.import_module("vftcli.readers.picking"), "WHOLE_ROWS", size)
+        monkeypatch.setattr(importlib.import_module("vftcli.readers.tables"), "WHOLE_ROWS", size)
         with pytest.raises(error) as refusal:
             read_chosen(path, ReadChoice())
         said.append(str(refusal.value))
@@ -172,7 +172,7 @@ def test_where_temporary_files_have_no_room_a_table_stays_in_memory_and_a_bag_sa
 
     path = tmp_path / "log.csv"
     table().write_csv(path)
-    monkeypatch.setattr(importlib.import_module("vftcli.readers.joining"), "TemporaryFile", full)
+    monkeypatch.setattr(importlib.import_module("vftcli.readers.table"), "TemporaryFile", full)
     check_same(*both_ways(path))
     with pytest.raises(LogError, match=r"No space left on device.*TMPDIR=FOLDER"):
         read_chosen(bare_mcap(tmp_path / "log.mcap"), ReadChoice())

@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from vftcli.readers.joints import UR_NAMES, kinematic_order, robot_of
+from vftcli.readers.aliases import UR_NAMES, kinematic_order, robot_of
 
 FRANKA = [f"fr3_joint{j}" for j in range(1, 8)]
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.readers.joints import UR_NAMES
+from vftcli.readers.aliases import UR_NAMES
 
 ROWS, START = 25, 1_750_000_000_000_000_001
 ALPHABETICAL = sorted(UR_NAMES)

@@ -7,7 +7,7 @@ import pytest
 import zstandard
 
 from vftcli.readers import opening
-from vftcli.readers.opening import HEAD_BYTES, Digest, head_of, unwrapped
+from vftcli.readers.opening import HEAD_BYTES, Digest, open_log
 from vftcli.signals.errors import LogError
 
 CONTENT = bytes(range(256)) * 1000
@@ -18,25 +18,24 @@ def test_the_head_is_that_of_the_content_whatever_it_is_wrapped_in(tmp_path):
     for wrapping, pack in packers.items():
         path = tmp_path / f"x.{wrapping}"
         path.write_bytes(pack(CONTENT))
-        assert head_of(path) == (CONTENT[:HEAD_BYTES], wrapping)
-        content, cut = unwrapped(path, wrapping)
-        assert (bytes(content), cut) == (CONTENT, False)
+        file = open_log(path)
+        assert (file.head, file.wrapping) == (CONTENT[:HEAD_BYTES], wrapping)
+        assert (bytes(file.content), file.remarks) == (CONTENT, ())
 
 
 @pytest.mark.parametrize("wrapping", ["gzip", "zstd"])
 def test_wrapped_pieces_one_behind_the_other_are_one_content(tmp_path, wrapping):
     pack = gzip.compress if wrapping == "gzip" else zstandard.compress
     (tmp_path / "x").write_bytes(pack(CONTENT) + pack(b"more"))
-    content, _ = unwrapped(tmp_path / "x", wrapping)
-    assert bytes(content) == CONTENT + b"more"
+    assert bytes(open_log(tmp_path / "x").content) == CONTENT + b"more"
 
 
 def test_a_cut_wrapping_yields_what_there_is_and_says_so(tmp_path):
     packed = gzip.compress(hashlib.shake_256(b"noise").digest(100_000))
     (tmp_path / "x").write_bytes(packed[: len(packed) // 2])
-    content, cut = unwrapped(tmp_path / "x", "gzip")
-    assert cut
-    assert 40_000 < len(content) < 60_000
+    file = open_log(tmp_path / "x")
+    assert [remark.code for remark in file.remarks] == ["file-cut"]
+    assert 40_000 < len(file.content) < 60_000
 
 
 def test_a_file_that_unpacks_beyond_its_limit_is_refused(tmp_path, monkeypatch):
@@ -44,7 +43,7 @@ def test_a_file_that_unpacks_beyond_its_limit_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(opening, "UNPACKED_RATIO", 2)
     (tmp_path / "x").write_bytes(gzip.compress(bytes(100_000)))
     with pytest.raises(LogError, match="unpacks to more than"):
-        unwrapped(tmp_path / "x", "gzip")
+        _ = open_log(tmp_path / "x").content
 
 
 @pytest.mark.parametrize(("content", "said"), [(b"", "is empty"), (None, "no such file")])
@@ -52,7 +51,7 @@ def test_what_cannot_be_opened_is_said(tmp_path, content, said):
     if content is not None:
         (tmp_path / "x").write_bytes(content)
     with pytest.raises(LogError, match=said):
-        head_of(tmp_path / "x")
+        open_log(tmp_path / "x")
 
 
 def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):

@@ -6,16 +6,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from vftcli.readers.bags.layout import fields_of, short
 from vftcli.readers.bags.ros_messages import (
     DEFINITIONS,
     FRANKA,
     ROS,
+    fields_of,
     in_parts,
     long_name,
     own_types,
     schema_text,
     serialised,
+    short,
     stamped,
 )
 from vftcli.signals.errors import OutputError

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read, recognise
-from vftcli.readers.joints import UR_NAMES
+from vftcli.readers.aliases import UR_NAMES
 from vftcli.signals.errors import LogError
 
 START = 1_750_000_000_123_456_789

@@ -312,7 +312,7 @@ def test_a_text_loads_no_reader_of_another_container(tmp_path: Path) -> None:
         "import sys; from vftcli.readers import read; read(sys.argv[1]); "
         "heavy = 'h5py', 'mcap', 'pyarrow', 'rosbags', 'scipy'; "
         "ours = (f'vftcli.readers.{name}' for name in "
-        "('arrow', 'bags', 'hdf5', 'lerobot', 'matlab', 'parquet', 'pickles')); "
+        "('arrays', 'bags', 'hdf5', 'lerobot', 'objects', 'parquet')); "
         "sys.exit(str({*heavy, *ours} & set(sys.modules)))"
     )
     words = [sys.executable, "-c", script, str(table_csv(tmp_path / "x"))]

@@ -8,7 +8,7 @@ import pytest
 from made_urdfs import arm, link, robot, written
 
 from vftcli.doctor.examination import Examiner
-from vftcli.readers.joints import UR_NAMES, UR_WORDS
+from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.pairing import paired, places, unwound

@@ -35,7 +35,7 @@ from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
 from vftcli.outputs.files import digest, put_text
 from vftcli.outputs.log.run_record import envelope, to_json
 from vftcli.readers import FORMATS
-from vftcli.readers.reader import open_log
+from vftcli.readers.opening import open_log
 from vftcli.signals.errors import LogError
 
 TOGETHER = 16  #: Episodes that go to a worker together, and into one file of rows.

@@ -20,8 +20,8 @@ from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import grounds, health
 from vftcli.outputs.log.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
-from vftcli.readers.estimates import refuse_estimates
 from vftcli.readers.library import Library
+from vftcli.readers.references import refuse_estimates
 from vftcli.robots.run import Runs
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError

@@ -156,7 +156,7 @@ def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
     Columns are a log's, not those of estimates made from it; a log is no free run of itself.
     """
     if key == "columns":
-        from vftcli.readers.estimates import stored_observers
+        from vftcli.readers.references import stored_observers
 
         return None if any(map(stored_observers, logs)) else value
     if key == "free" and len(logs) == 1:

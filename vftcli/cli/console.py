@@ -180,7 +180,7 @@ def judge_by_jacobian(
 ) -> "JacobianJudgement":
     """What a vendor's torques beside a Jacobian tell of what is asked, with the notes on them."""
     from vftcli.evaluation.logged_jacobian import judge_jacobian
-    from vftcli.readers.jacobian import jacobian_log
+    from vftcli.readers.references import jacobian_log
 
     read = jacobian_log(log, found, choice.read, choice.library.label(log))
     reference = choice.reference.name if choice.reference is not None else None

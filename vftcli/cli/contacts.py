@@ -47,8 +47,8 @@ def list_contacts(
 
     from vftcli.cli.console import LeftOut, say_analysis, stages
     from vftcli.pipeline import analyse_logs, list_touches
-    from vftcli.readers.estimates import stored_observers
     from vftcli.readers.library import Library
+    from vftcli.readers.references import stored_observers
 
     if len(logs) == 1 and logged.reading.words["columns"] is None and stored_observers(logs[0]):
         print_stored(logs[0], form)

@@ -162,8 +162,8 @@ def estimate(
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
-    from vftcli.readers.estimates import refuse_estimates
     from vftcli.readers.library import Library
+    from vftcli.readers.references import refuse_estimates
     from vftcli.readers.table import JacobianError
     from vftcli.signals.packages import check_installed
     from vftcli.signals.recording import EXAMINED

@@ -8,7 +8,7 @@ import polars as pl
 
 from vftcli.evaluation.errors import evaluate
 from vftcli.evaluation.wrenches import evaluate_wrenches
-from vftcli.readers.jacobian import JacobianLog
+from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.parsing import interval_text

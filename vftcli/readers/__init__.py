@@ -5,9 +5,11 @@ from typing import TYPE_CHECKING
 from vftcli.signals.packages import door
 
 if TYPE_CHECKING:
-    from vftcli.readers.formats import FORMATS, LogFormat
-    from vftcli.readers.reader import LogFile, RawLog, ReadChoice
+    from vftcli.readers.opening import LogFile
+    from vftcli.readers.reader import RawLog, ReadChoice
     from vftcli.readers.reading import (
+        FORMATS,
+        LogFormat,
         episode_numbers,
         holds_episodes,
         read,
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
         recognise,
     )
 else:
-    __getattr__ = door(__name__, "formats", "reader", "reading")
+    __getattr__ = door(__name__, "reader", "opening", "reading")
 
 __all__ = [
     "FORMATS",

@@ -9,18 +9,20 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
-from vftcli.readers.joints import effort_of, kinematic_order
+from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
     Cell,
     Pick,
     Picks,
     Table,
+    cells_of,
     checked,
     listed,
     missing_column,
     named_cells,
     pick_of,
 )
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
@@ -34,12 +36,9 @@ HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
 #: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them.
 OWN_STAMPS = "t_src_ns"
 #: Field of Recording → names its columns go by, in lower case and without their index.
-ALIASES: dict[str, tuple[str, ...]] = {
-    field: tuple(names)
-    for field, names in tomllib.loads(
-        (Path(__file__).parent / "aliases.toml").read_text(encoding="utf-8")
-    ).items()
-}
+ALIASES: dict[str, list[str]] = tomllib.loads(
+    (Path(__file__).parent / "aliases.toml").read_text(encoding="utf-8")
+)
 #: Names of libfranka's residual, measured torque minus model: its sign has to be turned.
 TURNED = {"tau_ext_hat_filtered", "state.tau_ext_hat_filtered", "motor_torques_external"}
 #: Names of the six columns of a wrench.
@@ -92,38 +91,39 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
     groups = grouped(table)
     rate = next((item.rate for item in stated if item.rate is not None), None)
     named = [item for item in stated if item.rate is None and item.signal != "_"]
-    told = {item.signal: stated_pick(table, item, groups) for item in named}
-    clock = told.pop("t", None) or (None if rate is not None else _clock(table))
-    signals = list(told.values())
-    find = missing_picks if any(pick.signal == "q" for pick in signals) else found_picks
-    signals += find(table, groups, signals)
+    own = {item.signal: _stated_pick(table, item, groups) for item in named}
+    clock = own.pop("t", None) or (None if rate is not None else clock_pick(table))
+    known = {pick.signal for pick in own.values()}
+    signals = list(own.values())
+    signals += (_missing if "q" in known else _found)(table, groups, signals)
     joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
     # A group of another width is about something else: a gripper, a base.
-    also = {"q", "wrench", *(pick.signal for pick in told.values())}
+    also = {"q", "wrench", *known}
     signals = [p for p in signals if len(p.cells) == (joints or len(p.cells)) or p.signal in also]
     origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
     picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
     q = next(pick.cells for pick in signals if pick.signal == "q")
     names = next((g.joints for g in groups.values() if g.joints and g.cells == q), ())
-    if effort_of(names) == "current" and not {pick.signal for pick in told.values()} & set(EFFORTS):
-        picks = replace(picks, signals=tuple(_as_driven(pick, groups) for pick in picks.signals))
+    if effort_of(names) == "current" and not known & set(EFFORTS):
+        efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
+        for k, pick in enumerate(signals):
+            if pick.signal == "torque" and pick.cells in efforts:
+                signals[k] = replace(pick, signal="current", remark=fact("effort-is-current"))
+        picks = replace(picks, signals=tuple(signals))
     return picks, names
 
 
-def found_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
-    """All signals that are found by their names beside those that are stated."""
+def _found(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
     known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
-    found = []
-    for signal in ALIASES:
-        if signal not in known and (pick := _pick_of(table, signal, groups)) is not None:
-            found += [pick] if taken.isdisjoint(pick.cells) else []
-    if "wrench" not in known and (wrench := _wrench(table)) is not None:
+    picks = [_pick_of(table, signal, groups) for signal in ALIASES if signal not in known]
+    found = [pick for pick in picks if pick is not None and taken.isdisjoint(pick.cells)]
+    if "wrench" not in known and (wrench := wrench_pick(table)) is not None:
         found.append(wrench)
     return found
 
 
-def missing_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
+def _missing(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
     """What a text that names the positions leaves out and no estimate can do without.
 
     Velocities, and an effort where it names none; what two groups could be is left out.
@@ -140,51 +140,41 @@ def missing_picks(table: Table, groups: dict[str, Group], stated: Sequence[Pick]
         fitting = [pick for pick in fitting if taken.isdisjoint(pick.cells)]
         if len(fitting) == 1:
             columns = table.names[fitting[0].cells[0].column]
-            told = fact("signal-by-name", signal=fitting[0].signal, column=columns)
-            found.append(replace(fitting[0], remark=told))
+            remark = fact("signal-by-name", signal=fitting[0].signal, column=columns)
+            found.append(replace(fitting[0], remark=remark))
     return found
 
 
-def _as_driven(pick: Pick, groups: dict[str, Group]) -> Pick:
-    """The effort of UR's drivers as the current that it is, other picks as they are."""
-    efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
-    if pick.signal != "torque" or pick.cells not in efforts:
-        return pick
-    return replace(pick, signal="current", remark=fact("effort-is-current"))
-
-
-def stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
-    """The columns of an item: by pattern, by a name without index, or those found without it."""
-    if item.pattern is None:
-        signal = SIGNALS.get(item.signal, item.signal)
-        found = _clock(table) if signal == "t" else None
-        found = _pick_of(table, signal, groups) if signal in ALIASES else found
-        if signal == "wrench":
-            controllers = groups.get("actual_tcp_force")  # UR's
-            own = None if controllers is None else vendor_pick(signal, signal, controllers.cells)
-            found = _wrench(table) or own
-        if found is None:
-            raise missing_column(table, item.signal, item.signal)
-        pick = pick_of(item, found.cells)
-        return replace(pick, factor=pick.factor * found.factor)
-    group = groups.get(item.pattern.lower())
-    if group is not None and item.pattern not in table.names:
-        return pick_of(item, filled_cells(table, item.pattern, group))
-    return pick_of(item, named_cells(table, item))
+def _stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
+    if item.pattern is not None:
+        group = groups.get(item.pattern.lower())
+        if group is not None and item.pattern not in table.names:
+            return pick_of(item, filled_cells(table, item.pattern, group))
+        return pick_of(item, named_cells(table, item))
+    signal = SIGNALS.get(item.signal, item.signal)
+    found = clock_pick(table) if signal == "t" else None
+    found = _pick_of(table, signal, groups) if signal in ALIASES else found
+    if signal == "wrench":
+        found = wrench_pick(table)
+        if found is None and (controllers := groups.get("actual_tcp_force")):  # UR's
+            found = Pick(signal=signal, cells=controllers.cells)
+    if found is None:
+        raise missing_column(table, item.signal, item.signal)
+    pick = pick_of(item, found.cells)
+    return replace(pick, factor=pick.factor * found.factor)
 
 
 def grouped(table: Table) -> dict[str, Group]:
     """The columns of a table by name without index, in lower case."""
     found: dict[str, dict[int, Cell]] = {}
     twice: dict[str, str] = {}
-    by_joint = joint_columns(table)
+    by_joint = _joint_columns(table)
     in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
     for column, name in enumerate(table.names):
         if column in in_joints:
             continue
         if column in table.lists:
-            cells = {k: Cell(column, k) for k in range(table.lists[column])}
-            found.setdefault(name.lower(), {}).update(cells)
+            found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
         elif match := JOINT_FIRST.fullmatch(name):
             by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
         elif match := INDEXED.fullmatch(name):
@@ -192,22 +182,19 @@ def grouped(table: Table) -> dict[str, Group]:
             stem = FIELD.sub("", match["stem"].lower(), count=1)
             if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
                 twice[stem] = name
-    # By index, not by place: a table may hold q_10 before q_2.
-    groups = {
-        stem: Group(
-            tuple(cells[i] for i in sorted(cells)), tuple(sorted(cells)), twice=twice.get(stem, "")
-        )
-        for stem, cells in found.items()
-    }
-    for stem, cells_of in by_joint.items():
-        order = kinematic_order(tuple(cells_of))
-        names = tuple(tuple(cells_of)[k] for k in order)
-        cells_in_order = tuple(cells_of[name] for name in names)
+    groups = {}
+    for stem, cells in found.items():
+        indices = tuple(sorted(cells))  # not by place: a table may hold q_10 before q_2
+        groups[stem] = Group(tuple(cells[i] for i in indices), indices, twice=twice.get(stem, ""))
+    for stem, cells_by_joint in by_joint.items():
+        each = tuple(cells_by_joint)
+        names = tuple(each[k] for k in kinematic_order(each))
+        cells_in_order = tuple(cells_by_joint[name] for name in names)
         groups[stem] = Group(cells_in_order, tuple(range(len(names))), names)
     return groups
 
 
-def joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
+def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
     """Columns that bear a signal's name beside a joint's: signal → joint → cell.
 
     Names are only taken apart so where two signals have the same joints, and are no axes.
@@ -248,7 +235,9 @@ def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None
             f"{table.path}: the columns of {name} are numbered "
             f"{', '.join(map(str, group.indices[:12]))}, with holes. Name them with --columns."
         )
-    return vendor_pick(signal, name, cells)
+    turned = name in TURNED
+    remark = RESIDUAL_TURNED if turned else None
+    return Pick(signal=signal, cells=cells, factor=-1.0 if turned else 1.0, remark=remark)
 
 
 def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
@@ -266,18 +255,7 @@ def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
     return group.cells
 
 
-def vendor_pick(signal: str, name: str, cells: tuple[Cell, ...]) -> Pick:
-    """The cells of a vendor's field as a signal; libfranka's residual with its sign turned."""
-    turned = name in TURNED
-    return Pick(
-        signal=signal,
-        cells=cells,
-        factor=-1.0 if turned else 1.0,
-        remark=RESIDUAL_TURNED if turned else None,
-    )
-
-
-def _wrench(table: Table) -> Pick | None:
+def wrench_pick(table: Table) -> Pick | None:
     """The six columns of a wrench, or its column of lists; None where one of them is missing."""
     there = enumerate(table.names)
     names = ["" if column in table.lists else name.lower() for column, name in there]
@@ -287,11 +265,11 @@ def _wrench(table: Table) -> Pick | None:
             return Pick(signal="wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
     rows = [c for c, n in enumerate(table.names) if n.lower() == "wrench"]
     if len(rows) == 1 and table.lists.get(rows[0]) == 6:
-        return Pick(signal="wrench", cells=tuple(Cell(rows[0], k) for k in range(6)))
+        return Pick(signal="wrench", cells=cells_of(table, rows[0]))
     return None
 
 
-def _clock(table: Table) -> Pick | None:
+def clock_pick(table: Table) -> Pick | None:
     """The columns of time, None where none bears a name of it: one, or seconds and nanoseconds.
 
     A message's own stamp goes before the time at which a recorder took it.
@@ -332,3 +310,87 @@ def table_clock(table: Table, column: int) -> Cell:
             "row, but a sample has one time. Name another column with --columns, as in t=…,q=…"
         )
     return Cell(column, 0 if column in table.lists else None)
+
+
+#: The UR drivers' joint names, base to tip; the arrays of the ROS 1 driver are alphabetical.
+UR_NAMES = (
+    "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
+    "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
+)  # fmt: skip
+#: The names on UR's teach pendant, base to tip.
+UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
+
+FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
+NUMBERED = re.compile(r".*?joint[_ ]?(\d{1,9})", re.IGNORECASE)
+
+HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}  #: Stem of Franka's joint names → profile.
+
+
+def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
+    """Positions of the arm's joints among `names`, base to tip.
+
+    Franka and UR joints are found by name wherever they stand, prefixes and further joints (a
+    gripper's fingers) set aside; UR's words and joints called joint1, joint_2, … where there are no
+    others. Unknown names keep the file's order.
+    """
+    words = [re.sub(r"[_ ]+", " ", name.lower()).strip() for name in names]
+    numbers = (NUMBERED.fullmatch(name) for name in names)
+    every: tuple[tuple[int, list[int | None]], ...] = (
+        (7, [int(m[2]) if (m := FRANKA.fullmatch(name)) else None for name in names]),
+        (6, [next((j for j, u in enumerate(UR_NAMES) if n.endswith(u)), None) for n in names]),
+        (6, [UR_WORDS.index(w) if len(words) == 6 and w in UR_WORDS else None for w in words]),
+        (len(names), [int(m[1]) if m else None for m in numbers]),
+    )
+    for count, places in every:
+        found = {place: k for k, place in enumerate(places) if place is not None}
+        if len(found) == count == len(places) - places.count(None):
+            return tuple(found[place] for place in sorted(found))
+    return tuple(range(len(names)))
+
+
+def along_arm(
+    names: tuple[str, ...], signals: dict[str, Array]
+) -> tuple[tuple[str, ...], dict[str, Array]]:
+    """Joints base to tip without a gripper's fingers: their names, and signals with a column each.
+
+    Of an arm of six joints the wrench has as many columns, but they are no joints.
+    """
+    order = kinematic_order(names)
+    if order == tuple(range(len(names))):
+        return names, signals
+    ordered = {
+        signal: value[:, list(order)]
+        if signal != "wrench" and value.ndim == 2 and value.shape[1] == len(names)
+        else value
+        for signal, value in signals.items()
+    }
+    return tuple(names[k] for k in order), ordered
+
+
+def effort_of(names: Sequence[str]) -> str:
+    """The signal of a JointState's effort by its joints' names: UR's drivers publish currents."""
+    is_ur = len(names) == len(UR_NAMES) and all(name.endswith(UR_NAMES) for name in names)
+    return "current" if is_ur else "torque"
+
+
+def laid_along(raw: RawLog, names: tuple[str, ...], request: ReadChoice) -> RawLog:
+    """A log of JointState messages with its joints base to tip, its effort by their names."""
+    items = request.spec.items
+    if any("|" in (item.pattern or "") for item in items):
+        return raw
+    width = raw.signals["q"].shape[1]
+    if len(names) != width:
+        raise LogError(f"{len(names)} names of joints for {width} positions: {', '.join(names)}")
+    names, signals = along_arm(names, dict(raw.signals))
+    remarks, stated = raw.remarks, {SIGNALS.get(item.signal) for item in items}
+    if effort_of(names) == "current" and "torque" in signals and not stated & set(EFFORTS):
+        signals["current"] = signals.pop("torque")
+        remarks = (*remarks, fact("effort-is-current"))
+    hint = robot_of(names)
+    return replace(raw, signals=signals, joint_names=names, robot_hint=hint, remarks=remarks)
+
+
+def robot_of(names: Sequence[str]) -> str | None:
+    """The profile that joint names settle; UR names do not tell the model."""
+    stems = {m[1] for name in names if (m := FRANKA.fullmatch(name))}
+    return HINTS.get(stems.pop()) if len(stems) == 1 else None

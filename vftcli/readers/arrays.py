@@ -1,27 +1,31 @@
-"""Named arrays: NumPy's files, JSON of any shape, dictionaries that panda-py and frankapy give."""
+"""Named arrays: NumPy's and MATLAB's files, JSON of any shape, dictionaries of panda-py, frankapy.
 
-import json
-import re
+MATLAB's files are read by SciPy (version 5) or h5py (7.3): variables, or one level of structs.
+"""
+
 import tokenize
+import warnings
 import zipfile
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
-from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.opening import check_unpacked
-from vftcli.readers.pickles import load_arrays_only
-from vftcli.readers.reader import Episodes, LogFile, RawLog, ReadChoice
-from vftcli.readers.table import Column
+from vftcli.readers.aliases import CLOCKS
+from vftcli.readers.hdf5 import level_of, opened, table_of
+from vftcli.readers.objects import columns_of, columns_of_lines, lines_of, load_arrays_only, parsed
+from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpacked_limit
+from vftcli.readers.reader import Episodes, RawLog, ReadChoice
+from vftcli.readers.reading import FORMATS, LogFormat
+from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
-from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
@@ -30,26 +34,22 @@ NOT_AN_ARRAY = (
     ValueError, EOFError, OSError, MemoryError, SyntaxError, TypeError, KeyError, OverflowError,
     RecursionError, tokenize.TokenError,
 )  # fmt: skip
-#: Bytes of objects that a document may be parsed into; one a line may be of any length.
-MEMORY_LIMIT = 768 * 1024 * 1024
-#: Letter → bytes of the object that it begins, at most.
-COSTS = {b"[": 64, b"{": 72, b",": 40, b":": 110}
-LONGEST_LINE = 1 << 20  #: Letters of one sample.
-CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
-#: Numbers that are none as C++ streams print them, libfranka's among them.
-NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
-
-Objects = list[dict[str, Any]]
+#: What is raised for a bundle of arrays that is damaged.
+NOT_A_BUNDLE = (
+    zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError,
+)  # fmt: skip
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read an .npy or .npz file, or states that libfranka printed one a line."""
+    """Read an .npy, .npz or .mat file, or states that libfranka printed one a line."""
+    if layout.name == "mat":
+        return _read_matlab(file, request)
     if layout.name == "npz":
-        return read_arrays(file, npz_arrays(file), request)
+        return _read_arrays(file, request, _npz_arrays(file))
     if layout.name == "npy":
-        array = npy_array(file.path, file.head, file.content)
+        array = _npy_array(file.path, file.head, file.content)
         if not array.dtype.names:
-            return read_rows(file, array, request)
+            return _read_rows(file, array, request)
         columns = {name: array[name] for name in array.dtype.names}
         return from_table(ArrayTable(path=file.path, columns=columns), request)
     lines = list(lines_of(file.content))
@@ -57,71 +57,57 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     columns, remarks = columns_of_lines(file, states)
     if skipped := len(lines) - len(states):
         remarks = (fact("lines-skipped", lines=skipped), *remarks)
-    return read_layout(
-        ArrayTable(path=file.path, columns=columns, remarks=remarks), layout, request
-    )
+    table = ArrayTable(path=file.path, columns=columns, remarks=remarks)
+    return read_layout(table, layout, request)
 
 
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
-    """The logs of JSON or a pickle: the skills of frankapy's, or the one of whichever shape."""
+    """The logs of JSON or a pickle: the skills of frankapy's, or the one of whichever shape.
+
+    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's get_log() is one.
+    """
     packed = file.head.startswith(b"\x80")
     first = file.first_line.strip()
     # One object a line: the first line is one by itself, and is not all.
     if not packed and len(file.lines) > 1 and first.startswith(b"{") and first.endswith(b"}"):
-        yield {0: partial(read_lines, file)}
+        yield {0: lambda r: _read_arrays(file, r, *columns_of_lines(file, lines_of(file.content)))}
         return
     log = load_arrays_only(file) if packed else parsed(file)
-    if isinstance(log, dict):
-        yield dictionary_episodes(file, log)
-    elif packed:
-        raise LogError(
-            f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of arrays. "
-            "Save the log with np.savez."
-        )
-    else:
-        yield {0: partial(read_list, file, log)}
-
-
-def dictionary_episodes(file: LogFile, log: Mapping[Any, Any]) -> Episodes:
-    """The logs of a dictionary of arrays or lists: frankapy's skills, else the one.
-
-    frankapy has one dictionary a skill, {0: {skill_state_dict: {…}}}; panda-py's get_log() is one.
-    """
+    if not isinstance(log, dict):
+        if packed:
+            raise LogError(
+                f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of "
+                "arrays. Save the log with np.savez."
+            )
+        yield {0: partial(_read_list, file, log)}
+        return
     held = [value.get(SKILL) for value in log.values() if isinstance(value, dict)]
     if skills := [states for states in held if isinstance(states, dict)]:
-        return {k: partial(read_skill, file, states) for k, states in enumerate(skills)}
-    if len(log) == 1 and isinstance(inner := next(iter(log.values())), dict):
-        log = inner
-    return {0: lambda request: read_arrays(file, arrays_of_lists(file, log), request)}
+        yield {k: partial(_read_skill, file, states) for k, states in enumerate(skills)}
+        return
+    inner = next(iter(log.values())) if len(log) == 1 else None
+    log = inner if isinstance(inner, dict) else log
+    yield {0: lambda request: _read_arrays(file, request, _arrays_of_lists(file, log))}
 
 
-def read_skill(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
-    """Read the states of one of frankapy's skills."""
+def _read_skill(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> RawLog:
     if "time_since_skill_started" in log:
-        arrays = arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
+        arrays = _arrays_of_lists(file, {**log, "time": log["time_since_skill_started"]})
         usual = {"time": "t[s]", "q": "q[rad]", "dq": "dq", "tau_J": "tau"}
         items = [f"{signal}={name}" for name, signal in usual.items() if name in arrays]
         request = replace(request, columns=request.columns or ",".join(items))
         log = {name: arrays[name] for name in usual if name in arrays}
-    return read_arrays(file, arrays_of_lists(file, log), request)
+    return _read_arrays(file, request, _arrays_of_lists(file, log))
 
 
-def read_lines(file: LogFile, request: ReadChoice) -> RawLog:
-    """Read objects of JSON, one a line."""
-    columns, remarks = columns_of_lines(file, lines_of(file.content))
-    return read_arrays(file, columns, request, *remarks)
-
-
-def read_list(file: LogFile, log: list[Any], request: ReadChoice) -> RawLog:
-    """Read a list of objects, or a list of rows."""
+def _read_list(file: LogFile, log: list[Any], request: ReadChoice) -> RawLog:
     if log and all(isinstance(row, dict) for row in log):
-        return read_arrays(file, columns_of(file, log, 1), request)
-    return read_rows(file, arrays_of_lists(file, {"rows": log})["rows"], request)
+        return _read_arrays(file, request, columns_of(file, log, 1))
+    return _read_rows(file, _arrays_of_lists(file, {"rows": log})["rows"], request)
 
 
-def read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
-    """Read a matrix, a row a sample."""
+def _read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
     if rows.ndim != 2 or rows.size == 0:
         raise NoLogError(
             f"{file.path}: an array of shape {rows.shape}; a log is a matrix, a row a sample."
@@ -130,8 +116,11 @@ def read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
     return from_table(ArrayTable(path=file.path, columns=columns, headed=False), request)
 
 
-def read_arrays(
-    file: LogFile, arrays: Mapping[str, Column], request: ReadChoice, *remarks: Remark
+def _read_arrays(
+    file: LogFile,
+    request: ReadChoice,
+    arrays: Mapping[str, Column],
+    remarks: tuple[Remark, ...] = (),
 ) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias."""
     # Rows of matrices are laid out flat, a column of single numbers is a row of them.
@@ -149,8 +138,7 @@ def read_arrays(
     return from_table(table, request)
 
 
-def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
-    """The arrays of a dictionary of arrays or of lists of equally long arrays."""
+def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     arrays = {}
     for name, value in log.items():
         rows = value.shape[0] if isinstance(value, np.ndarray) and value.ndim else 0
@@ -167,34 +155,29 @@ def arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
     return arrays
 
 
-def npz_arrays(file: LogFile) -> dict[str, Column]:
+def _npz_arrays(file: LogFile) -> dict[str, Column]:
     """The arrays of an .npz file by name, unpacked within bounds."""
     arrays = {}
-    try:
-        with zipfile.ZipFile(BytesIO(file.content)) as bundle:
-            total = sum(member.file_size for member in bundle.infolist())
-            check_unpacked(file.path, total, len(file.content))
-            for member in bundle.infolist():
-                if member.filename.endswith(".npy"):
-                    with bundle.open(member) as stream:
-                        content = stream.read(total + 1)
-                    name = member.filename.removesuffix(".npy")
-                    arrays[name] = npy_array(file.path, content, content)
-    except (
-        zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError,
-    ) as e:  # fmt: skip
-        reason = str(e).split("\n")[0][:120]
-        raise LogError(f"{file.path}: a damaged .npz file ({reason})") from None
+    with naming_damage(file.path, "a damaged .npz file", NOT_A_BUNDLE):
+        bundle = zipfile.ZipFile(BytesIO(file.content))
+        total = sum(member.file_size for member in bundle.infolist())
+        check_unpacked(file.path, total, len(file.content))
+        for member in bundle.infolist():
+            if member.filename.endswith(".npy"):
+                with bundle.open(member) as stream:
+                    content = stream.read(total + 1)
+                name = member.filename.removesuffix(".npy")
+                arrays[name] = _npy_array(file.path, content, content)
     return arrays
 
 
-def npy_array(path: Path, head: bytes, content: Any) -> Column:  # noqa: ANN401 - a buffer
+def _npy_array(path: Path, head: bytes, content: Any) -> Column:  # noqa: ANN401 - a buffer
     """One array of an .npy file, never executing what it may carry.
 
     What the header claims is compared with the file's size before it is believed.
     """
     stream = BytesIO(head)
-    try:
+    with naming_damage(path, "not a readable .npy file", NOT_AN_ARRAY):
         version = np.lib.format.read_magic(stream)
         header = {
             (1, 0): np.lib.format.read_array_header_1_0,
@@ -202,115 +185,119 @@ def npy_array(path: Path, head: bytes, content: Any) -> Column:  # noqa: ANN401 
         }[version]
         shape, _, dtype = header(stream)
         claimed = int(np.prod([int(s) for s in shape], dtype=object)) * dtype.itemsize
-    except NOT_AN_ARRAY as error:
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: not a readable .npy file ({reason})") from None
     if claimed != len(content) - stream.tell() or any(s < 0 for s in shape):
         raise LogError(
             f"{path}: the header claims {claimed} bytes of numbers, the file holds "
             f"{len(content) - stream.tell()}; it is cut, damaged, or holds more than one array."
         )
-    try:
+    with naming_damage(path, "not a readable array", NOT_AN_ARRAY, ". Save it with np.save."):
         return np.asarray(np.lib.format.read_array(BytesIO(content), allow_pickle=False))
-    except NOT_AN_ARRAY as error:
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: not a readable array ({reason}). Save it with np.save.") from None
 
 
-def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
-    """The lines that are not empty, with their numbers from 1."""
-    start, number = 0, 0
-    data: Any = content.obj
-    if data.find(b"\n") < 0:
-        data = bytes(data).replace(b"\r", b"\n")
-    while start < len(content):
-        number += 1
-        end = data.find(b"\n", start)
-        end = len(content) if end < 0 else end
-        if line := data[start : min(end, start + LONGEST_LINE + 1)].strip():
-            yield number, line
-        start = end + 1
+V73 = b"MATLAB 7.3 MAT-file"  #: How a file of HDF5 begins.
+HEADER, TAG = 128, 8  #: Bytes before the first variable, and of the tag before each.
+COMPRESSED = 15  #: Type of a variable that is packed.
+#: MATLAB's classes that may be signals, or hold them.
+MATLAB_NUMBERS = {
+    "double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64",
+    "logical", "struct",
+}  # fmt: skip
+#: What SciPy raises for a file that is none.
+NOT_MATLAB = (
+    ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OSError, zlib.error,
+    MemoryError, OverflowError, RecursionError, NotImplementedError, UnicodeError, SystemError,
+)  # fmt: skip
 
 
-def columns_of_lines(
-    file: LogFile, lines: Iterable[tuple[int, bytes]]
-) -> tuple[dict[str, Column], tuple[Remark, ...]]:
-    """The numbers of objects, one a line; a last one that is cut is left out and said."""
-    blocks: list[dict[str, Column]] = []
-    objects: Objects = []
-    waiting: int | None = None
-    first = number = 1
-    for number, line in lines:
-        if waiting is not None:
-            raise LogError(f"{file.path}: line {waiting} is not one JSON object.")
-        if (found := object_in(line)) is None:
-            waiting = number
-            continue
-        objects.append(found)
-        if len(objects) == CHUNK_LINES:
-            blocks.append(columns_of(file, objects, first))
-            objects, first = [], number + 1
-    if objects:
-        blocks.append(columns_of(file, objects, first))
-    if not blocks:
-        raise LogError(f"{file.path}: no line holds a JSON object.")
-    if any(block.keys() != blocks[0].keys() for block in blocks):
-        raise LogError(f"{file.path}: its lines do not hold the same fields.")
-    try:
-        columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
-    except ValueError:
-        raise LogError(f"{file.path}: a field differs in length from line to line.") from None
-    return columns, (fact("line-cut"),) if waiting is not None else ()
+def _read_matlab(file: LogFile, request: ReadChoice) -> RawLog:
+    """Read a .mat file, a row a sample; signals of joints × samples are turned, and said.
+
+    The length of the time says which is which.
+    """
+    variables = _matlab_73(file) if file.head.startswith(V73) else _matlab_5(file)
+    if not variables:
+        raise LogError(f"{file.path}: a MATLAB file without variables of numbers, so no log.")
+    level = "" if request.spec.item("q") else level_of(file.path, list(variables), ".")
+    columns = {
+        name.removeprefix(level): array.ravel() if 1 in array.shape else array
+        for name, array in variables.items()
+        if name.startswith(level) or "." not in name
+    }
+    lengths = {len(a) for name, a in columns.items() if a.ndim == 1 and _is_clock(name)}
+    turned = [
+        name
+        for name, array in columns.items()
+        if array.ndim == 2 and len(array) not in lengths and array.shape[1] in lengths
+    ]
+    columns |= {name: columns[name].T for name in turned}
+    remarks = (fact("signals-turned", signals=listed(turned)),) if turned else ()
+    return from_table(ArrayTable(path=file.path, columns=columns, remarks=remarks), request)
 
 
-def object_in(line: bytes) -> dict[str, Any] | None:
-    """The object that a line holds, the fields of those in it as outer.inner; None for none."""
-    if len(line) > LONGEST_LINE:
-        return None
-    words = {b"nan": b"NaN", b"inf": b"Infinity"}
-    try:
-        found = json.loads(NOT_JSON.sub(lambda m: m[1] + words[m[2]], line))
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(found, dict):
-        return None
-    flat: dict[str, Any] = {}
-    for name, value in found.items():
-        inner = value.items() if isinstance(value, dict) else ()
-        flat |= {f"{name}.{key}": v for key, v in inner} if inner else {name: value}
-    return flat
+def _is_clock(name: str) -> bool:
+    return name.rpartition(".")[2].lower() in CLOCKS
 
 
-def columns_of(file: LogFile, objects: Objects, first: int) -> dict[str, Column]:
-    """The numeric fields of some objects, a row an object."""
-    columns: dict[str, Column] = {}
-    for name, value in objects[0].items():
-        held = value if isinstance(value, list) and value else [value]
-        if not all(isinstance(v, int | float) for v in held):
-            continue
-        try:
-            columns[name] = np.array([entry[name] for entry in objects], dtype=np.float64)
-        except (KeyError, ValueError, TypeError, OverflowError):
-            shown = printable(name[:40])
-            raise LogError(
-                f"{file.path}: {shown} is not the same numbers in each of the objects from "
-                f"{first} to {first + len(objects) - 1}."
-            ) from None
-    return columns
+def _matlab_73(file: LogFile) -> dict[str, Column]:
+    """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
+    with opened(file) as content:
+        table = table_of(file.path, content, fewest_rows=1)
+        names = {k: n.replace("/", ".") for k, n in enumerate(table.names) if not n.startswith("#")}
+        table.check_size(list(names))
+        # MATLAB writes column by column, which HDF5 reads as rows.
+        return {
+            name: table.load([k], k if _is_clock(name) else None)[k].T for k, name in names.items()
+        }
 
 
-def parsed(file: LogFile) -> Any:  # noqa: ANN401 - of JSON
-    """The one value of a file: an object or a list."""
-    content = bytes(file.content)
-    if sum(cost * content.count(letter) for letter, cost in COSTS.items()) > MEMORY_LIMIT:
-        raise LogError(
-            f"{file.path}: a JSON document of {len(file.content) >> 20} MiB, too many values to "
-            "hold. Save the log with np.savez, or an object a line."
-        )
-    try:
-        return json.loads(content)
-    except RecursionError:
-        raise LogError(f"{file.path}: JSON nested too deeply to be a log.") from None
-    except ValueError as error:
-        reason = printable(str(error).split("\n")[0][:120])
-        raise LogError(f"{file.path}: looks like JSON and is not ({reason}).") from None
+def _matlab_5(file: LogFile) -> dict[str, Column]:
+    """The variables of numbers of a file of version 5, and those of its structs as struct.name."""
+    _check_matlab(file)
+    from scipy.io import loadmat, whosmat
+
+    stream: Any = BytesIO(file.content)
+    with naming_damage(file.path, "a damaged MATLAB file", NOT_MATLAB), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of what is left out
+        there = [(name, shape) for name, shape, kind in whosmat(stream) if kind in MATLAB_NUMBERS]
+        claimed = sum(8 * int(np.prod(shape, dtype=object)) for _, shape in there)
+        check_unpacked(file.path, claimed, len(file.content))
+        names = [name for name, _ in there]
+        loaded = loadmat(stream, variable_names=names, simplify_cells=True)
+    return dict(_flat(loaded))
+
+
+def _flat(variables: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Column]]:
+    """Variables that are one or two dimensions of numbers, those of structs one level down."""
+    found: list[tuple[str, Column]] = []
+    for name, value in variables.items():
+        if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.ndim in {1, 2}:
+            found += [(prefix + name, value)] if value.size else []
+        elif isinstance(value, dict) and not prefix:
+            found += _flat(value, f"{name}.")
+    return found
+
+
+def _check_matlab(file: LogFile) -> None:
+    """Check what the packed variables of a file unpack to, before any is kept."""
+    content, place, total = file.content, HEADER, 0
+    order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
+    while place + TAG <= len(content):
+        kind = int.from_bytes(content[place : place + 4], order)
+        size = int.from_bytes(content[place + 4 : place + TAG], order)
+        packed = content[place + TAG : place + TAG + size]
+        if len(packed) < size:
+            raise LogError(f"{file.path}: the MATLAB file is cut within a variable.")
+        total += size
+        if kind == COMPRESSED:
+            total += _unpacked_size(packed, unpacked_limit(len(content))) - size
+        check_unpacked(file.path, total, len(content))
+        place += TAG + size
+
+
+def _unpacked_size(packed: memoryview, limit: int) -> int:
+    unpacker, total, rest = zlib.decompressobj(), 0, bytes(packed)
+    with suppress(zlib.error):  # said when it is read
+        while rest and total <= limit and not unpacker.eof:
+            total += len(unpacker.decompress(rest, 1 << 20))
+            rest = unpacker.unconsumed_tail
+    return total

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.joining import joined
 from vftcli.readers.reader import RawLog
+from vftcli.readers.table import joined
 from vftcli.signals.arrays import (
     Array,
     Indices,
@@ -34,13 +34,8 @@ def kept(raw: RawLog, keep: Mask | slice, *remarks: Remark) -> RawLog:
             dict(zip(raw.signals, (value[here] for value in values), strict=True))
             for here, *values in parts
         )
-    return replace(
-        raw,
-        rows=rows[keep],
-        stamps=raw.stamps[keep],
-        signals=signals,
-        remarks=(*raw.remarks, *remarks),
-    )
+    remarks, stamps = (*raw.remarks, *remarks), raw.stamps[keep]
+    return replace(raw, rows=rows[keep], stamps=stamps, signals=signals, remarks=remarks)
 
 
 def without_unknown_rows(raw: RawLog) -> RawLog:
@@ -204,7 +199,11 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
     if not absurd.any() or absurd.all():
         return raw
     absurd |= tiny  # tiny values alone are a simulation at rest
-    jump = last_jump(raw, head.stop)
+    steps = np.diff(raw.stamps[head].astype(np.float64) * raw.tick)
+    usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
+    # The row after the last backward or enormous step, or 0.
+    jumps = np.flatnonzero(~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))) + 1
+    jump = int(jumps[-1]) if jumps.size else 0
     if not absurd[0] and jump == 0:
         return raw  # a lone bad value among good rows of one clock is not a misaligned packet
     count = max(int(np.flatnonzero(absurd)[-1]) + 1, jump)
@@ -213,14 +212,6 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
     code = "leading-garbage" if count > 1 else "leading-garbage-row"
     good = kept(raw, slice(count, None), fact(code, rows=count))
     return replace(good, first_row=raw.first_row + count)
-
-
-def last_jump(raw: RawLog, rows: int) -> int:
-    """Index of the row after the last backward or enormous step among the first rows, or 0."""
-    steps = np.diff(raw.stamps[:rows].astype(np.float64) * raw.tick)
-    usual = np.median(np.diff(raw.stamps.astype(np.float64))) * raw.tick
-    jumps = ~((steps >= 0) & (steps <= max(60.0, 1000 * usual)))
-    return int(np.flatnonzero(jumps)[-1]) + 1 if jumps.any() else 0
 
 
 #: What a column of a signal is that is none of a joint.

@@ -1,9 +1,19 @@
-"""The --columns grammar: which column of a table holds which signal, in which unit and sign."""
+"""Which column of a table holds which signal, in which unit and sign: the --columns grammar.
+
+And what the values of a table without a header settle of it, as a text of that grammar.
+"""
 
 import re
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
+import numpy as np
+
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
+from vftcli.signals.series import median_step
 
 #: Name in --columns → field of Recording. `t` is the clock and `_` skips.
 SIGNALS: dict[str, str] = {
@@ -113,13 +123,11 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
 
 
 def _split(text: str) -> list[str]:
-    """Split at the commas that stand outside brackets."""
     parts = re.split(r",(?![^\[]*\])", text)
     return [part.strip() for part in parts if part.strip()]
 
 
 def _without_segment(parts: list[str]) -> tuple[list[str], int | None]:
-    """The items but for segment=N, and that number."""
     numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
     if not numbers:
         return parts, None
@@ -129,7 +137,6 @@ def _without_segment(parts: list[str]) -> tuple[list[str], int | None]:
 
 
 def _parse_item(part: str) -> Item:
-    """One item of the text."""
     match = ITEM.fullmatch(part)
     if match is None:
         raise LogError(
@@ -143,8 +150,13 @@ def _parse_item(part: str) -> Item:
         )
     if name == "_" and (match["pattern"] or match["minus"]):
         raise LogError(f"--columns: {part!r}: _ only skips, as in _:13.")
-    factor = unit_factor(name, match["unit"]) * (-1.0 if match["minus"] else 1.0)
-    rate = _rate(part, name, match["rate"])
+    factor = _unit_factor(name, match["unit"]) * (-1.0 if match["minus"] else 1.0)
+    rate = None
+    if match["rate"] is not None:
+        with suppress(ValueError):
+            rate = float(match["rate"])
+        if name != "t" or rate is None or not 0 < rate < 1e7:
+            raise LogError(f"--columns: {part!r}: a table without a clock is given as t@125Hz.")
     if match["count"] == "*":
         if name != "_":
             raise LogError(f"--columns: {part!r}: only _:* covers all columns that are left.")
@@ -162,20 +174,7 @@ def _parse_item(part: str) -> Item:
     )
 
 
-def _rate(part: str, name: str, text: str | None) -> float | None:
-    """The rate behind @, None where there is none. [Hz]"""
-    if text is None:
-        return None
-    try:
-        rate = float(text)
-    except ValueError:
-        rate = 0.0
-    if name != "t" or not 0 < rate < 1e7:
-        raise LogError(f"--columns: {part!r}: a table without a clock is given as t@125Hz.")
-    return rate
-
-
-def unit_factor(signal: str, unit: str | None) -> float:
+def _unit_factor(signal: str, unit: str | None) -> float:
     """Factor from a unit in brackets to SI; the bracket of a wrench names its frame instead."""
     if unit is None or signal in {"wrench", "_"}:
         return 1.0
@@ -183,3 +182,186 @@ def unit_factor(signal: str, unit: str | None) -> float:
     if unit not in units:
         raise LogError(f"--columns: {signal} has no unit {unit!r}; units: {', '.join(units)}.")
     return units[unit]
+
+
+def tick_of(stamps: Array, name: str) -> tuple[float, str]:
+    """Length of a tick of unstated unit: from the name, else from the size of stamps and steps.
+
+    Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
+    everything else is seconds.
+    """
+    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+    if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
+        return units[match[1]], match[1]
+    if len(stamps) == 0:
+        return 1.0, "s"
+    usual = abs(float(stamps[len(stamps) // 2]))  # the first may be garbage
+    # Counts since 1970 are near 1.7e18 ns, 1.7e15 µs and 1.7e12 ms.
+    for size, unit in ((1e17, "ns"), (1e14, "us"), (1e11, "ms")):
+        if size < usual < 1e20:
+            return units[unit], unit
+    step = median_step(stamps) if len(stamps) > 1 else 0.0
+    whole = stamps.dtype.kind in "iu" or bool(np.all(np.mod(stamps[:1000], 1) == 0))
+    return (1e-3, "ms") if whole and 0.8 <= step <= 1.2 else (1.0, "s")
+
+
+ROWS = 20_000  #: Rows that are looked at; of more, the first.
+FITTED = 2000  #: Rows, of these, by which a drive constant is told.
+JOINTS = range(3, 13)  #: Numbers of joints that a table may be of.
+#: Rows over which a velocity's integral is compared with the change of a position.
+STEPS = (1, 4, 16, 64)
+OPEN = 0.35  #: Share of a position's change that its own velocity may leave; another's leaves 1.
+STILL = 0.02  #: Travel below which a joint need not show which velocity is its own. [rad]
+EVEN = 20.0  #: How much longer than the median a twentieth of a clock's steps are at most.
+#: Misfit of a current to a torque divided by its drive constant, friction left free.
+#:
+#: Of a UR10e's target current .02 to .09, of its measured current .06 to .6.
+DRIVEN = 0.12
+CLEAR = 1.3  #: How much better than another current it must fit.
+CONSTANTS = (3.0, 400.0)  #: Drive constants of geared joints. [N·m/A]
+#: Slope and cosine between a target and what was measured, of the joint where they are nearest.
+ALIKE, NEAR = (0.5, 2.0), 0.9
+
+
+class Guess(NamedTuple):
+    """What the values of a table say."""
+
+    columns: str  #: The text for --columns.
+    why: str  #: What was found, in words.
+    #: Further texts that fit as well; empty where the values settle it.
+    others: tuple[str, ...] = ()
+
+
+def guessed(columns: Sequence[Array]) -> Guess | None:
+    """What the columns (T,) of a table without a header are by their values, in file order.
+
+    A clock steps evenly, velocities are the derivative of positions, and a controller's target
+    torque is its target current times a constant, but for friction. None where no clock, or no
+    positions with their velocities behind them, are found.
+    """
+    table = np.stack([np.asarray(column[:ROWS], dtype=np.float64) for column in columns], axis=1)
+    clock = np.asarray(columns[0][:ROWS])
+    if len(table) < 2 * STEPS[-1] or not np.isfinite(table).all() or not _is_clock(clock):
+        return None
+    t = (clock - clock[0]).astype(np.float64) * tick_of(clock, "")[0]
+    matches = _derivatives(t, table)
+    fitting = [n for n in JOINTS if 2 * n < table.shape[1] and _is_layout(matches, table, n)]
+    if len(fitting) != 1:
+        return None
+    joints, start = fitting[0], 1 + 2 * fitting[0]
+    blocks, left = divmod(len(columns) - start, joints)
+    parts = [table[:, start + k * joints : start + (k + 1) * joints] for k in range(blocks)]
+    few = slice(None, None, len(table) // FITTED + 1)
+    found, why = _efforts([part[few] for part in parts], table[few, 1 + joints : start])
+    rest = left if found else (blocks - 1) * joints + left
+    skipped = f",_:{rest}" if rest else ""
+    texts = [
+        ",".join(["t", *(f"{name}:{joints}" for name in ("q", "dq", *names))]) + skipped
+        for names in found or [(name,) for name in SINGLE]
+    ]
+    settled = len(found) == 1 and not left
+    others = () if settled else tuple(texts[1:]) or (texts[0],)
+    return Guess(texts[0], f"the first steps evenly, dq is the derivative of q{why}", others)
+
+
+#: What the numbers behind the velocities may be, the likeliest first.
+SINGLE = ("tau", "current", "tau+g")
+
+
+def _is_clock(stamps: Array) -> bool:
+    steps = np.diff(stamps)
+    if not np.all(steps >= 0):
+        return False
+    usual = median_step(stamps)
+    return bool(usual > 0 and np.quantile(steps, 0.95) < EVEN * usual)
+
+
+def _is_layout(matches: Mask, table: Array, joints: int) -> bool:
+    """Whether all that moves in q:n has its derivative in dq:n, and no other column has one."""
+    rows, columns = np.nonzero(matches)
+    inside = (rows >= 1) & (rows <= joints) & (columns == rows + joints)
+    if not rows.size or not inside.all():
+        return False
+    positions = table[:, 1 : 1 + joints]
+    moves = np.ptp(positions, axis=0) > STILL
+    places = np.arange(1, 1 + joints)[moves]
+    return bool(matches[places, places + joints].all())
+
+
+def _derivatives(t: Array, table: Array) -> Mask:
+    """Which column (the first index) has which as its derivative. (k, k)
+
+    What the integral of the other column leaves of a position's change over some rows is compared.
+    """
+    width = table.shape[1]
+    steps = np.diff(t)[:, None]
+    integral = np.vstack([np.zeros(width), np.cumsum((table[1:] + table[:-1]) / 2 * steps, axis=0)])
+    best = np.full((width, width), np.inf)
+    for step in STEPS:
+        change, area = (np.diff(values[::step], axis=0) for values in (table, integral))
+        own, other = np.sum(change**2, axis=0), np.sum(area**2, axis=0)
+        left = own[:, None] + other[None, :] - 2 * change.T @ area
+        share = np.full((width, width), np.inf)
+        live = own > 0
+        share[live] = left[live] / own[live, None]
+        best = np.minimum(best, share)
+    best[0] = best[:, 0] = np.inf
+    np.fill_diagonal(best, np.inf)
+    # A slow joint's change may look like the integral of several columns: the nearest is its own.
+    alike: Mask = (best < OPEN**2) & (best == best.min(axis=1, keepdims=True))
+    return alike
+
+
+def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], str]:
+    """All readings of the blocks of columns behind the velocities that fit, by name, and why."""
+    if not parts:
+        return [()], ""
+    if len(parts) != 3:
+        return [], ""
+    pairs = sorted((fit for fit in _driven(parts, dq) if fit[0] < DRIVEN), key=lambda fit: fit[0])
+    readings = []
+    for misfit, torque, current, constants in pairs:
+        measured = 3 - torque - current
+        if misfit > CLEAR * pairs[0][0] or not _alike(parts[measured], parts[current]):
+            continue
+        names = {measured: "current", current: "target_current", torque: "target_torque"}
+        shown = " ".join(f"{constant:.3g}" for constant in constants)
+        readings.append((tuple(names[k] for k in range(3)), shown))
+    if len(readings) != 1:
+        return [names for names, _ in readings], ""
+    why = f", target_torque is target_current times {readings[0][1]} N·m/A but for friction"
+    return [readings[0][0]], why
+
+
+def _driven(
+    parts: Sequence[Array], dq: Array
+) -> Iterator[tuple[float, int, int, tuple[float, ...]]]:
+    """Misfit of blocks as torque and current, friction beside it; both; constants [N·m/A]."""
+    for torque, current in ((a, b) for a in range(len(parts)) for b in range(len(parts)) if a != b):
+        size = np.sqrt(np.mean(parts[current] ** 2, axis=0))
+        if np.abs(parts[torque]).max() < CONSTANTS[0] * np.abs(parts[current]).max():
+            continue
+        live = np.flatnonzero(size > 2e-3 * size.max())
+        fits = [_fitted(parts[torque][:, j], parts[current][:, j], dq[:, j]) for j in live]
+        constants = tuple(constant for constant, _ in fits)
+        if fits and all(CONSTANTS[0] < k < CONSTANTS[1] for k in constants):
+            yield float(np.median([misfit for _, misfit in fits])), torque, current, constants
+
+
+def _fitted(torque: Array, current: Array, dq: Array) -> tuple[float, float]:
+    """The drive constant between a torque and a current, and what it leaves of the current."""
+    friction = (np.tanh(dq / 0.002), dq, dq * np.abs(dq))
+    terms = np.stack([torque, *friction], axis=1)
+    values, *_ = np.linalg.lstsq(terms, current, rcond=None)
+    left = np.sqrt(np.mean((current - terms @ values) ** 2) / np.mean(current**2))
+    return (1 / float(values[0]) if values[0] else 0.0), float(left)
+
+
+def _alike(measured: Array, target: Array) -> bool:
+    product = np.sum(measured * target, axis=0)
+    own, other = np.sum(measured**2, axis=0), np.sum(target**2, axis=0)
+    live = (own > 0) & (other > 0)
+    slope = product[live] / other[live]
+    cosine = product[live] / np.sqrt(own[live] * other[live])
+    # Where a joint stands its stiction is in what was measured alone.
+    return bool(np.any((slope > ALIKE[0]) & (slope < ALIKE[1]) & (cosine > NEAR)))

@@ -3,7 +3,6 @@
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import takewhile
@@ -12,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.reader import LogFile
+from vftcli.readers.opening import LogFile
 from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
@@ -28,14 +27,13 @@ def is_comment(line: str) -> bool:
     return line.removeprefix("\ufeff").lstrip().startswith("#")
 
 
-def as_number(text: str, *, decimal_comma: bool = False) -> float | None:
-    """The number that a cell holds, or None."""
-    if decimal_comma:
-        text = text.replace(",", ".")
+def is_number(text: str, *, decimal_comma: bool = False) -> bool:
+    """Whether a cell holds a number."""
     try:
-        return float(text) if "_" not in text else None
+        float(text.replace(",", ".") if decimal_comma else text)
     except ValueError:
-        return None
+        return False
+    return "_" not in text
 
 
 def split_cells(line: str, separator: str) -> list[str]:
@@ -69,22 +67,14 @@ class TextTable:
         lines = [decoded(line) for line in self.file.lines[:200]]
         if not lines:
             raise LogError(f"{self.path}: not a table of text; `vftcli inspect` says what it is.")
-        if len(self.file.lines) <= 200 and not self.file.is_whole:
+        if len(self.file.lines) <= 200 and len(self.file.content) > len(self.file.head):
             lines = lines[:-1] if len(lines) > 1 else lines  # the head may end inside a line
         lines[0] = lines[0].removeprefix("\ufeff")
         comments = list(takewhile(is_comment, lines))
         rows = lines[len(comments) :]
-        if comments and rows and self._names_in(comments[-1], rows[0]):
+        if comments and rows and _names_in(comments[-1], rows[0]):
             return [comments[-1].lstrip("# "), *rows]
         return rows or lines
-
-    @staticmethod
-    def _names_in(comment: str, row: str) -> bool:
-        """Whether a comment has one name for each number of a row, as np.savetxt writes it."""
-        names = re.split(r"[,;\t ]+", comment.lstrip("# ").strip())
-        cells = re.split(r"[,;\t ]+", row.strip())
-        words = all(as_number(name) is None for name in names)
-        return words and len(names) == len(cells) and all(as_number(c) is not None for c in cells)
 
     @cached_property
     def separator(self) -> str:
@@ -111,14 +101,15 @@ class TextTable:
         line = line.strip(" \r")
         return line.split() if self.separator == " " else split_cells(line, self.separator)
 
+    def is_number(self, cell: str) -> bool:
+        """Whether a cell holds a number as this table writes them."""
+        return is_number(cell, decimal_comma=self.decimal_comma)
+
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The header's names, none if the first line holds numbers only."""
         cells = self.cells(self.sample[0])
-        numbers = [as_number(cell, decimal_comma=self.decimal_comma) for cell in cells]
-        if all(n is not None for n, cell in zip(numbers, cells, strict=True) if cell):
-            return ()
-        return tuple(cells)
+        return () if all(not cell or self.is_number(cell) for cell in cells) else tuple(cells)
 
     @cached_property
     def width(self) -> int:
@@ -127,19 +118,12 @@ class TextTable:
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
-        import polars as pl
-
         kinds = self._kinds(columns, clock)
         # Most files parse as they are; mending copies them, so it waits for a failure.
         for text in (self._text, self._mended):
-            try:
-                frame = self._parse(text(), kinds)
-            except pl.exceptions.NoDataError:  # a header alone, before polars 2
-                return {c: np.empty(0) for c in columns}
-            except pl.exceptions.PolarsError:
-                continue
-            if not self._has_blank_rows(frame):
-                return {c: _numbers(frame[str(c)], self.path) for c in columns}
+            found = self._parse(text(), kinds)
+            if found is not None and not _has_blank_rows(found):
+                return {c: _numbers(found[c], self.path) for c in columns}
         raise self._diagnosed(kinds)
 
     @property
@@ -150,12 +134,9 @@ class TextTable:
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Parse some columns as `load` does, some megabytes of text at a time."""
-        import polars as pl
-
         path, kinds = self.file.direct, self._kinds(columns, clock)
-        quoted = any('"' in line for line in self.sample)
         in_one_piece = LogError(f"{self.path}: a text that needs mending is read in one piece")
-        if path is None or quoted or self._needs_mending(self.file.head):
+        if path is None or self._is_quoted or self._needs_mending(self.file.head):
             raise in_one_piece
         end = self._end() or len(self.file.content)
         with path.open("rb") as source:
@@ -164,48 +145,60 @@ class TextTable:
             while (left := end - source.tell()) > 0:
                 text = source.read(min(BLOCK_BYTES, left))
                 text += source.readline() if source.tell() < end else b""
-                try:
-                    frame = self._parse(text, kinds)
-                except pl.exceptions.PolarsError:
-                    raise in_one_piece from None
-                if self._has_blank_rows(frame):
+                found = self._parse(text, kinds)
+                if found is None or _has_blank_rows(found):
                     raise in_one_piece
-                yield {c: _numbers(frame[str(c)], self.path) for c in columns}
-
-    def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, Any]:
-        """Column → its polars type."""
-        import polars as pl
-
-        kinds: dict[int, Any] = dict.fromkeys(columns, pl.Float64)
-        if clock is not None:
-            kinds[clock] = self._clock_kind(clock)
-        return kinds
+                yield {c: _numbers(found[c], self.path) for c in columns}
 
     def words(self, column: int) -> tuple[str, ...]:
         """The different texts that a column holds, in the order in which they come."""
-        import polars as pl
-
         for text in (self._text, self._mended):
-            with suppress(pl.exceptions.PolarsError):
-                found = self._parse(text(), {column: pl.String})[str(column)]
-                return tuple(str(word or "").strip() for word in found.unique(maintain_order=True))
+            found = self._parse(text(), {column: "String"})
+            if found is not None and len(found[column]):
+                words = found[column].unique(maintain_order=True)
+                return tuple(str(word or "").strip() for word in words)
         raise self._diagnosed({})
 
-    def _parse(self, source: Any, kinds: Mapping[int, Any]) -> Any:  # noqa: ANN401 - polars lazily
-        """The rows by polars, every wanted column with its type."""
+    def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, str]:
+        """Column → its polars type; a clock's long whole numbers must not pass through float64."""
+        kinds = dict.fromkeys(columns, "Float64")
+        if clock is not None:
+            row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
+            cells = self.cells(row)
+            text = cells[clock] if clock < len(cells) else ""
+            # float64 holds nanoseconds since 1970 only to 256 ns.
+            if re.fullmatch(r"\d{16,19}", text):
+                kinds[clock] = "Int64"
+            elif re.match(r"\d{4}-\d\d-\d\d", text):
+                kinds[clock] = "String"
+        return kinds
+
+    @property
+    def _is_quoted(self) -> bool:
+        return any('"' in line for line in self.sample)
+
+    def _parse(self, source: Path | bytes, kinds: Mapping[int, str]) -> dict[int, Any] | None:
+        """The wanted columns by polars, each of its type; None where it refuses the text."""
         import polars as pl
 
-        return pl.read_csv(
-            source,
-            has_header=False,
-            skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
-            separator=self.separator,
-            columns=sorted(kinds),
-            schema={str(c): kinds.get(c, pl.String) for c in range(self.width)},
-            quote_char='"' if any('"' in line for line in self.sample) else None,
-            decimal_comma=self.decimal_comma,
-            glob=False,
-        )
+        types = {c: getattr(pl, kind) for c, kind in kinds.items()}
+        try:
+            frame = pl.read_csv(
+                source,
+                has_header=False,
+                skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
+                separator=self.separator,
+                columns=sorted(kinds),
+                schema={str(c): types.get(c, pl.String) for c in range(self.width)},
+                quote_char='"' if self._is_quoted else None,
+                decimal_comma=self.decimal_comma,
+                glob=False,
+            )
+        except pl.exceptions.NoDataError:  # a header alone, before polars 2
+            return {c: pl.Series(dtype=kind) for c, kind in types.items()}
+        except pl.exceptions.PolarsError:
+            return None
+        return {c: frame[str(c)] for c in kinds}
 
     @property
     def _lines_before_rows(self) -> int:
@@ -220,12 +213,11 @@ class TextTable:
 
     @property
     def _header_is_comment(self) -> bool:
-        """Whether the names stand in a comment above the rows, as np.savetxt writes them."""
         lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
         first = next((line for line in lines if not line.startswith("#")), "")
         return bool(self.names) and self.cells(first) != list(self.names)
 
-    def _text(self) -> Any:  # noqa: ANN401 - a path or bytes
+    def _text(self) -> Path | bytes:
         """The table as it can be parsed at once: the path, or bytes where something must go."""
         head = self.file.head
         if self._needs_mending(head):
@@ -243,13 +235,8 @@ class TextTable:
         blank = re.search(rb"(\n|^)[ \t\r]*\n", head) is not None
         lone = b"\r" in head and (b"\r\r" in head or head.count(b"\r") != head.count(b"\r\n"))
         blanks = self.separator == " " and re.search(rb"  |\n | \r?\n", head) is not None
-        return (
-            blank
-            or lone
-            or blanks
-            or is_comment(decoded(head[:64]))
-            or head.startswith(b"\xef\xbb\xbf")
-        )
+        begins = is_comment(decoded(head[:64])) or head.startswith(b"\xef\xbb\xbf")
+        return blank or lone or blanks or begins
 
     def _mended(self) -> bytes:
         """The rows with plain line ends, without blank lines, comments and doubled blanks."""
@@ -298,30 +285,7 @@ class TextTable:
             return decimals != {len(last[-1].partition(".")[2])}
         return ends != {last[-1]}
 
-    def _clock_kind(self, clock: int) -> Any:  # noqa: ANN401 - a polars type
-        """Type of the clock's column: long whole numbers must not pass through float64."""
-        import polars as pl
-
-        row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
-        cells = self.cells(row)
-        text = cells[clock] if clock < len(cells) else ""
-        # float64 holds nanoseconds since 1970 only to 256 ns.
-        if re.fullmatch(r"\d{16,19}", text):
-            return pl.Int64
-        if re.match(r"\d{4}-\d\d-\d\d", text):
-            return pl.String
-        return pl.Float64
-
-    @staticmethod
-    def _has_blank_rows(frame: Any) -> bool:  # noqa: ANN401 - polars
-        """Whether a row holds nothing at all, which is a blank line that slipped through."""
-        import polars as pl
-
-        if all(series.null_count() == 0 for series in frame):
-            return False
-        return bool(frame.select(pl.all_horizontal(pl.all().is_null()).any()).item())
-
-    def _diagnosed(self, kinds: Mapping[int, Any]) -> LogError:
+    def _diagnosed(self, kinds: Mapping[int, str]) -> LogError:
         """Look at the table row by row for what the parser could not take."""
         rows = self._mended().split(b"\n")
         for number, row in enumerate(rows, start=1):
@@ -333,13 +297,26 @@ class TextTable:
                 )
             for column in sorted(kinds):
                 cell = cells[column] if column < len(cells) else ""
-                if cell and as_number(cell, decimal_comma=self.decimal_comma) is None:
+                if cell and not self.is_number(cell):
                     name = f" ({self.names[column]})" if self.names else ""
                     return LogError(
                         f"{self.path}: row {number}, column {column + 1}{name}: {cell[:40]!r} is "
                         "not a number. Cut the row out, or leave the column out with _."
                     )
         return LogError(f"{self.path}: cannot be parsed as a table of numbers; is it a log?")
+
+
+def _has_blank_rows(columns: Mapping[int, Any]) -> bool:
+    if all(series.null_count() == 0 for series in columns.values()):
+        return False
+    return bool(np.all([series.is_null() for series in columns.values()], axis=0).any())
+
+
+def _names_in(comment: str, row: str) -> bool:
+    names = re.split(r"[,;\t ]+", comment.lstrip("# ").strip())
+    cells = re.split(r"[,;\t ]+", row.strip())
+    words = not any(map(is_number, names))
+    return words and len(names) == len(cells) and all(map(is_number, cells))
 
 
 def decoded(line: bytes) -> str:

@@ -18,29 +18,30 @@ from typing import Any, NamedTuple
 
 from vftcli.readers.aliases import ALIASES
 from vftcli.readers.columns import parse_columns
-from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.opening import check_unpacked, natural, unpacked_limit
-from vftcli.readers.reader import (
-    ARMS,
-    Episodes,
+from vftcli.readers.opening import (
     LogFile,
-    RawLog,
-    ReadChoice,
-    arm_of,
+    check_unpacked,
+    naming_damage,
+    natural,
     open_log,
+    unpacked_limit,
 )
+from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
+from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Column, listed
 from vftcli.readers.tables import ArrayTable, described, from_table
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import fact
 
+Hdf5 = Any  #: A file, group, dataset or chunk of h5py, which has no stubs.
+
 #: Filters by HDF5's numbers; those of h5py, MATLAB and the common recorders.
 DEFLATE, SHUFFLE, FLETCHER32, LZF = 1, 2, 3, 32000
 DEFLATE_RATIO = 1032  #: The most that deflate unpacks a byte to (zlib, algorithm.txt).
 
 
-def check_chunks(name: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 - h5py
+def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
     """Check that no chunk unpacks to more than a log's may."""
     if dataset.chunks is None:
         return
@@ -58,14 +59,14 @@ def check_chunks(name: str, dataset: Any, limit: int) -> None:  # noqa: ANN401 -
             "and lzf are read, once each; repack it: h5repack -f GZIP=4 OLD NEW"
         )
     if DEFLATE in filters and DEFLATE_RATIO * dataset.id.get_storage_size() > limit:
-        inflate_suspects(name, dataset, size, limit)
+        _inflate_suspects(name, dataset, size, limit)
 
 
-def inflate_suspects(name: str, dataset: Any, size: int, limit: int) -> None:  # noqa: ANN401
+def _inflate_suspects(name: str, dataset: Hdf5, size: int, limit: int) -> None:
     """Inflate chunks that could unpack to more than `limit`, no further than to their `size`."""
     suspects: list[tuple[int, ...]] = []
 
-    def look(chunk: Any) -> None:  # noqa: ANN401 - h5py
+    def look(chunk: Hdf5) -> None:
         if DEFLATE_RATIO * chunk.size > limit:
             suspects.append(chunk.chunk_offset)
 
@@ -88,15 +89,15 @@ MOST_OBJECTS, DEEPEST = 100_000, 32
 def opened(file: LogFile) -> Iterator[Any]:
     """The file as h5py opens it, its errors turned into one that names the file."""
     h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
-    try:
-        with h5py.File(file.direct or BytesIO(file.content), "r") as content:
-            yield content
-    except (
+    errors = (
         OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError,
         NotImplementedError, AttributeError, SystemError,
-    ) as error:  # fmt: skip
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{file.path}: a damaged HDF5 file ({reason})") from None
+    )  # fmt: skip
+    with (
+        naming_damage(file.path, "a damaged HDF5 file", errors),
+        h5py.File(file.direct or BytesIO(file.content), "r") as content,
+    ):
+        yield content
 
 
 class Hdf5Table(ArrayTable):
@@ -122,15 +123,15 @@ class Hdf5Table(ArrayTable):
 
     def check_size(self, columns: Sequence[int]) -> None:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
-        names, datasets = list(self.columns), list(self.columns.values())
-        stored = sum(datasets[c].id.get_storage_size() for c in columns)
-        what = f"{self.path}: {listed([names[c] for c in columns])}"
-        check_unpacked(what, 8 * sum(datasets[c].size for c in columns), stored)
-        for c in columns:
-            check_chunks(f"{self.path}: {names[c]}", datasets[c], unpacked_limit(stored))
+        each = [list(self.columns.items())[c] for c in columns]
+        stored = sum(dataset.id.get_storage_size() for _, dataset in each)
+        what = f"{self.path}: {listed([name for name, _ in each])}"
+        check_unpacked(what, 8 * sum(dataset.size for _, dataset in each), stored)
+        for name, dataset in each:
+            _check_chunks(f"{self.path}: {name}", dataset, unpacked_limit(stored))
 
 
-def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # noqa: ANN401 - h5py
+def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
     """The datasets of numbers of an open file that have some rows."""
     found = {name: d for name, d in datasets_of(path, content) if is_signal(d, fewest_rows)}
     if not found:
@@ -138,7 +139,7 @@ def table_of(path: Path, content: Any, fewest_rows: int = 2) -> Hdf5Table:  # no
     return Hdf5Table(path, dict(sorted(found.items(), key=lambda item: natural(item[0]))))
 
 
-def datasets_of(path: Path, content: Any) -> Iterator[tuple[str, Any]]:  # noqa: ANN401 - h5py
+def datasets_of(path: Path, content: Hdf5) -> Iterator[tuple[str, Hdf5]]:
     """Every dataset of an open file by its path, links to elsewhere and second ways left out."""
     h5py = needed("h5py", "an HDF5 file")
 
@@ -163,7 +164,7 @@ def datasets_of(path: Path, content: Any) -> Iterator[tuple[str, Any]]:  # noqa:
                 waiting.append((f"{prefix}{name}/", item, depth + 1))
 
 
-def is_signal(dataset: Any, fewest_rows: int) -> bool:  # noqa: ANN401 - h5py
+def is_signal(dataset: Hdf5, fewest_rows: int) -> bool:
     """Whether a dataset may be a signal: numbers of the file's own, one or many a row."""
     if dataset.dtype.kind not in "fiub" or dataset.shape is None or dataset.ndim not in {1, 2}:
         return False
@@ -231,8 +232,8 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     """DROID: the robot state's own clock, and motor_torques_measured, libfranka's tau_J."""
     if request.spec.item("q"):
         return from_table(table, request)
-    names = table.names
-    remarks = (fact("computed-torque-left-out"),) if DROID_STATE + DROID_COMPUTED in names else ()
+    computed = DROID_STATE + DROID_COMPUTED in table.names
+    remarks = (fact("computed-torque-left-out"),) if computed else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
     raw = described(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
     return replace(raw, robot_hint=robot_of(Path(table.path).parent))
@@ -306,9 +307,9 @@ def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
 def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
     """The episodes' numbers: those their groups' names end with, else counted from 0."""
     ends = [re.search(r"(\d{1,9})\D*$", group) for group in groups]
-    numbers = [int(end[1]) for end in ends if end]
+    numbers = tuple(int(end[1]) for end in ends if end)
     rising = all(a < b for a, b in pairwise(numbers))
-    return tuple(numbers) if len(numbers) == len(groups) and rising else tuple(range(len(groups)))
+    return numbers if rising and len(numbers) == len(groups) else tuple(range(len(groups)))
 
 
 def trajectories(folder: Path) -> Iterator[Path | None]:
@@ -332,21 +333,26 @@ def recognises(file: LogFile, _: LogFormat) -> bool:
 @contextmanager
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The logs of an HDF5 file, or of DROID's folder by name, with their places if several."""
-    if file.is_folder:
-        paths = [path for path in trajectories(file.path) if path is not None]
-        if not paths:
-            raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
-        places = [str(path.parent.relative_to(file.path)) for path in paths]
-        yield placed(range(len(paths)), places, [partial(read_trajectory, path) for path in paths])
+    if not file.is_folder:
+        with opened(file) as content:
+            table = table_of(file.path, content)
+            layout, groups = layout_of(table)
+            each = [partial(layout.read, table.within(group)) for group in groups]
+            yield _placed(numbers_of(groups), [group.rstrip("/") for group in groups], each)
         return
-    with opened(file) as content:
-        table = table_of(file.path, content)
-        layout, groups = layout_of(table)
-        each = [partial(layout.read, table.within(group)) for group in groups]
-        yield placed(numbers_of(groups), [group.rstrip("/") for group in groups], each)
+    paths = [path for path in trajectories(file.path) if path is not None]
+    if not paths:
+        raise LogError(f"{file.path}: no {TRAJECTORY} in it or below.")
+
+    def read(path: Path, request: ReadChoice) -> RawLog:
+        raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
+        return replace(raw, part="", files=(path,))
+
+    places = [str(path.parent.relative_to(file.path)) for path in paths]
+    yield _placed(range(len(paths)), places, [partial(read, path) for path in paths])
 
 
-def placed(
+def _placed(
     numbers: Sequence[int], places: Sequence[str], each: Sequence[Callable[[ReadChoice], RawLog]]
 ) -> Episodes:
     """Episodes by number; the place of one of several is said."""
@@ -357,12 +363,6 @@ def placed(
         return replace(raw, remarks=(*said, *raw.remarks))
 
     return {number: partial(read, k) for k, number in enumerate(numbers)}
-
-
-def read_trajectory(path: Path, request: ReadChoice) -> RawLog:
-    """Read the file of one of DROID's episodes."""
-    raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
-    return replace(raw, part="", files=(path,))
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:

@@ -11,20 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.readers.aliases import ALIASES
+from vftcli.readers.aliases import ALIASES, kinematic_order
 from vftcli.readers.columns import SIGNALS
-from vftcli.readers.formats import LogFormat
-from vftcli.readers.joints import kinematic_order
+from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
-from vftcli.readers.reader import (
-    ARMS,
-    Episodes,
-    LogFile,
-    RawLog,
-    ReadChoice,
-    arm_of,
-    open_log,
-)
+from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
+from vftcli.readers.reading import LogFormat
 from vftcli.readers.table import listed
 from vftcli.readers.tables import described
 from vftcli.signals.errors import LogError
@@ -252,14 +244,13 @@ def episodes_told(folder: Path) -> list[Episode]:
 def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
     """The episodes that tables of these paths, times and sizes tell."""
     each = [
-        (episodes_of_table if path.suffix == ".parquet" else episodes_of_lines)(folder, path)
+        (_episodes_of_table if path.suffix == ".parquet" else _episodes_of_lines)(folder, path)
         for path, _, _ in states
     ]
     return [episode for episodes in each for episode in episodes]
 
 
-def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
-    """The episodes of a table of version 3."""
+def _episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     table = ParquetTable(open_log(path))
     names = list(table.names)
     if missing := [name for name in EPISODES_TABLE if name not in names]:
@@ -276,8 +267,7 @@ def episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
         yield Episode(number, length, start, place)
 
 
-def episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
-    """The episodes of a table of version 2, one object a line."""
+def _episodes_of_lines(folder: Path, path: Path) -> Iterable[Episode]:
     chunk = info_of(folder).get("chunks_size")
     chunk = chunk if isinstance(chunk, int) and chunk > 0 else 1000
     for line in filter(str.strip, text_of(path).splitlines()):

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import reading
-from vftcli.readers.estimates import stored_observers
-from vftcli.readers.formats import LogFormat
-from vftcli.readers.opening import files_of
-from vftcli.readers.reader import LogFile, ReadChoice, open_log
+from vftcli.readers.opening import LogFile, files_of, open_log
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.reading import LogFormat
+from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
 from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.parsing import printable
@@ -105,7 +105,6 @@ def absolute(path: str | Path) -> Path:
 
 
 def _shortest_tail(parts: tuple[str, ...], tails: Mapping[tuple[str, ...], int]) -> str:
-    """The last parts of a path, as many as no other path ends with."""
     own = (parts[-count:] for count in range(1, len(parts) + 1))
     return str(Path(*next((tail for tail in own if tails[tail] == 1), parts)))
 
@@ -144,7 +143,6 @@ class LogCollection:
                     yield from self._inside(path) if path.is_dir() else self._parts(path)
 
     def _parts(self, path: Path) -> Iterator[LogEntry]:
-        """The episodes of a file, or itself: reading it says what is wrong."""
         try:
             reader = reading.recognise(path, self._choice)
             yield from self._episodes(path, reader)

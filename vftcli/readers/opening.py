@@ -1,17 +1,21 @@
 """Opening files: gzip and zstd taken off within bounds, whole files as memory, digests beside."""
 
 import hashlib
+import math
 import mmap
 import re
 import threading
 import zlib
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
-from functools import partial
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any, Literal
 
+from vftcli.signals.arrays import release
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import Remark, warning
 
 HEAD_BYTES = 64 * 1024  #: Bytes that recognition looks at.
 
@@ -24,6 +28,13 @@ UNPACKED_LIMIT = 128 * 1024 * 1024
 #:
 #: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
 UNPACKED_RATIO = 50
+
+#: A log of no more rows is read in one piece: there is memory for all that is done with it.
+WHOLE_ROWS = 100_000
+
+CHUNK = 1024 * 1024
+#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time.
+ZSTD_BYTES = 1024
 
 
 def unpacked_limit(size: int) -> int:
@@ -40,16 +51,96 @@ def check_unpacked(what: object, claimed: int, size: int) -> None:
         )
 
 
-#: A log of no more rows is read in one piece: there is memory for all that is done with it.
-WHOLE_ROWS = 100_000
+@contextmanager
+def naming_damage(
+    path: Path, what: str, errors: tuple[type[Exception], ...], remedy: str = ""
+) -> Iterator[None]:
+    """Turn errors of a library into a LogError that names the file."""
+    try:
+        yield
+    except errors as error:
+        raise LogError(f"{path}: {what} ({reason_of(error)}){remedy}") from None
 
-CHUNK = 1024 * 1024
-#: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time.
-ZSTD_BYTES = 1024
+
+def reason_of(error: Exception, most: int = 120) -> str:
+    """The beginning of an error's first line."""
+    return str(error).split("\n", maxsplit=1)[0][:most]
 
 
-def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
-    """Return the first bytes of a file's content, unwrapped, and what it was wrapped in."""
+@dataclass(frozen=True, kw_only=True)
+class LogFile:
+    """A file or folder as the readers see it: its first bytes already unwrapped."""
+
+    path: Path  #: The file or folder.
+    #: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
+    head: bytes = b""
+    entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
+    wrapping: Wrapping | None = None  #: What the file is compressed with as a whole, or None.
+
+    @property
+    def is_folder(self) -> bool:
+        """Whether the path is a folder."""
+        return self.path.is_dir()
+
+    @property
+    def direct(self) -> Path | None:
+        """The path, where other libraries can open it: a plain file with a name in UTF-8."""
+        try:
+            str(self.path).encode("utf-8")
+        except UnicodeEncodeError:
+            return None
+        return self.path if self.wrapping is None else None
+
+    @property
+    def content(self) -> memoryview:
+        """The whole content, unwrapped; a plain file is mapped, not read."""
+        return self._unwrapped[0]
+
+    def release(self) -> None:
+        """Let go of the pages of a mapped file that were touched so far; they can be read again."""
+        release(self.content)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What had to be left behind to open the file."""
+        cut = self.wrapping is not None and self._unwrapped[1]
+        return (warning("file-cut", wrapping=self.wrapping),) if cut else ()
+
+    @cached_property
+    def _unwrapped(self) -> tuple[memoryview, bool]:
+        """The content, and whether a wrapped file ends before its packed data does."""
+        if self.wrapping is not None:
+            content, whole = unpacked(self.path, self.wrapping)
+            return memoryview(content), not whole
+        # Mapping costs more than copying where there is little to copy.
+        if self.path.stat().st_size < CHUNK:
+            return memoryview(self.path.read_bytes()), False
+        with self.path.open("rb") as file:
+            return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)), False
+
+    @cached_property
+    def lines(self) -> list[bytes]:
+        """The non-empty lines of the head, without their ends; [] if the head is not text."""
+        # No text in UTF-8 or an eight-bit encoding holds one of these.
+        if any(bytes([c]) in self.head for c in (*range(7), *range(14, 20), 127)):
+            return []
+        lines = self.head.replace(b"\r", b"\n").split(b"\n")
+        return [line for line in lines if line.strip()]
+
+    @property
+    def first_line(self) -> bytes:
+        """The first non-empty line without a byte-order mark, or nothing."""
+        return self.lines[0].removeprefix(b"\xef\xbb\xbf") if self.lines else b""
+
+
+def open_log(path: Path) -> LogFile:
+    """Open a path for recognition: unwrap the head of a file, list a folder.
+
+    Raises:
+        LogError: If there is no such path or it cannot be opened.
+    """
+    if path.is_dir():
+        return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
     if not path.exists():
         raise LogError(f"{path}: no such file or folder. Check the path.")
     if not path.is_file():
@@ -61,82 +152,53 @@ def head_of(path: Path) -> tuple[bytes, Wrapping | None]:
         raise LogError(f"{path}: cannot be opened ({error.strerror})") from None
     if not head:
         raise LogError(f"{path}: the file is empty; nothing was recorded into it.")
-    for magic, wrapping in MAGICS.items():
-        if head.startswith(magic):
-            found = b""
-            for piece in Unpacker(path, wrapping).pieces():
-                found += piece
-                if len(found) >= HEAD_BYTES:
-                    break
-            if not found:
-                raise LogError(
-                    f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged."
-                )
-            return found[:HEAD_BYTES], wrapping
-    return head, None
-
-
-def unwrapped(path: Path, wrapping: Wrapping | None) -> tuple[memoryview, bool]:
-    """Return a file's whole content, mapped if plain, unpacked into memory if wrapped.
-
-    Returns:
-        The content, and whether a wrapped file ends before its packed data does.
-    """
+    wrapping = next((w for magic, w in MAGICS.items() if head.startswith(magic)), None)
     if wrapping is not None:
-        unpacker = Unpacker(path, wrapping)
-        return memoryview(b"".join(unpacker.pieces())), not unpacker.ended
-    # Mapping costs more than copying where there is little to copy.
-    if path.stat().st_size < CHUNK:
-        return memoryview(path.read_bytes()), False
-    with path.open("rb") as file:
-        return memoryview(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)), False
+        head = unpacked(path, wrapping, HEAD_BYTES)[0][:HEAD_BYTES]
+        if not head:
+            raise LogError(
+                f"{path}: the {wrapping} file unpacks to nothing; it is empty or damaged."
+            )
+    return LogFile(path=path, head=head, wrapping=wrapping)
 
 
-class Unpacker:
-    """Unpacks a file piece by piece: a cut end yields what there is, a bomb is refused.
+def unpacked(path: Path, wrapping: Wrapping, enough: float = math.inf) -> tuple[bytes, bool]:
+    """What a file unpacks to, or the first bytes of it, and whether its packed data is whole.
 
-    Attributes:
-        ended: After the last piece: whether the packed data was whole.
+    Members of gzip, or frames of zstd, come one after another; of a cut file comes what there is,
+    a bomb is refused.
     """
+    new: Callable[[], Any]
+    damage: type[Exception]
+    if gzip := wrapping == "gzip":
+        new, damage, size = partial(zlib.decompressobj, wbits=31), zlib.error, CHUNK // 16
+    else:
+        import zstandard
 
-    def __init__(self, path: Path, wrapping: Wrapping) -> None:
-        self.path = path
-        self.wrapping = wrapping
-        self.limit = unpacked_limit(path.stat().st_size)
-        self.ended = False
-
-    def pieces(self) -> Iterator[bytes]:
-        """The content, piece by piece: members of gzip, or frames of zstd, one after another."""
-        new: Callable[[], Any]
-        damage: type[Exception]
-        if gzip := self.wrapping == "gzip":
-            new, damage, size = partial(zlib.decompressobj, wbits=31), zlib.error, CHUNK // 16
-        else:
-            import zstandard
-
-            new = zstandard.ZstdDecompressor(max_window_size=1 << 27).decompressobj
-            damage, size = zstandard.ZstdError, ZSTD_BYTES
-        unpacker, total = new(), 0
-        with self.path.open("rb") as file:
-            while packed := file.read(size):
-                while packed:
-                    try:
-                        piece = unpacker.decompress(packed, *[CHUNK] * gzip)
-                    except damage as error:
-                        told = f"{self.path}: the {self.wrapping} file is damaged ({error})"
-                        raise LogError(told) from None
-                    total += len(piece)
-                    if total > self.limit:
-                        raise LogError(
-                            f"{self.path}: unpacks to more than {self.limit >> 20} MiB, more than "
-                            "a log this small can hold. If it is genuine, unpack it "
-                            f"({self.wrapping} -d) and give the unpacked file."
-                        )
-                    yield piece
-                    packed = unpacker.unconsumed_tail if gzip else b""
-                    if unpacker.eof and (packed := unpacker.unused_data.lstrip(b"\0" * gzip)):
-                        unpacker = new()
-        self.ended = unpacker.eof
+        new = zstandard.ZstdDecompressor(max_window_size=1 << 27).decompressobj
+        damage, size = zstandard.ZstdError, ZSTD_BYTES
+    limit = unpacked_limit(path.stat().st_size)
+    unpacker, total, pieces = new(), 0, list[bytes]()
+    with path.open("rb") as file:
+        while packed := file.read(size):
+            while packed:
+                try:
+                    pieces.append(unpacker.decompress(packed, *[CHUNK] * gzip))
+                except damage as error:
+                    raise LogError(f"{path}: the {wrapping} file is damaged ({error})") from None
+                total += len(pieces[-1])
+                if total > limit:
+                    raise LogError(
+                        f"{path}: unpacks to more than {limit >> 20} MiB, more than a log this "
+                        f"small can hold. If it is genuine, unpack it ({wrapping} -d) and give "
+                        "the unpacked file."
+                    )
+                if total >= enough:
+                    return b"".join(pieces), False
+                packed = unpacker.unconsumed_tail if gzip else b""
+                if unpacker.eof and (packed := unpacker.unused_data.lstrip(b"\0" * gzip)):
+                    unpacker = new()
+    return b"".join(pieces), unpacker.eof
 
 
 def natural(name: str) -> list[tuple[int, int, str]]:
@@ -162,22 +224,16 @@ class Digest:
         self._sum = hashlib.sha256()
         # hashlib releases the interpreter for large pieces, so a thread is enough.
         self._thread = threading.Thread(target=self._run, daemon=True)
-        self._started = False
 
     def start(self) -> None:
         """Start computing, if that has not begun."""
-        if not self._started:
-            self._started = True
+        if self._thread.ident is None:
             self._thread.start()
 
     def _run(self) -> None:
-        """Sum up the files' bytes; what cannot be opened is told by whoever reads it."""
-        buffer = bytearray(CHUNK)
-        view = memoryview(buffer)
         for path in self._paths:
             with suppress(OSError), path.open("rb", buffering=0) as file:
-                while count := file.readinto(view):
-                    self._sum.update(view[:count])
+                hashlib.file_digest(file, lambda: self._sum)
 
     def hexdigest(self) -> str:
         """Wait for the end and return the digest."""

@@ -17,14 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.opening import check_unpacked
-from vftcli.readers.reader import Episodes, LogFile, RawLog, ReadChoice
+from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
+from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import from_table
+from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
+
+Arrow = Any  #: An array, type or buffer of pyarrow, which has no stubs.
 
 EPISODE = "episode_index"
 #: Rows that are decoded at a time of a long table, and bytes of a column that are read for them.
@@ -41,11 +44,9 @@ MESSAGE_HEADER, BATCH_ROWS, BATCH_BUFFERS, BATCH_PACKING, DICTIONARY_BATCH = 2, 
 def guarded(path: Path) -> Iterator[None]:
     """Turn the errors of pyarrow, beside Python's own, into a LogError that names the file."""
     arrow = needed("pyarrow", f"{path}: a Parquet or Arrow file", error=LogError).ArrowException
-    try:
+    errors = OSError, ValueError, KeyError, MemoryError, OverflowError, arrow
+    with naming_damage(path, "a damaged Parquet or Arrow file", errors):
         yield
-    except (OSError, ValueError, KeyError, MemoryError, OverflowError, arrow) as error:
-        reason = str(error).split("\n")[0][:120]
-        raise LogError(f"{path}: a damaged Parquet or Arrow file ({reason})") from None
 
 
 class ColumnarTable(ABC):
@@ -60,32 +61,28 @@ class ColumnarTable(ABC):
 
     def __init__(self, file: LogFile) -> None:
         self.path: Path = file.path
-        self._rows: Any = None
+        self._rows: Indices | None = None
         self._size = len(file.content)
         with guarded(self.path):
             schema, self.rows = self._opened(file)
             self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
-            self._lists = [k for k, kind in enumerate(schema.types) if is_list(kind)]
+            self._lists = [k for k, kind in enumerate(schema.types) if _is_list(kind)]
             if self.rows == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
         self.names: tuple[str, ...] = tuple(schema.names)
+        self.width = len(self.names)
 
     @abstractmethod
     def _opened(self, file: LogFile) -> tuple[Any, int]:
         """Open the file; its schema, and how many rows it says it has."""
 
     @abstractmethod
-    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - a list
+    def _first_list(self, column: int) -> Arrow:
         """The value in the first row of a column of lists, None for none."""
 
     @abstractmethod
-    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
+    def _decoded(self, columns: Sequence[int]) -> Arrow:
         """Some columns of all rows, as a table."""
-
-    @property
-    def width(self) -> int:
-        """Number of columns."""
-        return len(self.names)
 
     def conversion(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
@@ -104,18 +101,16 @@ class ColumnarTable(ABC):
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Decode some columns."""
-        self._names_of(columns)
-        self._check_size(columns)
+        self._check(columns)
         with guarded(self.path):
             # One after the other: of a long log all of them have no room in two forms.
             return {c: self._column(self._kept(c), c, clock) for c in sorted(columns)}
 
-    def _kept(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
-        """One column's rows, those that are kept."""
+    def _kept(self, column: int) -> Arrow:
         values = self._decoded([column]).column(0)
         return values if self._rows is None else values.take(self._rows)
 
-    def _column(self, values: Any, column: int, clock: int | None) -> Column:  # noqa: ANN401
+    def _column(self, values: Arrow, column: int, clock: int | None) -> Column:
         """A column as numbers; whole stamps stay whole, times become nanoseconds."""
         import pyarrow as pa
 
@@ -134,7 +129,7 @@ class ColumnarTable(ABC):
         # Not copied where nothing is to be changed: what is picked of it is copied once more.
         return plain(values).astype(target, copy=False)
 
-    def _matrix(self, values: Any, column: int) -> Column:  # noqa: ANN401 - pyarrow
+    def _matrix(self, values: Arrow, column: int) -> Column:
         """A column of lists of one length. (T, k)"""
         length, name = self.lists[column], self.names[column]
         values = values.combine_chunks()
@@ -148,20 +143,15 @@ class ColumnarTable(ABC):
             raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
         return plain(flat).astype(np.float64).reshape(len(values), length)
 
-    def _names_of(self, columns: Sequence[int]) -> dict[int, str]:
-        """The names of some columns, each of one column only."""
-        names = self.names
-        # Decoders hand over both under one name.
-        if any(names.count(names[c]) > 1 for c in columns):
-            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
-        return {c: names[c] for c in columns}
-
-    def _check_size(self, columns: Sequence[int]) -> None:
+    def _check(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
 
         The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
         whole process.
         """
+        # Decoders hand over two columns of one name under that name.
+        if any(self.names.count(self.names[c]) > 1 for c in columns):
+            raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         width = sum(self.lists.get(column, 1) for column in columns)
         check_unpacked(self.path, 8 * width * self.rows, self._size)
 
@@ -175,12 +165,12 @@ class ColumnarTable(ABC):
             raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
         return numbers
 
-    def keep(self, rows: Any) -> None:  # noqa: ANN401 - numbers of rows
+    def keep(self, rows: Indices | None) -> None:
         """Keep some rows only, all for None."""
         self._rows = rows
 
 
-def plain(values: Any) -> Column:  # noqa: ANN401 - pyarrow
+def plain(values: Arrow) -> Column:
     """Numbers as an array, NaN where there is none.
 
     Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half a second.
@@ -194,15 +184,14 @@ def plain(values: Any) -> Column:  # noqa: ANN401 - pyarrow
     return np.from_dlpack(values)
 
 
-def is_list(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
-    """Whether a column holds lists."""
+def _is_list(kind: Arrow) -> bool:
     import pyarrow as pa
 
-    tests = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
-    return any(test(kind) for test in tests)
+    types = pa.types
+    return bool(types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind))
 
 
-def is_number(kind: Any) -> bool:  # noqa: ANN401 - a pyarrow type
+def is_number(kind: Arrow) -> bool:
     """Whether a column holds numbers."""
     import pyarrow as pa
 
@@ -221,15 +210,14 @@ class ParquetTable(ColumnarTable):
         about = self._file.metadata  # vftcli's own is the file's, not the schema's
         return self._file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
 
-    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+    def _first_list(self, column: int) -> Arrow:
         name = self.names[column]
         batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
         first = next(iter(batches), None)
         return first.column(name)[0].as_py() if first is not None and first.num_rows else None
 
-    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
-        names = self.names
-        return self._file.read(columns=[names[c] for c in columns], use_threads=False)
+    def _decoded(self, columns: Sequence[int]) -> Arrow:
+        return self._file.read(columns=[self.names[c] for c in columns], use_threads=False)
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Decode some columns as `load` does, some thousand rows at a time."""
@@ -238,8 +226,8 @@ class ParquetTable(ColumnarTable):
 
         if self._rows is not None or self._direct is None:
             raise LogError(f"{self.path}: part of a file, or a packed one, is read in one piece")
-        names = self._names_of(columns)
-        self._check_size(columns)
+        self._check(columns)
+        names = {c: self.names[c] for c in columns}
         with guarded(self.path):
             # Read ahead, or as a mapped file, all of it would lie in memory; so would groups that
             # are asked for together.
@@ -266,27 +254,26 @@ class ArrowTable(ColumnarTable):
         check_unpacked(file.path, sum(size for _, size in batches), self._size)
         return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
-    def _first_list(self, column: int) -> Any:  # noqa: ANN401 - pyarrow
+    def _first_list(self, column: int) -> Arrow:
         for batch in self._stream([column]):
             batch.validate(full=True)
             if batch.num_rows:
                 return batch.column(0)[0].as_py()
         return None
 
-    def _decoded(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
+    def _decoded(self, columns: Sequence[int]) -> Arrow:
         table = self._stream(columns).read_all()
         table.validate(full=True)  # a damaged offset would lead out of the file
         return table
 
-    def _stream(self, columns: Sequence[int]) -> Any:  # noqa: ANN401 - pyarrow
-        """The batches, of some columns."""
+    def _stream(self, columns: Sequence[int]) -> Arrow:
         import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
         return pa.ipc.open_stream(self._content, options=options)
 
 
-def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
+def claims(content: Arrow) -> Iterator[tuple[int, int]]:
     """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
     import pyarrow as pa
 
@@ -313,7 +300,7 @@ def claims(content: Any) -> Iterator[tuple[int, int]]:  # noqa: ANN401 - pyarrow
 
 def unpacked(batch: "Flat", body: memoryview) -> int:
     """Bytes that the buffers of a batch say to unpack to."""
-    packed, total = batch.has(BATCH_PACKING), 0
+    packed, total = batch.field(BATCH_PACKING) is not None, 0
     for start, length in batch.pairs(BATCH_BUFFERS):
         claimed = length
         if packed and length >= NUMBER.size:
@@ -332,37 +319,32 @@ class Flat:
         self._fields = self._place - self._at("<i", self._place)
 
     def _at(self, kind: str, place: int) -> int:
-        """A number at a place."""
         if place < 0:
             raise struct.error
         return int(struct.unpack_from(kind, self._data, place)[0])
 
-    def _field(self, index: int) -> int | None:
+    def field(self, index: int) -> int | None:
         """Place of a field, None where it is left out."""
         if 4 + 2 * index >= self._at("<H", self._fields):
             return None
         offset = self._at("<H", self._fields + 4 + 2 * index)
         return self._place + offset if offset else None
 
-    def has(self, index: int) -> bool:
-        """Whether a field is there."""
-        return self._field(index) is not None
-
     def number(self, index: int) -> int:
         """A field of 64 bits, 0 where it is left out."""
-        place = self._field(index)
+        place = self.field(index)
         return 0 if place is None else self._at("<q", place)
 
     def table(self, index: int) -> "Flat":
         """A field that is a table."""
-        place = self._field(index)
+        place = self.field(index)
         if place is None:
             raise struct.error
         return Flat(self._data, place + self._at("<I", place))
 
     def pairs(self, index: int) -> Iterator[tuple[int, int]]:
         """A field that is a row of pairs of numbers."""
-        place = self._field(index)
+        place = self.field(index)
         if place is None:
             return
         place += self._at("<I", place)
@@ -381,13 +363,10 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
     def read(number: int, request: ReadChoice) -> RawLog:
         table.keep(np.flatnonzero(numbers == number) if len(there) > 1 else None)
         raw = from_table(table, request)
-        names = tuple(str(name) for name in about.get("joint_names") or ())
-        return replace(
-            raw,
-            wrench_frame=raw.wrench_frame or WrenchFrame.of_conversion(about.get("wrench_frame")),
-            joint_names=raw.joint_names or names,
-            robot_hint=raw.robot_hint or about.get("robot"),
-        )
+        names = raw.joint_names or tuple(str(name) for name in about.get("joint_names") or ())
+        frame = raw.wrench_frame or WrenchFrame.of_conversion(about.get("wrench_frame"))
+        hint = raw.robot_hint or about.get("robot")
+        return replace(raw, wrench_frame=frame, joint_names=names, robot_hint=hint)
 
     yield {number: partial(read, number) for number in there}
 

@@ -1,9 +1,8 @@
-"""Reader: what a log format is to this package, and the file a reader is handed."""
+"""What is asked of a reader, and what it gives: a choice, a raw log, one of several episodes."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
@@ -13,82 +12,10 @@ from vftcli.signals.option import LOG, Choice, Option, setting
 
 if TYPE_CHECKING:
     from vftcli.readers.columns import ColumnSpec
-    from vftcli.readers.opening import Wrapping
     from vftcli.signals.arrays import Array, Indices
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
     from vftcli.signals.wrench import WrenchFrame
-
-
-@dataclass(frozen=True, kw_only=True)
-class LogFile:
-    """A file or folder as the readers see it: its first bytes already unwrapped."""
-
-    path: Path  #: The file or folder.
-    #: The first bytes of the content, after gzip or zstd were taken off; empty for a folder.
-    head: bytes = b""
-    entries: tuple[str, ...] = ()  #: Names in the folder, sorted; empty for a file.
-    wrapping: "Wrapping | None" = None  #: What the file is compressed with as a whole, or None.
-
-    @property
-    def is_folder(self) -> bool:
-        """Whether the path is a folder."""
-        return self.path.is_dir()
-
-    @property
-    def direct(self) -> Path | None:
-        """The path, where other libraries can open it: a plain file with a name in UTF-8."""
-        try:
-            str(self.path).encode("utf-8")
-        except UnicodeEncodeError:
-            return None
-        return self.path if self.wrapping is None else None
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether `head` is the whole content."""
-        return len(self.content) == len(self.head)
-
-    @property
-    def content(self) -> memoryview:
-        """The whole content, unwrapped; a plain file is mapped, not read."""
-        return self._unwrapped[0]
-
-    def release(self) -> None:
-        """Let go of the pages of a mapped file that were touched so far; they can be read again."""
-        from vftcli.signals.arrays import release
-
-        release(self.content)
-
-    @property
-    def remarks(self) -> "tuple[Remark, ...]":
-        """What had to be left behind to open the file."""
-        from vftcli.signals.remarks import warning
-
-        if self.wrapping is None or not self._unwrapped[1]:
-            return ()
-        return (warning("file-cut", wrapping=self.wrapping),)
-
-    @cached_property
-    def _unwrapped(self) -> tuple[memoryview, bool]:
-        """The content, and whether it was cut; read once."""
-        from vftcli.readers.opening import unwrapped
-
-        return unwrapped(self.path, self.wrapping)
-
-    @cached_property
-    def lines(self) -> list[bytes]:
-        """The non-empty lines of the head, without their ends; [] if the head is not text."""
-        # No text in UTF-8 or an eight-bit encoding holds one of these.
-        if any(bytes([c]) in self.head for c in (*range(7), *range(14, 20), 127)):
-            return []
-        lines = self.head.replace(b"\r", b"\n").split(b"\n")
-        return [line for line in lines if line.strip()]
-
-    @property
-    def first_line(self) -> bytes:
-        """The first non-empty line without a byte-order mark, or nothing."""
-        return self.lines[0].removeprefix(b"\xef\xbb\xbf") if self.lines else b""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -265,20 +192,6 @@ class ReadChoice(Choice):
         return self.signals is None or signal in self.signals or signal in {"t", "q"}
 
 
-def open_log(path: Path) -> LogFile:
-    """Open a path for recognition: unwrap the head of a file, list a folder.
-
-    Raises:
-        LogError: If there is no such path or it cannot be opened.
-    """
-    if path.is_dir():
-        return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
-    from vftcli.readers.opening import head_of
-
-    head, wrapping = head_of(path)
-    return LogFile(path=path, head=head, wrapping=wrapping)
-
-
 #: The number of each episode of a file, rising, and the function that reads it.
 Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 
@@ -293,20 +206,22 @@ def episode_of(
     """
     from vftcli.signals.remarks import caution
 
-    number, count = request.episode, len(numbers)
-    if number is not None and number not in numbers:
-        there = f"{count} episodes, {numbers[0]} to {numbers[-1]}"
-        there = f"1 episode, {numbers[0]}" if count == 1 else there
+    first, count = numbers[0], len(numbers)
+    number = first if request.episode is None else request.episode
+    if number not in numbers:
+        there = (
+            f"1 episode, {first}" if count == 1 else f"{count} episodes, {first} to {numbers[-1]}"
+        )
         raise LogError(f"{path}: no episode {number}; it holds {there} (--episode K|all).")
-    taken = numbers[0] if number is None else number
-    said = number is None and count > 1
-    code = "episode-taken" if taken == 0 else "episode-taken-first"
-    remarks = (caution(code, episode=taken, episodes=count),) if said else ()
-    return taken, f"episode {taken}" if count > 1 else "", remarks
+    part = f"episode {number}" if count > 1 else ""
+    if request.episode is not None or count == 1:
+        return number, part, ()
+    code = "episode-taken" if number == 0 else "episode-taken-first"
+    return number, part, (caution(code, episode=number, episodes=count),)
 
 
 def arm_of(
-    path: Path | str, request: ReadChoice, arms: Sequence[str], told: str = ""
+    path: Path | str, request: ReadChoice, arms: Sequence[str], places: str = ""
 ) -> "tuple[str, tuple[Remark, ...]]":
     """The arm that is read of a log of two: the one asked for; to look at, the first, and said."""
     from vftcli.signals.remarks import caution
@@ -316,9 +231,9 @@ def arm_of(
     if request.arm is not None or len(arms) == 1:
         return request.arm or arms[0], ()
     if not request.examining:
-        where = f" ({told})" if told else ""
+        where = f" ({places})" if places else ""
         raise LogError(
             f"{path}: holds two arms{where}; say which with --arm {' or --arm '.join(arms)}."
         )
-    taken = caution("arm-side-taken", arm=arms[0], other=arms[1], places=told or "by name")
-    return arms[0], (taken,)
+    there = places or "by name"
+    return arms[0], (caution("arm-side-taken", arm=arms[0], other=arms[1], places=there),)

@@ -5,15 +5,19 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers.aliases import _clock, _wrench, filled_cells, grouped
+from vftcli.readers.aliases import clock_pick, filled_cells, grouped, wrench_pick
+from vftcli.readers.cleaning import measured, seconds, without_repeats
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
+from vftcli.readers.opening import Digest, open_log
 from vftcli.readers.parquet import ParquetTable
-from vftcli.readers.picking import picked
-from vftcli.readers.reader import ReadChoice, open_log
-from vftcli.readers.table import Pick, Picks, Table, listed, picks_of
+from vftcli.readers.reader import ReadChoice
+from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks, Table, listed, picks_of
+from vftcli.readers.tables import picked
 from vftcli.signals.arrays import Array, check_clock
-from vftcli.signals.errors import LogError
+from vftcli.signals.errors import ClockError, LogError
+from vftcli.signals.parsing import interval_text
+from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
 TORQUE = "tau_ext"
@@ -73,7 +77,7 @@ def found(table: Table) -> Picks:
             "--reference-columns, as in t,tau_ext:6."
         )
     groups = {name: g for name, g in grouped(table).items() if name.endswith(TORQUE)}
-    wrench = _wrench(table)
+    wrench = wrench_pick(table)
     if len(groups) > 1 or not (groups or wrench):
         there = " and ".join(groups) or f"no column ends in {TORQUE} among {listed(table.names)}"
         raise LogError(
@@ -86,4 +90,129 @@ def found(table: Table) -> Picks:
     ]
     if wrench is not None:
         picks.append(wrench)
-    return Picks(signals=tuple(picks), clock=_clock(table))
+    return Picks(signals=tuple(picks), clock=clock_pick(table))
+
+
+UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.
+
+
+@dataclass(frozen=True, kw_only=True)
+class JacobianLog:
+    """What such a log holds; the Jacobian's axes and point are the log's own."""
+
+    name: str  #: What it is called in tables.
+    path: Path  #: The file.
+    sha256: str  #: Digest of its bytes.
+    t: Array  #: Time since its first sample. (T,) [s]
+    tau_ext: Array  #: The vendor's estimate of the torque on the robot. (T, n) [N·m]
+    jacobian: Array  #: Rows of velocity, then of angular velocity. (T, 6, n)
+    wrench: Array | None  #: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
+    remarks: tuple[Remark, ...] = ()  #: What reading dropped or turned.
+
+
+@np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
+def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
+    """Read the log in which positions were looked for in vain."""
+    table, digest = found.table, Digest((path,))
+    digest.start()
+    signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
+    cells, n = _jacobian_cells(found)
+    if "tau_ext" not in signals or len(signals["tau_ext"].cells) != n:
+        raise LogError(
+            f"{path}: a Jacobian of {n} joints and no external torques of {n} joints beside it. "
+            "Name their columns with --columns, as in tau_ext=tau_ext_{i}."
+        )
+    signals["jacobian"] = Pick(signal="jacobian", cells=cells)
+    picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
+    raw = without_repeats(measured(picked(table, picks, ReadChoice()), path), path)
+    t = seconds(raw)
+    start, stop = choice.interval or (-np.inf, np.inf)
+    inside = (t >= start) & (t <= stop)
+    if np.count_nonzero(inside) < 2:
+        raise ClockError(f"{path}: fewer than two samples in {interval_text(start, stop)} [s]")
+    jacobian = velocity_first(raw.signals["jacobian"].reshape(-1, 6, n), path)
+    wrench = raw.signals.get("wrench")
+    return JacobianLog(
+        name=name,
+        path=path,
+        sha256=digest.hexdigest(),
+        t=t[inside],
+        tau_ext=raw.signals["tau_ext"][inside],
+        jacobian=jacobian[inside],
+        wrench=None if wrench is None else wrench[inside],
+        remarks=raw.remarks,
+    )
+
+
+def _jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
+    names = found.table.names
+    places = {
+        (int(match[2]), int(match[3])): Cell(column)
+        for column, name in enumerate(names)
+        if (match := JACOBIAN.fullmatch(name))
+    }
+    rows, columns = (sorted({place[k] for place in places}) for k in (0, 1))
+    if len(rows) != 6 or len(columns) < 6 or len(places) != 6 * len(columns):
+        raise LogError(
+            f"{found.table.path}: the Jacobian has {len(rows)} rows, {len(columns)} columns and "
+            f"{len(places)} cells; a wrench needs 6 rows and a column for each of 6 joints or more."
+        )
+    return tuple(places[r, c] for r in rows for c in columns), len(columns)
+
+
+def velocity_first(jacobian: Array, path: Path) -> Array:
+    """The Jacobian with its rows of velocity first: the axes of revolute joints have length 1."""
+    for J in (jacobian, np.roll(jacobian, 3, axis=1)):
+        if np.all(np.abs(np.linalg.norm(J[:, 3:], axis=1) - 1) < UNIT):
+            return J
+    raise LogError(
+        f"{path}: neither the first nor the last three rows of the Jacobian are axes of revolute "
+        "joints, of length 1."
+    )
+
+
+PREFIX = "tau_ext/"
+
+
+def estimates_columns(path: Path, observer: str) -> str | None:
+    """How to read an ``estimates.parquet`` with one observer's torque as its tau_ext.
+
+    Returns:
+        A description for ``--columns``, or None if the file is not one of ours.
+    """
+    if not (held := stored_observers(path)):
+        return None
+    if observer not in held:
+        raise LogError(
+            f"{path}: holds no estimates of {observer!r}; it holds {', '.join(held)}. Choose one "
+            "with --observer."
+        )
+    return f"t=t,q=q/{{i}},tau_ext={PREFIX}{observer}/{{i}}"
+
+
+def stored_observers(path: Path) -> list[str]:
+    """The observers whose estimates a file holds, none if it is not one of ours."""
+    if not path.is_file():
+        return []
+    with path.open("rb") as file:
+        if file.read(4) != b"PAR1":
+            return []
+    import polars as pl
+    from polars.exceptions import PolarsError
+
+    try:
+        with path.open("rb") as file:  # polars cannot open a name that is not UTF-8
+            names = pl.read_parquet_schema(file)
+    except PolarsError:  # what is damaged is said by whoever reads it
+        return []
+    held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})
+    return held if "t" in names and "q/1" in names else []
+
+
+def refuse_estimates(path: Path) -> None:
+    """Raise where a log is needed and a file of our estimates is given."""
+    if stored_observers(path):
+        raise LogError(
+            f"{path} holds estimates, not what the drives measured; give the log. `vftcli "
+            "contacts` lists its contacts and `vftcli admit` replays its force as they are"
+        )

@@ -1,14 +1,20 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import islice
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import Any, NamedTuple, Protocol, runtime_checkable
+from weakref import finalize
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.columns import SIGNALS, ColumnSpec, Item
+from vftcli.signals.arrays import Array, release
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
@@ -94,7 +100,7 @@ class Picks:
 
 
 class JacobianError(LogError):
-    """Torques beside a Jacobian where positions were looked for: `vftcli.readers.jacobian`."""
+    """Torques beside a Jacobian where positions were looked for: `vftcli.readers.references`."""
 
     def __init__(self, message: str, table: Table, picks: Picks) -> None:
         super().__init__(message)
@@ -122,15 +128,7 @@ def picks_of(
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     """Picks of a text that counts the columns in file order."""
-    cells = [
-        cell
-        for column in range(table.width)
-        for cell in (
-            [Cell(column, k) for k in range(table.lists[column])]
-            if column in table.lists
-            else [Cell(column)]
-        )
-    ]
+    cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
     missing = len(cells) - spec.width
     rest = any(item.count == 0 for item in spec.items)
     if missing < 0 or (missing and not rest):
@@ -139,14 +137,16 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
             f"{table.path}: --columns describes {spec.width} columns, the table has "
             f"{len(cells)}; {remedy}."
         )
-    picks, start = [], 0
-    for item in spec.items:
-        if item.rate is not None:
-            continue
-        count = item.count or missing
-        picks.append(pick_of(item, tuple(cells[start : start + count])))
-        start += count
-    return picks
+    left = iter(cells)
+    items = [item for item in spec.items if item.rate is None]
+    return [pick_of(item, tuple(islice(left, item.count or missing))) for item in items]
+
+
+def cells_of(table: Table, column: int, elements: slice = slice(None)) -> tuple[Cell, ...]:
+    """The cell of a column, or of elements of its lists one each."""
+    if column not in table.lists:
+        return (Cell(column),)
+    return tuple(Cell(column, k) for k in range(table.lists[column])[elements])
 
 
 def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
@@ -216,8 +216,7 @@ def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
                 f"{table.path}: {bare!r} is a column of numbers, not of lists: {name!r}."
             )
         return (Cell(column),)
-    length = table.lists[column]
-    cells = tuple(Cell(column, k) for k in range(length)[elements])
+    length, cells = table.lists[column], cells_of(table, column, elements)
     if not cells or (elements.stop or 0) > length:
         raise LogError(f"{table.path}: {bare!r} holds lists of {length}; there is no {name!r}.")
     return cells
@@ -275,3 +274,80 @@ def checked(table: Table, picks: Picks) -> Picks:
             f"{len(picks.clock.cells)}."
         )
     return picks
+
+
+#: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the system's
+#: folder for temporary files, and is an array all the same.
+HELD = 1 << 22
+
+
+class JoinedRows:
+    """The rows of a signal, part by part.
+
+    Attributes:
+        count: How many there are so far.
+        shapes: The shapes of single rows.
+    """
+
+    def __init__(self) -> None:
+        self.count, self.shapes = 0, set[tuple[int, ...]]()
+        self._held: list[Column] = []
+        self._size = 0
+        self._file: Any = None
+
+    def add(self, rows: Column) -> None:
+        """Take up the next rows. (N, k) or (N,)
+
+        Raises:
+            LogError: If they have no room.
+        """
+        self.count += len(rows)
+        self.shapes.add(rows.shape[1:])
+        self._kind = rows.dtype
+        self._held.append(rows)
+        self._size += rows.nbytes
+        if self._size > HELD and self.count > len(rows):
+            self._write()
+
+    def _write(self) -> None:
+        """Write the rows that wait behind those in the file."""
+        try:
+            if self._file is None:
+                self._file = TemporaryFile()  # noqa: SIM115 - open until all rows are there
+                finalize(self, self._file.close)
+            for rows in self._held:
+                self._file.write(np.ascontiguousarray(rows))
+                release(rows)
+            self._file.flush()
+        except OSError as error:
+            raise LogError(
+                f"a long log has no room in the folder of temporary files ({error.strerror}). "
+                "Name another: TMPDIR=FOLDER"
+            ) from None
+        self._held, self._size = [], 0
+
+    def whole(self) -> Column:
+        """All rows, where they have one shape; nothing can be added any more."""
+        if self._file is None:
+            return np.concatenate(self._held) if len(self._held) > 1 else self._held[0]
+        self._write()
+        mapped = mmap(self._file.fileno(), 0, access=ACCESS_READ)  # stays when the file is closed
+        return np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
+
+
+def joined(parts: Iterable[Mapping[str, Array]]) -> dict[str, Array]:
+    """Signals that come part by part, each as one array.
+
+    Args:
+        parts: Signal → its next rows (N, k); all parts have the same signals.
+
+    Raises:
+        LogError: If there are no parts, or no room for them.
+    """
+    found: dict[str, JoinedRows] = {}
+    for part in parts:
+        for name, rows in part.items():
+            found.setdefault(name, JoinedRows()).add(rows)
+    if not found:
+        raise LogError("the log has no rows; nothing was recorded into it")
+    return {name: rows.whole() for name, rows in found.items()}

@@ -9,22 +9,33 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, table_clock
-from vftcli.readers.columns import ColumnSpec, Item, parse_columns
-from vftcli.readers.delimited import TextTable, as_number
-from vftcli.readers.formats import LogFormat
-from vftcli.readers.headless import guessed
-from vftcli.readers.joints import robot_of
-from vftcli.readers.picking import picked
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
-from vftcli.readers.table import Cell, Column, Table, missing_column, named_cells, picks_of
+from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, robot_of, table_clock
+from vftcli.readers.columns import ColumnSpec, Item, guessed, parse_columns, tick_of
+from vftcli.readers.delimited import TextTable
+from vftcli.readers.opening import WHOLE_ROWS, LogFile
+from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.readers.reading import LogFormat
+from vftcli.readers.table import (
+    Cell,
+    Column,
+    LongTable,
+    Pick,
+    Picks,
+    Table,
+    joined,
+    missing_column,
+    named_cells,
+    picks_of,
+)
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
+RawField = Any  #: A further field of a RawLog.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
-def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table by its --columns text, else by the aliases of its column names.
 
     A text that names signals says something of these; what it leaves out is found by name.
@@ -33,34 +44,27 @@ def from_table(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noq
         LogError: If the columns cannot be told.
     """
     spec = request.spec
-    more["segment"] = spec.segment
-    stated = (item := spec.item("q")) is not None and item.unit is not None
+    item = spec.item("q")
+    more |= {"segment": spec.segment, "degrees_possible": item is None or item.unit is None}
     if spec.items and (not table.names or not spec.named):
-        return picked(table, picks_of(table, spec), request, degrees_possible=not stated, **more)
+        return picked(table, picks_of(table, spec), request, **more)
     if not table.names and table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
             "files into one table, or build the log through the API: vftcli.Recording(t=…, q=…)."
         )
     if not table.names:
-        return read_by_values(table, request, **more)
+        return _read_by_values(table, request, **more)
     picks, joints = picks_by_alias(table, spec.items)
-    return picked(
-        table,
-        picks,
-        request,
-        degrees_possible=not stated,
-        joint_names=joints,
-        robot_hint=robot_of(joints),
-        **more,
-    )
+    more |= {"joint_names": joints, "robot_hint": robot_of(joints)}
+    return picked(table, picks, request, **more)
 
 
 def read_layout(
     table: Table,
     layout: LogFormat,
     request: ReadChoice,
-    **more: Any,  # noqa: ANN401
+    **more: RawField,
 ) -> RawLog:
     """Read a table by the columns of its format; what it has not of them is left out.
 
@@ -73,10 +77,10 @@ def read_layout(
     Raises:
         LogError: If it has no clock or no positions.
     """
-    spec = parse_columns(layout.columns)
+    spec, names = parse_columns(layout.columns), table.names
     if spec.named:
-        spec = replace(spec, items=tuple(known_items(table, layout, spec)))
-    picks, names = picks_of(table, spec), table.names
+        spec = replace(spec, items=tuple(_known_items(table, layout, spec)))
+    picks = picks_of(table, spec)
     # Of the vendors' signals libfranka's residual alone is turned.
     signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
     payload = layout.payload.split()
@@ -85,9 +89,8 @@ def read_layout(
     return picked(table, picks, request, clock_name=layout.clock, **more)
 
 
-def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
+def _known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
     """The items of a layout of which a table has all columns, a joint each."""
-    names = table.names
     for item in spec.items:
         cells: tuple[Cell, ...] = ()
         with suppress(LogError):
@@ -99,44 +102,42 @@ def known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[I
             yield item
         elif item.signal in {"t", "q"}:
             raise LogError(
-                f"{table.path}: no {item.pattern} among its {len(names)} columns. {layout.remedy}"
+                f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
             )
 
 
-def described(table: Table, usual: str, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table whose columns are known, but for what a --columns text says of them."""
     stated = request.spec
     if stated.items and not stated.named:
         return from_table(table, request, **more)
-    items = {item.signal: item for item in parse_columns(usual).items if there(table, item)}
+    items = {}
+    for item in parse_columns(usual).items:
+        columns = (column.partition("[")[0] for column in (item.pattern or "").split("|"))
+        # The clock and the positions are always looked for.
+        if item.signal in {"t", "q"} or not set(table.names).isdisjoint(columns):
+            items[item.signal] = item
     if stated.item("q") is not None:
         items = {signal: item for signal, item in items.items() if signal == "t"}
     for item in stated.items:
-        items[item.signal] = restated(table, item, items.get(item.signal))
+        items[item.signal] = _restated(table, item, items.get(item.signal))
     spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
     return picked(table, picks_of(table, spec), request, **more)
 
 
-def there(table: Table, item: Item) -> bool:
-    """Whether a table has the columns of an item; its clock and positions are always looked for."""
-    columns = (item.pattern or "").split("|")
-    return item.signal in {"t", "q"} or any(c.partition("[")[0] in table.names for c in columns)
-
-
-def restated(table: Table, item: Item, usual: Item | None) -> Item:
+def _restated(table: Table, item: Item, usual: Item | None) -> Item:
     """An item of a --columns text, its columns the usual ones where it names none."""
     if item.pattern is not None or item.rate is not None:
         return item
     if usual is None:
         raise missing_column(table, item.signal, item.signal)
     scale = usual.factor if item.unit is None else math.copysign(1.0, usual.factor)
-    factor = item.factor * scale
-    return replace(usual, factor=factor, unit=item.unit or usual.unit)
+    return replace(usual, factor=item.factor * scale, unit=item.unit or usual.unit)
 
 
-def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  # noqa: ANN401
+def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table without a header whose values settle what its columns are, and say it."""
     columns: dict[int, Column] = {}
     if 1 < table.width <= WIDEST and not table.lists:
@@ -151,11 +152,11 @@ def read_by_values(table: Table, request: ReadChoice, **more: Any) -> RawLog:  #
             f"{table.path}: a table of {table.width} columns without a header. Say what they are "
             f"with --columns, in file order, {likely}"
         )
-    told = fact("columns-by-value", count=table.width, columns=found.columns, why=found.why)
+    remark = fact("columns-by-value", count=table.width, columns=found.columns, why=found.why)
     named = {str(k): column for k, column in columns.items()}
     loaded = ArrayTable(path=table.path, columns=named, headed=False, remarks=table.remarks)
     picks = picks_of(loaded, parse_columns(found.columns))
-    return picked(loaded, picks, request, degrees_possible=True, remarks=(told,), **more)
+    return picked(loaded, picks, request, remarks=(remark,), **more)
 
 
 @dataclass
@@ -184,18 +185,17 @@ class ArrayTable:
 
     def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
         """Return columns as float64; whole stamps stay whole."""
-        arrays = list(self.columns.values())
-        names = list(self.columns)
-        lengths = {len(arrays[c]) for c in columns}
-        if len(lengths) > 1:
-            told = ", ".join(f"{names[c]} {len(arrays[c])}" for c in columns)
-            raise LogError(f"{self.path}: the arrays differ in length: {told} rows.")
+        each = list(self.columns.items())
+        if len({len(each[c][1]) for c in columns}) > 1:
+            lengths = ", ".join(f"{each[c][0]} {len(each[c][1])}" for c in columns)
+            raise LogError(f"{self.path}: the arrays differ in length: {lengths} rows.")
         loaded = {}
         for c in columns:
-            if arrays[c].dtype.kind not in "fiub":
-                raise LogError(f"{self.path}: {names[c]} holds {arrays[c].dtype}, not numbers.")
-            whole = c == clock and arrays[c].dtype.kind in "iu" and arrays[c].dtype.itemsize == 8
-            values = np.asarray(arrays[c]).astype(np.int64 if whole else np.float64, copy=False)
+            name, array = each[c]
+            if array.dtype.kind not in "fiub":
+                raise LogError(f"{self.path}: {name} holds {array.dtype}, not numbers.")
+            whole = c == clock and array.dtype.kind in "iu" and array.dtype.itemsize == 8
+            values = np.asarray(array).astype(np.int64 if whole else np.float64, copy=False)
             loaded[c] = values[:, 0] if values.ndim == 2 and c not in self.lists else values
         return loaded
 
@@ -210,8 +210,8 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
     if len(table.sample) < 2:
         return table.width > 1
     cells = table.cells(table.sample[1])
-    numbers = [as_number(cell, decimal_comma=table.decimal_comma) for cell in cells]
-    return len(cells) > 1 and sum(n is not None for n in numbers) * 2 >= len(cells)
+    numbers = sum(map(table.is_number, cells))
+    return len(cells) > 1 and numbers * 2 >= len(cells)
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
@@ -219,3 +219,118 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     if layout.columns:
         return read_layout(TextTable(file), layout, request)
     return from_table(TextTable(file), request)
+
+
+def picked(
+    table: Table,
+    picks: Picks,
+    request: ReadChoice,
+    *,
+    clock_name: str = "",
+    **more: RawField,
+) -> RawLog:
+    """Load the picked columns of a table and scale them."""
+    signals = tuple(p for p in picks.signals if request.wants(p.signal))
+    clock = picks.clock.cells[0] if picks.clock else None
+    last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
+    kept = {cell.column for cell in picks.clock.cells} if picks.clock else set()
+    kept |= set() if picks.origin is None else {picks.origin}
+    asked = sorted(kept.union(last, picks.constants)), clock.column if clock else None
+    columns: dict[int, list[Column]] = {}
+    constants: tuple[float, ...] = ()
+
+    def stacked(parts: Iterator[dict[int, Column]]) -> Iterator[dict[str, Array]]:
+        nonlocal constants
+        columns.clear()
+        for loaded in parts:
+            for column in kept:
+                columns.setdefault(column, []).append(loaded[column])
+            last_rows = (loaded[c][-1:] for c in picks.constants)
+            constants = tuple(float(row[0]) if len(row) else np.nan for row in last_rows)
+            arrays = {}
+            for pick in signals:
+                arrays[pick.signal] = _stacked(pick, loaded)
+                # Columns and what is picked of them have no room beside each other.
+                for column in [c for c in loaded if last.get(c) == pick.signal]:
+                    del loaded[column]
+            yield arrays
+
+    arrays: dict[str, Array] = {}
+    if isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
+        with suppress(LogError):  # in one piece it can be mended, or it is known what is wrong
+            arrays = joined(stacked(table.blocks(*asked)))
+    arrays = arrays or joined(stacked(table.load(*asked) for _ in range(1)))
+    loaded = {c: np.concatenate(x) if len(x) > 1 else x[0] for c, x in columns.items()}
+    rows = len(next(iter(arrays.values())))
+    stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
+    if picks.origin is not None and len(stamps):
+        more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
+    if constants and np.isfinite(constants).all():
+        more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
+    remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
+    wrench = next((pick for pick in signals if pick.signal == "wrench"), None)
+    more.setdefault("wrench_frame", wrench.frame if wrench else None)
+    return RawLog(
+        stamps=stamps,
+        tick=tick,
+        clock=words,
+        signals=arrays,
+        remarks=(*remarks, *more.pop("remarks", ())),
+        **more,
+    )
+
+
+def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
+    """One signal's cells side by side, scaled. (T, n)"""
+    rows = len(loaded[pick.cells[0].column])
+    out = np.empty((rows, len(pick.cells)))
+    for j, cell in enumerate(pick.cells):
+        column = loaded[cell.column]
+        out[:, j] = column if cell.element is None else column[:, cell.element]
+        if cell.turned:
+            out[:, j] = 0.0 - out[:, j]
+    if pick.factor != 1.0:
+        out *= pick.factor
+        out += 0.0  # a turned zero is plain zero
+    return out
+
+
+def _stamps(
+    table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int, clock_name: str
+) -> tuple[Column, float, str]:
+    """The stamps of the rows (T,), the length of their tick and which clock they are."""
+    clock = picks.clock
+    if clock is None:
+        if picks.rate is None:
+            raise LogError(
+                f"{table.path}: no clock. Name its column with --columns (t=…, or t in file "
+                "order), or say the rate of a log without one: t@125Hz."
+            )
+        words = clock_name or f"none: {picks.rate:g} Hz as stated"
+        return np.arange(rows), 1 / picks.rate, words
+    if clock.factor < 0 or any(cell.turned for cell in clock.cells):
+        raise LogError(
+            f"{table.path}: --columns turns the sign of the clock; time cannot run back."
+        )
+    cell, *rest = clock.cells
+    column = loaded[cell.column]
+    stamps: Column = column if cell.element is None else column[:, cell.element]
+    name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
+    words = clock_name or f"column {name}" if table.names else name
+    if rest:
+        return _of_pair(table, stamps, loaded[rest[0].column]), 1e-9, words
+    if clock.unit is not None:
+        return stamps, clock.factor, f"{words} [{clock.unit}]"
+    tick, unit = tick_of(stamps, name)
+    return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
+
+
+def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
+    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]"""
+    whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
+    if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
+        raise LogError(
+            f"{table.path}: the two columns of the clock are no whole seconds and the nanoseconds "
+            "within them. Name one column of time with --columns, as in t=…"
+        )
+    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)

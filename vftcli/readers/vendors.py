@@ -1,14 +1,18 @@
 """UR's real-time data exchange: the official client's text and binary files, and ur_rtde's CSV."""
 
+import ast
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from vftcli.readers.delimited import TextTable
-from vftcli.readers.formats import FORMATS, LogFormat
-from vftcli.readers.reader import LogFile, RawLog, ReadChoice
-from vftcli.readers.tables import ArrayTable, read_layout
+from vftcli.readers.aliases import laid_along
+from vftcli.readers.delimited import TextTable, is_number, split_cells
+from vftcli.readers.opening import LogFile
+from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.readers.reading import FORMATS, LogFormat
+from vftcli.readers.tables import ArrayTable, from_table, read_layout
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
@@ -29,7 +33,10 @@ BINARY_TYPES = {
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read a table of RTDE names."""
+    """Read a table of RTDE names, or a printed JointState topic."""
+    if layout.name in {"bagpy", "rostopic", "ros2-echo"}:
+        printed = EchoTable(file) if layout.name == "ros2-echo" else TextTable(file)
+        return laid_along(from_table(printed, request), joint_names(printed), request)
     table = binary_table(file) if layout.name == "ur-binary" else TextTable(file)
     raw = read_layout(table, FORMATS["ur-csv"], request)
     return replace(raw, wrench_frame=force_frame(table.names, raw.stamps * raw.tick))
@@ -83,3 +90,73 @@ def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
     if unknown := set(types) - set(BINARY_TYPES):
         raise LogError(f"{file.path}: unknown column type {unknown.pop()!r} in the second line.")
     return names, types, len(first) + len(second) + 2
+
+
+STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
+
+
+@dataclass
+class EchoTable(TextTable):
+    """A table by ``ros2 topic echo --csv``: a message's fields in their order, without a header.
+
+    Names, positions, velocities and efforts, as many of each or none, follow the header's stamp and
+    frame.
+    """
+
+    @cached_property
+    def joints(self) -> int:
+        """Number of names in the first row; 0 where it is no such row."""
+        cells = split_cells(self.sample[0], ",")
+        words = [k for k, cell in enumerate(cells) if k >= STAMP and not is_number(cell)]
+        count = len(words)
+        values = len(cells) - STAMP - count
+        stamped = len(cells) > STAMP and all(cell.isdigit() for cell in cells[:2])
+        if not stamped or is_number(cells[2]) or words != list(range(STAMP, STAMP + count)):
+            return 0
+        return count if count and values >= count and values % count == 0 else 0
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """The columns' names, as rostopic would print them."""
+        fields = ("name", "position", "velocity", "effort")
+        count, width = self.joints, self.width
+        named = [f"{fields[k // count]}{k % count}" for k in range(min(width - STAMP, 4 * count))]
+        more = [f"_{k}" for k in range(width - STAMP - len(named))]
+        return ("sec", "nanosec", "frame_id", *named, *more)
+
+    @property
+    def _header_is_comment(self) -> bool:
+        return True
+
+
+def joint_names(table: TextTable) -> tuple[str, ...]:
+    """The joints' names that the rows hold, in the order of the columns."""
+    names = table.names
+    columns = [k for k, name in enumerate(names) if name.removeprefix("field.")[:4] == "name"]
+    found = [table.words(column) for column in columns]
+    for words in found:
+        if len(words) > 1:
+            raise LogError(
+                f"{table.path}: the rows name different joints ({words[0][:60]} and "
+                f"{words[1][:60]}), as where two controllers publish on one topic. Keep the rows "
+                "of the arm."
+            )
+    if len(found) == 1 and found[0][0].startswith(("[", "(")):
+        return _listed_names(table, found[0][0])
+    return tuple(words[0] for words in found)
+
+
+def _listed_names(table: TextTable, text: str) -> tuple[str, ...]:
+    try:
+        names = ast.literal_eval(text)
+    except (ValueError, SyntaxError, RecursionError, MemoryError):
+        names = None
+    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
+        raise LogError(f"{table.path}: the column name holds no list of joints: {text[:60]!r}")
+    return tuple(names)
+
+
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a file was printed by ``ros2 topic echo --csv`` of a JointState topic."""
+    cells = split_cells(file.first_line.decode("utf-8", "replace"), ",")
+    return len(cells) > STAMP and EchoTable(file).joints > 0

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.joints import UR_NAMES, UR_WORDS, kinematic_order
+from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import printable

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from vftcli.batch.datasets import DataFile, ForceColumn, Forces, OfEpisodes
-from vftcli.readers.formats import FORMATS
 from vftcli.readers.hdf5 import episode_places
-from vftcli.readers.reader import open_log
+from vftcli.readers.opening import open_log
+from vftcli.readers.reading import FORMATS
 from vftcli.signals.errors import LogError
 
 ENDINGS = (".h5", ".hdf5")  #: Names that files of episodes end with.

@@ -29,7 +29,7 @@ from vftcli.outputs.log.run_record import (
     to_json,
 )
 from vftcli.outputs.page.pages import render, render_index
-from vftcli.readers.jacobian import JacobianLog
+from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed

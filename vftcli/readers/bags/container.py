@@ -1,19 +1,19 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
 import io
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from importlib import import_module
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.opening import check_unpacked, natural
-from vftcli.readers.reader import LogFile
+from vftcli.readers.opening import LogFile, check_unpacked, natural
 from vftcli.signals import parsing
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, caution, fact, warning
+from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
 Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
@@ -71,7 +71,6 @@ def batched(runs: Iterable[ChannelRun], ingest: "Ingest") -> Iterator[Batch]:
 
 
 def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
-    """Messages of one channel as a batch."""
     channel, times, contents = found
     ends = np.cumsum([len(content) for content in contents])
     lengths = np.diff(ends, prepend=0)
@@ -175,6 +174,43 @@ def storage_files(file: LogFile) -> list[str]:
     names = {n for n in file.entries if n.endswith(STORAGE) and (file.path / n).is_file()}
     plain = {n for n in names if n.removesuffix(".zstd").removesuffix(".zst") not in names - {n}}
     return sorted(plain, key=natural)
+
+
+#: How a file of a container begins → the module and function here that read it.
+CONTAINERS = {
+    b"#ROSBAG V2.0\n": ("rosbag1", "batches"),
+    b"\x89MCAP0\r\n": ("ros2", "mcap_batches"),
+    b"SQLite format 3\0": ("ros2", "db3_batches"),
+}
+
+
+def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
+    """The messages of files, one behind the other; what a library raises is told in one line."""
+    for file in files:
+        begins = next((magic for magic in CONTAINERS if file.head.startswith(magic)), None)
+        if begins is None:
+            raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
+        module, function = CONTAINERS[begins]
+        batches_of = getattr(import_module(f"vftcli.readers.bags.{module}"), function)
+        try:
+            for batch in batches_of(file, ingest):
+                yield batch
+                file.release()
+        except LogError:
+            raise
+        except MemoryError:
+            raise LogError(
+                f"{ingest.path}: a part of it claims more memory than the file holds; it is "
+                "damaged."
+            ) from None
+        except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
+            reason = printable(f"{type(error).__name__}: {error}")[:100]
+            raise LogError(
+                f"{ingest.path}: not a readable bag; it is damaged ({reason})."
+            ) from None
+        if file.path != ingest.path:
+            for remark in file.remarks:
+                ingest.note(replace(remark, where=Where(about=file.path.name)))
 
 
 def printable(name: str) -> str:

@@ -1,23 +1,161 @@
-"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one."""
+"""Bulk decoding: messages of one layout become arrays at once, the odd ones one by one.
+
+A layout says where the numbers of a serialised ROS message lie. It is found by walking one message
+along its definition. Another message has the same layout if and only if it is as long and all its
+length prefixes are equal; strings are required to be equal too, so that joint names hold for every
+message of a group.
+"""
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vftcli.readers.bags.container import Batch, Channel, Ingest, Integers
-from vftcli.readers.bags.layout import LayoutError, MessageLayout, Types, Walker
-from vftcli.readers.bags.ros_messages import types_for
-from vftcli.readers.joining import JoinedRows
-from vftcli.readers.joints import in_order, kinematic_order
-from vftcli.readers.table import Column
-from vftcli.signals.arrays import Array
+from vftcli.readers.aliases import along_arm
+from vftcli.readers.bags.container import Batch, Bytes, Channel, Ingest, Integers, strided
+from vftcli.readers.bags.ros_messages import SIZES, Field, LayoutError, Types, types_for
+from vftcli.readers.table import Column, JoinedRows
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
 
+MAX_DEPTH = 24
+MAX_LEAVES = 20_000
+#: Fields that a walk may visit beyond one a byte: messages without fields take none.
+SPARE_VISITS = 1000
+#: The numbers below a wrench.
+VECTORS = ("force.x", "force.y", "force.z", "torque.x", "torque.y", "torque.z")
 
-def paths_by_name(text: str) -> dict[str, tuple[str, ...]]:
+
+class Leaf(NamedTuple):
+    """Numbers in a message: where, of which type, how many."""
+
+    offset: int
+    code: str
+    numbers: int
+
+
+class MessageLayout:
+    """Where everything lies in messages of one shape.
+
+    Attributes:
+        leaves: Dotted path → numbers.
+        texts: Dotted path → strings, one or several.
+        fixed: Ranges of bytes that have to be equal for a message to have this layout.
+        uses: Number of batches it was used for.
+    """
+
+    def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
+        self.leaves: dict[str, Leaf] = {}
+        self.texts: dict[str, tuple[str, ...]] = {}
+        self.fixed: list[tuple[int, int]] = []
+        self.uses = 0
+        self._types, self._message, self._cdr = types, message, cdr
+        self._order, self._position, self._visits = "<", 0, 0
+        if cdr:  # four bytes: representation and byte order
+            if len(message) < 4 or message[0] != 0 or message[1] > 1:
+                raise LayoutError("unknown encapsulation")
+            self._order = "<" if message[1] == 1 else ">"
+            self.fixed.append((0, 2))
+            self._position = 4
+        self._walk("", kind, 0)
+        # Some writers pad a message at its end.
+        if len(message) - self._position > (8 if cdr else 0):
+            raise LayoutError(f"{len(message) - self._position} bytes too many")
+        self._expected = [message[a:b].copy() for a, b in self.fixed]
+        del self._message  # a part of a batch, all of which would stay in memory
+
+    def fits(self, buffer: Bytes, offsets: Integers) -> Mask:
+        """Which messages, all of this layout's length, have this layout. (k,)"""
+        same = np.ones(len(offsets), dtype=bool)
+        for (a, b), expected in zip(self.fixed, self._expected, strict=True):
+            same &= (strided(buffer, offsets, a, b) == expected).all(axis=1)
+        return same
+
+    def numbers(
+        self, paths: Sequence[str], buffer: Bytes, offsets: Integers
+    ) -> NDArray[np.float64]:
+        """The numbers of each message at the first path that is there. (k, count)
+
+        At a path without numbers of its own are the six of a wrench, or none.
+        """
+        each = [[p] if p in self.leaves else [f"{p}.{part}" for part in VECTORS] for p in paths]
+        found = next((names for names in each if self.leaves.keys() >= set(names)), [])
+        columns = [np.empty((len(offsets), 0))]
+        for leaf in map(self.leaves.__getitem__, found):
+            dtype = np.dtype(leaf.code)
+            raw = strided(buffer, offsets, leaf.offset, leaf.offset + leaf.numbers * dtype.itemsize)
+            columns.append(np.ascontiguousarray(raw).view(dtype).astype(np.float64))
+        return np.hstack(columns) if len(columns) != 2 else columns[1]
+
+    def _walk(self, path: str, kind: str, depth: int) -> None:
+        """Walk the fields of one message: numbers, text, or messages."""
+        if depth > MAX_DEPTH:
+            raise LayoutError("nested too deeply")
+        # Empty messages take no bytes: a few nested types of them would be visited without end.
+        self._visits += 1
+        if self._visits > len(self._message) + SPARE_VISITS:
+            raise LayoutError("more parts than bytes")
+        if kind not in self._types:
+            raise LayoutError(f"no definition of {kind}")
+        for part in self._types[kind]:
+            inner = f"{path}.{part.name}" if path else part.name
+            many = self._count() if part.many == -1 else part.many
+            if part.type in SIZES:
+                self._numbers(inner, part, 1 if many is None else many)
+            elif part.type == "string":
+                texts = [self._text(inner) for _ in range(1 if many is None else many)]
+                self.texts[inner] = tuple(texts)
+            elif many is None:
+                self._walk(inner, part.type, depth + 1)
+            else:
+                for k in range(many):
+                    self._walk(f"{inner}[{k}]", part.type, depth + 1)
+
+    def _take(self, size: int, what: str) -> int:
+        start, self._position = self._position, self._position + size
+        if self._position > len(self._message):
+            raise LayoutError(f"{what} lies outside the message")
+        return start
+
+    def _take_fixed(self, size: int, what: str) -> Bytes:
+        """The next bytes, which every message of this layout must repeat."""
+        start = self._take(size, what)
+        if self.fixed and self.fixed[-1][1] == start:
+            start, _ = self.fixed.pop()
+        self.fixed.append((start, self._position))
+        return self._message[self._position - size : self._position]
+
+    def _align(self, size: int) -> None:
+        if self._cdr:
+            self._position += -(self._position - 4) % size
+
+    def _numbers(self, path: str, part: Field, count: int) -> None:
+        code = SIZES[part.type]
+        size = np.dtype(code).itemsize
+        if count:
+            self._align(size)
+        start = self._take(count * size, path)
+        if len(self.leaves) > MAX_LEAVES:
+            raise LayoutError(f"{path} lies outside the message")
+        self.leaves[path] = Leaf(start, self._order + code, count)
+
+    def _count(self) -> int:
+        self._align(4)
+        count = int(self._take_fixed(4, "a length").view(f"{self._order}u4")[0])
+        # An element takes a byte or more: a larger count is damage, not data.
+        if count > len(self._message) - self._position:
+            raise LayoutError("a count larger than what is left of the message")
+        return count
+
+    def _text(self, path: str) -> str:
+        raw = self._take_fixed(self._count(), path).tobytes()
+        return raw.removesuffix(b"\0").decode("utf-8", "replace")
+
+
+def _paths_by_name(text: str) -> dict[str, tuple[str, ...]]:
     """Name → paths, of words as "q=position|q": two paths are two releases' names of one field."""
     words = (word.split("=") for word in text.split())
     return {name: tuple(paths.split("|")) for name, paths in words}
@@ -33,27 +171,25 @@ class Kind(NamedTuple):
     frame: str = ""  #: Path of the frame's name.
     #: Name → paths to try of the load's numbers, of which the last value counts.
     constants: Mapping[str, tuple[str, ...]] = {}
-    #: Whether it is Franka's: it leads, its residual is to be turned, its wrench's frame is known.
+    #: Whether it is Franka's: it leads, its residual is turned, its wrench's frame is known.
     franka: bool = False
 
 
-#: Path of a robot's own clock in any type. [s]
-ROBOT_TIME = "time"
 #: Message type → what is read from it.
 KINDS = {
     "sensor_msgs/JointState": Kind(
-        paths_by_name("q=position dq=velocity effort=effort"), names="name"
+        _paths_by_name("q=position dq=velocity effort=effort"), names="name"
     ),
     "franka_msgs/FrankaState": Kind(
-        paths_by_name(
+        _paths_by_name(
             "q=q dq=dq torque=tau_J target_q=q_d target_dq=dq_d tau_ext=tau_ext_hat_filtered "
             "wrench=O_F_ext_hat_K"
         ),
-        constants=paths_by_name("mass=m_load com=F_x_Cload"),
+        constants=_paths_by_name("mass=m_load com=F_x_Cload"),
         franka=True,
     ),
     "franka_msgs/FrankaRobotState": Kind(
-        paths_by_name(
+        _paths_by_name(
             "q=measured_joint_state.position|q dq=measured_joint_state.velocity|dq "
             "torque=measured_joint_state.effort|tau_j target_q=desired_joint_state.position|q_d "
             "target_dq=desired_joint_state.velocity|dq_d "
@@ -61,12 +197,11 @@ KINDS = {
             "wrench=o_f_ext_hat_k.wrench|o_f_ext_hat_k"
         ),
         names="measured_joint_state.name",
-        constants=paths_by_name("mass=inertia_load.inertia.m|m_load com=f_x_cload"),
+        constants=_paths_by_name("mass=inertia_load.inertia.m|m_load com=f_x_cload"),
         franka=True,
     ),
-    "geometry_msgs/WrenchStamped": Kind(paths_by_name("wrench=wrench"), frame="header.frame_id"),
+    "geometry_msgs/WrenchStamped": Kind(_paths_by_name("wrench=wrench"), frame="header.frame_id"),
 }
-
 
 #: Layouts that messages of one topic may have: joint names, and lengths of lists, hardly vary.
 LAYOUTS = 512
@@ -76,11 +211,7 @@ CHECKED_ROWS = 4
 
 @dataclass
 class Stream:
-    """Messages of one topic about the same joints, as arrays.
-
-    Attributes:
-        messages: How many messages.
-    """
+    """Messages of one topic about the same joints, as arrays."""
 
     channel: Channel  #: The topic.
     kind: Kind  #: What its type means.
@@ -89,20 +220,15 @@ class Stream:
     frame: str  #: Frame of its stamps' headers, or nothing.
     receive: Integers  #: When each was recorded. (T,) [ns]
     header: Integers | None  #: Stamp in each header. (T,) [ns]
-    robot: Array | None  #: The robot's own clock, or None. (T,) [s]
     signals: dict[str, Array]  #: Signal → (T, k).
-    constants: dict[str, tuple[float, ...]]  #: Last value of each constant.
+    robot: Array | None = None  #: The robot's own clock, or None. (T,) [s]
+    #: Last value of each constant.
+    constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
     def messages(self) -> int:
         """Number of messages."""
         return len(self.receive)
-
-    def series(self) -> Iterator[tuple[str, Column]]:
-        """Its times and signals, by name."""
-        times = (("receive", self.receive), ("header", self.header), ("robot", self.robot))
-        yield from ((name, value) for name, value in times if value is not None)
-        yield from self.signals.items()
 
 
 #: What tells streams of a topic apart: the joints' names, the frame, the signals.
@@ -148,7 +274,7 @@ class Decoder:
             topic.seen += len(batch.offsets)
             for key, parts in topic.parts.items():
                 series = topic.series.setdefault(key, defaultdict(JoinedRows))
-                for name, value in in_recorded_order(parts):
+                for name, value in _in_recorded_order(parts):
                     series[name].add(value)
             topic.parts.clear()
         except LayoutError as error:
@@ -163,7 +289,7 @@ class Decoder:
         known, place = topic.layouts.setdefault(length, []), 0
         while rows.size:
             if place == len(known):
-                known.append(self._walked(batch, topic, int(rows[0])))
+                known.append(_layout_of(batch, topic, int(rows[0])))
                 if sum(map(len, topic.layouts.values())) > LAYOUTS:
                     raise LayoutError(f"its messages have more than {LAYOUTS} layouts")
             fits = known[place].fits(batch.buffer, batch.offsets[rows])
@@ -171,61 +297,45 @@ class Decoder:
                 self._decode(batch, topic, known[place], rows[fits])
             rows, place = rows[~fits], place + 1
 
-    def _walked(self, batch: Batch, topic: _Topic, row: int) -> MessageLayout:
-        """The layout of one message."""
-        start = int(batch.offsets[row])
-        message = batch.buffer[start : start + int(batch.lengths[row])]
-        cdr = batch.channel.encoding == "cdr"
-        return Walker(topic.types, message, cdr=cdr).walk(batch.channel.type)
-
     def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
         """Decode messages of one layout into a part of their stream."""
         layout.uses += 1
         if layout.uses & (layout.uses - 1) == 0:  # the first, second, fourth, eighth … batch
             for row in self._chance.choice(rows, min(CHECKED_ROWS, len(rows)), replace=False):
-                if self._walked(batch, topic, int(row)).leaves != layout.leaves:
+                if _layout_of(batch, topic, int(row)).leaves != layout.leaves:
                     raise LayoutError("two walks of one message differ")
         kind = KINDS[batch.channel.type]
         at = batch.buffer, batch.offsets[rows]
         each = {signal: layout.numbers(paths, *at) for signal, paths in kind.signals.items()}
-        signals = {signal: value for signal, value in each.items() if value.shape[1]}
         for name, paths in kind.constants.items():
             if (last := layout.numbers(paths, *at)[-1]).size:
                 topic.constants[name] = tuple(last.tolist())
-        names = layout.texts.get(kind.names, ())
-        order = kinematic_order(names)
         # Some drivers publish joints alphabetically; every message of a layout has one order.
-        mixed = order != tuple(range(len(names)))
-        if mixed:
-            # Of an arm of six joints the wrench has as many columns, but they are no joints.
-            signals = {
-                n: v if n == "wrench" else in_order(v, order, len(names))
-                for n, v in signals.items()
-            }
-            names = tuple(names[k] for k in order)
-        frame = "".join(layout.texts.get(kind.frame, ()))
+        own = layout.texts.get(kind.names, ())
+        names, signals = along_arm(own, {s: value for s, value in each.items() if value.shape[1]})
+        if kind.franka and "tau_ext" in signals:
+            signals["tau_ext"] = 0.0 - signals["tau_ext"]
+        key = names, "".join(layout.texts.get(kind.frame, ())), tuple(signals)
         part = signals | {"place": topic.seen + rows, "receive": batch.times[rows]}
-        if (clock := layout.numbers([ROBOT_TIME], *at)).size:
+        if (clock := layout.numbers(["time"], *at)).size:  # a robot's own [s]
             part["robot"] = clock[:, 0]
         # float64 holds both whole.
         stamp = [layout.numbers([f"header.stamp.{part}"], *at) for part in ("sec", "nanosec")]
         if all(number.size for number in stamp):
             part["header"] = np.hstack(stamp).astype(np.int64) @ (10**9, 1)
-        key = names, frame, tuple(signals)
         topic.parts.setdefault(key, []).append(part)
-        topic.mixed |= {key} if mixed else set()
+        topic.mixed |= {key} if names != own else set()
 
     def streams(self) -> Iterator[Stream]:
         """All streams that were decoded, each in the order of recording."""
         for channel, topic in self.topics.items():
             for key, series in topic.series.items():
                 names, frame, signals = key
-                count = series["receive"].count
                 # What every message has, and of one width.
                 found = {
                     name: rows.whole()
                     for name, rows in series.items()
-                    if len(rows.shapes) == 1 and rows.count == count
+                    if len(rows.shapes) == 1 and rows.count == series["receive"].count
                 }
                 yield Stream(
                     channel=channel,
@@ -241,7 +351,13 @@ class Decoder:
                 )
 
 
-def in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:
+def _layout_of(batch: Batch, topic: _Topic, row: int) -> MessageLayout:
+    start, channel = int(batch.offsets[row]), batch.channel
+    message = batch.buffer[start : start + int(batch.lengths[row])]
+    return MessageLayout(topic.types, message, channel.type, cdr=channel.encoding == "cdr")
+
+
+def _in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:
     """The times and signals that all parts of a batch have, in the order of recording."""
     order = np.argsort(np.concatenate([part.pop("place") for part in parts]), kind="stable")
     for name, value in parts[0].items():

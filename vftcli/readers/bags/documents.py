@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.readers.aliases import along_arm, laid_along
 from vftcli.readers.bags.container import Batch, Channel, Ingest
-from vftcli.readers.bags.decode import KINDS, Stream
-from vftcli.readers.bags.layout import VECTORS
-from vftcli.readers.joints import in_order, kinematic_order, laid_along
+from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import Column
 from vftcli.readers.tables import ArrayTable, from_table
@@ -29,8 +28,7 @@ SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "n
 Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
 
 
-def is_joint_state(row: Document) -> bool:
-    """Whether a document has joints' names and a position for each."""
+def _is_joint_state(row: Document) -> bool:
     names, positions = row.get("name"), row.get("position")
     if not isinstance(names, list) or not isinstance(positions, list):
         return False
@@ -50,25 +48,23 @@ def _stream(
     if any(key.startswith(STAMPS) for key in rows[0]) if without else None in stamps:
         return None
     signals = {}
-    order = kinematic_order(names)
     for signal, paths in KINDS[kind].signals.items():
         keys = [f"wrench.{path}" for path in VECTORS] if signal == "wrench" else paths
         values = matrix(rows, keys, len(names) if names else len(VECTORS))
         if values is not None:
-            signals[signal] = in_order(values, order, len(names)) if names else values
+            signals[signal] = values
     if "q" not in signals and "wrench" not in signals:
         return None
+    ordered, signals = along_arm(names, signals)
     return Stream(
         channel=replace(channel, type=kind),
         kind=KINDS[kind],
-        names=tuple(names[k] for k in order),
-        mixed=bool(names) and order != tuple(range(len(names))),
+        names=ordered,
+        mixed=ordered != names,
         frame=str(rows[0].get("header.frame_id", "")),
         receive=np.array(times, dtype=np.int64),
         header=None if without else np.array(stamps, dtype=np.int64),
-        robot=None,
         signals=signals,
-        constants={},
     )
 
 
@@ -141,7 +137,7 @@ class Documents:
                 streams.append(_stream(channel, WRENCH, rows, times, ()))
                 continue
             by_names: dict[tuple[str, ...], list[int]] = {}
-            if all(map(is_joint_state, rows)):
+            if all(map(_is_joint_state, rows)):
                 for k, row in enumerate(rows):
                     by_names.setdefault(tuple(row["name"]), []).append(k)
             for names, at in by_names.items():
@@ -179,7 +175,6 @@ def joint_states(message: bytes) -> dict[str, Any]:
 
 
 def _joint(message: bytes) -> dict[str, Any]:
-    """One joint of a JointStates message: name = 1, position = 2 …"""
     names = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
     joint: dict[str, Any] = {}
     for number, value in fields(message):
@@ -211,7 +206,6 @@ def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:
 
 
 def _varint(message: bytes, position: int) -> tuple[int, int]:
-    """A whole number in protobuf's base-128, and where it ends."""
     value = shift = 0
     while True:
         if position >= len(message) or shift > 63:
@@ -236,7 +230,6 @@ def flattened(message: bytes, *, json_like: bool) -> dict[str, Any]:
 
 
 def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
-    """Put the values below a path into the flat document."""
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
         raise ValueError("nested or long beyond any message of joints")
     if isinstance(value, dict):
@@ -260,7 +253,6 @@ def _read(
     times: list[int],
     request: ReadChoice,
 ) -> RawLog:
-    """The documents of one channel as a table, read by aliases or by --columns."""
     names = rows[0].get("name", [])
     named = isinstance(names, list) and all(isinstance(name, str) for name in names)
     columns: dict[str, Column] = {}

@@ -6,16 +6,79 @@ Bags of ROS 2 Humble and older hold no definitions, and a bag that is written ne
 import struct
 import tomllib
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, Channel
-from vftcli.readers.bags.layout import SIZES, Field, LayoutError, Types, fields_of, short, types_of
 from vftcli.signals.errors import LogError, OutputError
+
+#: The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB.
+MAX_DEFINITION = 64 * 1024
+#: Primitive type → NumPy's code for it.
+SIZES = {
+    "bool": "u1", "byte": "u1", "octet": "u1", "char": "u1", "uint8": "u1", "int8": "i1",
+    "uint16": "u2", "int16": "i2", "uint32": "u4", "int32": "i4", "uint64": "u8", "int64": "i8",
+    "float32": "f4", "float64": "f8",
+}  # fmt: skip
+
+
+class Field(NamedTuple):
+    """One field of a message type."""
+
+    name: str  #: Its name.
+    type: str  #: A primitive, `string`, or another message type as package/Name.
+    many: int | None  #: How many: None for one, a number for a fixed array, −1 for a sequence.
+
+
+Types = Mapping[str, Sequence[Field]]
+
+
+class LayoutError(ValueError):
+    """A message does not fit its definition."""
+
+
+@lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
+def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field, ...]]:
+    """Parse a message definition with rosbags' parsers. Type → fields."""
+    from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
+
+    if len(definition) > MAX_DEFINITION:
+        raise LayoutError(f"a definition of more than {MAX_DEFINITION >> 10} KiB")
+    try:
+        parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
+    except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
+        reason = str(error).split("\n", maxsplit=1)[0][:60]
+        raise LayoutError(f"no message definition: {reason}") from None
+    return {short(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
+
+
+def fields_of(fields: Any) -> tuple[Field, ...]:  # noqa: ANN401 - rosbags' nested tuples
+    """Fields as rosbags describes them, in our terms."""
+    return tuple(Field(str(name), *_described(kind)) for name, kind in fields)
+
+
+def _described(kind: Any) -> tuple[str, int | None]:  # noqa: ANN401
+    node, inner = int(kind[0]), kind[1]
+    if node == 1:  # a primitive with a bound
+        return str(inner[0]), None
+    if node == 2:  # another message
+        return short(str(inner)), None
+    element, bound = inner
+    name, many = _described(element)
+    if many is not None:
+        raise LayoutError("an array of arrays")
+    return name, int(bound) if node == 3 else -1
+
+
+def short(name: str) -> str:
+    """A type's name without the middle part: std_msgs/msg/Header → std_msgs/Header."""
+    parts = name.split("/")
+    return f"{parts[0]}/{parts[-1]}"
+
 
 #: The definitions of ROS 2's own types that are written, and of Franka's state.
 MESSAGES = Path(__file__).parent / "messages.toml"
@@ -158,7 +221,6 @@ class Serialiser:
             self._count(0)  # sequences of messages stay empty
 
     def _numbers(self, value: Value | None, dtype: np.dtype[Any], many: int | None) -> None:
-        """Leave room for the numbers of a field and note what goes there."""
         given = np.zeros(0) if value is None else np.asarray(value, dtype=dtype)
         width = 1 if many is None else many
         if width < 0:
@@ -173,10 +235,8 @@ class Serialiser:
         self.template += bytes(width * dtype.itemsize)
 
     def _count(self, count: int) -> None:
-        """Lay a length."""
         self._align(4)
         self.template += struct.pack("<I", count)
 
     def _align(self, size: int) -> None:
-        """Lay zeros up to a multiple of a size, counted behind the encapsulation."""
         self.template += bytes(-(len(self.template) - 4) % size)

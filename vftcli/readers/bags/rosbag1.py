@@ -25,7 +25,7 @@ from vftcli.readers.bags.container import (
     strided,
     type_name,
 )
-from vftcli.readers.reader import LogFile
+from vftcli.readers.opening import LogFile
 from vftcli.signals.errors import LogError
 
 MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
@@ -51,14 +51,12 @@ def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
 
 
 def _record(file: BinaryIO, ingest: Ingest) -> tuple[Header, bytes]:
-    """The header and the data of the next record."""
     fields = read_bytes(file, read_uint32(file))
     ingest.spend(1 + len(fields) // BYTES_PER_FIELD)
     return _header(fields), read_bytes(file, read_uint32(file))
 
 
 def _header(fields: bytes) -> Header:
-    """The fields of a header."""
     return Header.read(io.BytesIO(len(fields).to_bytes(4, "little") + fields))
 
 
@@ -107,7 +105,6 @@ class _Bag:
             raise LogError(f"{self.ingest.path}: an unknown record; the bag is damaged.")
 
     def _connect(self, header: Header, data: bytes) -> None:
-        """Take up a connection record."""
         about = _header(data)
         self.channels[header["conn"]] = Channel(
             topic=printable(header["topic"].decode("utf-8", "replace")),
@@ -171,7 +168,6 @@ class _Bag:
 
 
 def _begins(chunk: io.BytesIO, end: int, ingest: Ingest) -> Integers:
-    """Where messages begin in a chunk of which the index is lost."""
     begins, place = [], 0
     while place < end:
         if _record(chunk, ingest)[0]["op"] == MESSAGE:
@@ -190,6 +186,5 @@ def _heads(buffer: Bytes, begins: Integers) -> Bytes:
 
 
 def _words(heads: Bytes, start: int, count: int = 1) -> Integers:
-    """Numbers of four bytes in each head. (k, count)"""
     part = np.ascontiguousarray(heads[:, start : start + 4 * count])
     return part.view("<u4").astype(np.int64)

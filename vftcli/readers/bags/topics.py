@@ -1,22 +1,25 @@
-"""Several topics on one clock: which topic leads, which clock counts, what is interpolated."""
+"""Bags read: several topics on one clock. Which leads, which clock counts, what is interpolated."""
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import RESIDUAL_TURNED
-from vftcli.readers.bags.container import Integers
-from vftcli.readers.bags.decode import Stream
+from vftcli.readers.aliases import RESIDUAL_TURNED, effort_of, robot_of
+from vftcli.readers.bags.container import Ingest, Integers, batches, storage_files
+from vftcli.readers.bags.decode import Decoder, Stream
+from vftcli.readers.bags.documents import Documents
 from vftcli.readers.columns import SIGNALS
-from vftcli.readers.joints import effort_of, robot_of
+from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.reader import RawLog, ReadChoice
+from vftcli.readers.reading import LogFormat
 from vftcli.signals.arrays import Array, pieces, release
 from vftcli.signals.errors import LogError
 from vftcli.signals.recording import EFFORTS
-from vftcli.signals.remarks import Remark, caution, fact
+from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
 
@@ -33,15 +36,15 @@ def aligned(
     streams: Sequence[Stream], path: Path, request: ReadChoice, others: dict[str, str]
 ) -> RawLog:
     """Put the topics of a bag on the clock of the one with the joints' positions."""
-    gathering = Gathering(leading(streams, path, others, request), request)
-    gathering.take_lead(path)
+    lead = leading(streams, path, others, request)
+    gathering = Gathering(lead, request, path)
     for stream in streams:
         gathering.take(stream)
-        for _, values in stream.series():
-            release(values)
-    frame = gathering.take_wrench(streams, path)
+        for values in (stream.receive, stream.header, stream.robot, *stream.signals.values()):
+            if values is not None:
+                release(values)
+    frame = gathering.take_wrench(streams)
     gathering.tell_left(streams, others)
-    lead, signals = gathering.lead, gathering.signals
     names, hint = lead.names, robot_of(lead.names)
     if not names:  # another topic about the arm may have them
         width = lead.signals["q"].shape[1]
@@ -50,10 +53,10 @@ def aligned(
                 names = stream.names
                 break
     return RawLog(
-        stamps=gathering.clock.stamps,
-        tick=gathering.clock.tick,
-        clock=gathering.clock.words,
-        signals={name: value for name, value in signals.items() if request.wants(name)},
+        stamps=gathering.stamps,
+        tick=gathering.tick,
+        clock=gathering.words,
+        signals={name: v for name, v in gathering.signals.items() if request.wants(name)},
         wrench_frame=frame,
         joint_names=names,
         robot_hint=hint,
@@ -63,46 +66,37 @@ def aligned(
     )
 
 
-class StreamClock(NamedTuple):
-    """A stream's best clock: the robot's own, else its header's, else the recorder's."""
-
-    stamps: Any  #: The stamps. (T,)
-    tick: float  #: Length of their tick. [s]
-    words: str  #: Which clock they are.
-    host: Integers  #: Header or receive stamps, on which other topics are aligned. (T,) [ns]
-
-
 class Gathering:
     """The signals of a recording as they are gathered, topic by topic.
 
     Attributes:
         lead: The topic with the joints' positions.
-        clock: Its clock.
+        stamps, tick, words: Its best clock.
+        host: Its header or receive stamps, on which other topics are aligned. (T,) [ns]
         chosen: Signal → message field, "" for its own, and factor, as --columns says: -tau=effort,
             current[mA]=effort, -tau.
-        said_of_wrench: What --columns says of the wrench, None for nothing.
         signals: Field of Recording → values at the leading topic's times. (T, k)
         taken: Topics beside the leading one of which a signal was taken.
         remarks: What was chosen, and what looks suspicious.
     """
 
-    def __init__(self, lead: Stream, request: ReadChoice) -> None:
-        self.lead = lead
-        self.clock = clock_of(lead)
-        items = request.spec.items
+    def __init__(self, lead: Stream, request: ReadChoice, path: Path) -> None:
+        self.lead, self.path = lead, path
+        self.stamps, self.tick, self.words, self.host = clock_of(lead)
+        self.said_of_wrench = request.spec.item("wrench")
         # A wrench without a field is the one that is read anyway, of whichever topic.
         self.chosen = {
             SIGNALS[item.signal]: (item.pattern or "", item.factor)
-            for item in items
+            for item in request.spec.items
             if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
         }
-        self.said_of_wrench = request.spec.item("wrench")
         self.signals: dict[str, Array] = {}
         self.taken: set[str] = set()
         self.remarks: list[Remark] = []
+        self._take_lead()
+        self._settle_effort()
 
-    def take_lead(self, path: Path) -> None:
-        """Take the leading topic's signals, the vendor's signs turned into ours."""
+    def _take_lead(self) -> None:
         lead, width = self.lead, self.lead.signals["q"].shape[1]
         if lead.mixed:
             self.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
@@ -114,19 +108,17 @@ class Gathering:
             elif np.isnan(value[0]).all() and np.isnan(value).all():
                 if signal == "q":
                     raise LogError(
-                        f"{path}: the positions in {lead.channel.topic} are NaN in all "
+                        f"{self.path}: the positions in {lead.channel.topic} are NaN in all "
                         f"{lead.messages} messages, so nothing was measured. Record another topic."
                     )
                 # Drivers publish NaN for what they do not measure.
                 self.remarks.append(fact("signal-empty", signal=signal))
             else:
-                turned = lead.kind.franka and signal == "tau_ext"
-                self.signals[signal] = 0.0 - value if turned else value
+                self.signals[signal] = value
         if lead.kind.franka and "tau_ext" in self.signals:
             self.remarks.append(RESIDUAL_TURNED)
-        self._tell_effort()
 
-    def _tell_effort(self) -> None:
+    def _settle_effort(self) -> None:
         """Decide what effort is: what --columns says, else current for UR joints, else torque."""
         there, lead = dict(self.signals), self.lead
         for signal, (pattern, factor) in self.chosen.items():
@@ -153,24 +145,17 @@ class Gathering:
         """Take what another topic has of the same joints, and the leading one has not."""
         if stream.channel.topic.startswith(OWN):
             self._take_own(stream)
-            return
-        if stream is self.lead or not same_arm(stream, self.lead):
-            return
-        for signal in stream.signals:
-            if signal in self.signals or signal == "effort":
-                continue
-            values = self.interpolated(stream, signal)
-            if values is not None:
-                turned = stream.kind.franka and signal == "tau_ext"
-                self.signals[signal] = 0.0 - values if turned else values
+        elif stream is not self.lead and same_arm(stream, self.lead):
+            for signal in [s for s in stream.signals if s != "effort" and s not in self.signals]:
+                if (values := self.interpolated(stream, signal)) is not None:
+                    self.signals[signal] = values
 
     def _take_own(self, stream: Stream) -> None:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
         name, lead = stream.channel.topic.removeprefix(OWN), self.lead
         value = stream.signals.get("wrench" if name == "wrench" else "effort")
-        same = stream.messages == lead.messages and np.array_equal(
-            host_times(stream)[0], self.clock.host
-        )
+        own, _ = host_times(stream)
+        same = stream.messages == lead.messages and np.array_equal(own, self.host)
         if value is None or not same or name not in {*SIGNALS, *SIGNALS.values()}:
             return
         field_name = SIGNALS.get(name, name)
@@ -180,14 +165,15 @@ class Gathering:
                     del self.signals[other]  # /joint_states' effort said the same without its kind
         self.signals[field_name] = value
 
-    def take_wrench(self, streams: Sequence[Stream], path: Path) -> WrenchFrame | None:
+    def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
         """Take the wrench of a sensor or of the vendor; return what --columns or the bag states."""
         frame, said = self._usual_wrench(streams), self.said_of_wrench
         if said is None:
             return frame
         if "wrench" not in self.signals:
             raise LogError(
-                f"{path}: --columns says something of a wrench, and no topic has one; leave it out."
+                f"{self.path}: --columns says something of a wrench, and no topic has one; leave "
+                "it out."
             )
         if said.pattern is None:
             self.signals["wrench"] = self.signals["wrench"] * said.factor + 0.0
@@ -201,10 +187,9 @@ class Gathering:
         frame = FRANKA_FRAME if self.lead.kind.franka else None
         found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
         sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
-        if (not sensors and "wrench" in self.lead.signals) or "wrench" in self.chosen:
-            return frame
         sensor = max(sensors or found, key=lambda s: s.messages, default=None)
-        if sensor is None:
+        vendors = not sensors and "wrench" in self.lead.signals
+        if sensor is None or vendors or "wrench" in self.chosen:
             return frame
         if sensor.channel.topic.startswith(OWN):
             return WrenchFrame.of_conversion(sensor.frame)
@@ -220,11 +205,12 @@ class Gathering:
 
         None, and a caution, where the other topic does not cover the leading one's time.
         """
-        lead, times, topic = self.lead, self.clock.host, stream.channel.topic
+        lead, times, topic = self.lead, self.host, stream.channel.topic
         own, _ = host_times(stream)
-        if (lead.header is None or times is not lead.header) and own is not stream.receive:
-            own = stream.receive  # one of the two has receive stamps only: compare like with like
-        elif own is stream.receive and times is lead.header:
+        # One of the two may have receive stamps only: like is compared with like.
+        if times is not lead.header:
+            own = stream.receive
+        elif own is stream.receive:
             times = lead.receive
         fresh = np.concatenate([[True], np.diff(own) > 0])
         own, values = own[fresh], stream.signals[signal][fresh]
@@ -236,14 +222,9 @@ class Gathering:
         start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
         x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
         self.taken.add(topic)
+        rate, leads = 1e9 / usual, lead.channel.topic
         self.remarks.append(
-            fact(
-                "signal-interpolated",
-                signal=signal,
-                topic=topic,
-                rate_Hz=1e9 / usual,
-                lead=lead.channel.topic,
-            )
+            fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
         )
         return resample_columns(x, xp, values)
 
@@ -252,13 +233,10 @@ class Gathering:
         lead = self.lead
         for stream in streams:
             if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
+                there = tuple(stream.signals) or ("names",)
+                count, topic = stream.messages, lead.channel.topic
                 self.remarks.append(
-                    caution(
-                        "messages-left-out",
-                        messages=stream.messages,
-                        topic=lead.channel.topic,
-                        signals=tuple(stream.signals) or ("names",),
-                    )
+                    caution("messages-left-out", messages=count, topic=topic, signals=there)
                 )
         topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
         topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
@@ -323,18 +301,23 @@ def leading(
     return best
 
 
-def clock_of(stream: Stream) -> StreamClock:
-    """A stream's best clock."""
+def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
+    """A stream's best clock: the robot's own, else its header's, else the recorder's.
+
+    Returns:
+        Its stamps (T,), the length of their tick [s], which clock they are, and header or receive
+        stamps (T,) [ns].
+    """
     host, words = host_times(stream)
     robot = stream.robot
     if robot is None or not runs(robot):
-        return StreamClock(host, 1e-9, words, host)
+        return host, 1e-9, words, host
     words = f"robot clock (time of {stream.channel.topic})"
     # Franka counts whole milliseconds, which seconds in float64 would blur.
     milliseconds = np.rint(robot * 1e3)
     if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
-        return StreamClock(milliseconds.astype(np.int64), 1e-3, words, host)
-    return StreamClock(robot, 1.0, words, host)
+        return milliseconds.astype(np.int64), 1e-3, words, host
+    return robot, 1.0, words, host
 
 
 def runs(stamps: Any) -> bool:  # noqa: ANN401 - whole numbers or seconds
@@ -350,3 +333,48 @@ def host_times(stream: Stream) -> tuple[Integers, str]:
     if header is not None and header[0] > 0 and runs(header):
         return header, f"header stamps of {topic}"
     return stream.receive, f"receive stamps of {topic} (its header stamps are unset or run back)"
+
+
+METADATA_BYTES = 1024 * 1024
+
+
+def recognises(file: LogFile, _: LogFormat) -> bool:
+    """Whether a folder holds files of a ROS 2 bag."""
+    return bool(storage_files(file))
+
+
+def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
+    """Read any container of messages."""
+    paths = [file.path / name for name in storage_files(file)]
+    size = sum(path.stat().st_size for path in paths) if file.is_folder else len(file.content)
+    ingest = Ingest(path=file.path, size=size)
+    decoder, documents = Decoder(ingest), Documents(ingest)
+    messages = 0
+    for batch in batches([open_log(path) for path in paths] if paths else [file], ingest):
+        messages += len(batch.offsets)
+        if not documents.take(batch):
+            decoder.take(batch)
+    if "metadata.yaml" in file.entries:
+        with (file.path / "metadata.yaml").open("rb") as metadata:
+            text = metadata.read(METADATA_BYTES)
+        match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
+        counted = messages if match is None else int(match[1])
+        if messages < counted:
+            said = warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
+            ingest.note(said)
+        elif messages > counted:
+            ingest.note(fact("message-count-differs", counted=counted, found=messages))
+    if messages == 0:
+        why = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
+        raise LogError(f"{file.path}: {why}.")
+    of_documents = documents.streams(request)
+    streams = [*decoder.streams(), *of_documents]
+    # ROS messages go before documents: their types say what they hold.
+    if documents.found and not any("q" in stream.signals for stream in streams):
+        raw = documents.read(request)
+    else:
+        known = {stream.channel.topic for stream in of_documents}
+        rows = (channel for channel in documents.found if channel.topic not in known)
+        others = decoder.others | {c.topic: c.type or c.encoding for c in rows}
+        raw = aligned(streams, file.path, request, others)
+    return replace(raw, remarks=(*ingest.remarks, *raw.remarks))

@@ -4,11 +4,12 @@ Format: https://mcap.dev/spec. The reader unpacks a chunk to whatever it holds, 
 unpacked here, within bounds, and handed to it as files of records.
 """
 
+import sqlite3
 import struct
 import zlib
 from collections.abc import Iterator
-from contextlib import suppress
-from typing import BinaryIO
+from contextlib import closing, suppress
+from typing import Any, BinaryIO
 
 from mcap import records
 from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
@@ -26,8 +27,9 @@ from vftcli.readers.bags.container import (
     printable,
     type_name,
 )
-from vftcli.readers.reader import LogFile
+from vftcli.readers.opening import LogFile
 from vftcli.signals.errors import LogError
+from vftcli.signals.remarks import warning
 
 DATA = (
     records.Schema, records.Channel, records.Message, records.Chunk, records.MessageIndex,
@@ -38,7 +40,7 @@ DATA_END_BYTES = 13  #: Length of the record that ends the data, its head includ
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+def mcap_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of an MCAP file, up to the last whole chunk."""
     return batched(_Mcap(ingest).runs(file.content), ingest)
 
@@ -90,7 +92,6 @@ class _Mcap:
         census.tell(self.ingest, len(content) - end, "its statistics")
 
     def _take(self, record: records.McapRecord, end: int) -> None:
-        """Take up a record that is neither a message nor a chunk."""
         if isinstance(record, records.Schema):
             self.schemas[record.id] = record
         elif isinstance(record, records.Channel):
@@ -114,7 +115,6 @@ class _Mcap:
             self.census.missing = data_end - self.census.data_end
 
     def _channel(self, record: records.Channel) -> None:
-        """Take up a channel, whose schema came before it."""
         schema = self.schemas.get(record.schema_id, records.Schema(0, b"", "", ""))
         is_ros = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
         text = schema.data.decode("utf-8", "replace") if is_ros else ""
@@ -147,3 +147,128 @@ class _Mcap:
             raise LogError(f"{self.ingest.path}: a record ends outside its chunk; damaged.")
         self.census.kept += sum(len(run.contents) for run in found.values())
         yield from found.values()
+
+
+ZSTD = b"\x28\xb5\x2f\xfd"
+#: No message of a topic that is read comes near this; an image of 4000 × 4000 is smaller.
+MESSAGE_LIMIT = 64 * 1024 * 1024
+#: The tables of a bag → the columns that are read.
+TABLES = {
+    "topics": {"id", "name", "type", "serialization_format"},
+    "messages": {"id", "topic_id", "timestamp", "data"},
+    "message_definitions": {"topic_type", "encoding", "encoded_message_definition"},
+}
+
+STEPS = 10_000
+#: What SQLite may do for a file: some ten steps a row and topic, and rows of a few bytes or more.
+#:
+#: A tree of pages that hold one another has rows without end.
+SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
+
+
+def db3_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
+    """Messages of a db3 file, in the order of recording."""
+    with closing(_opened(file)) as db:
+        yield from batched(_runs(db, len(file.content), ingest), ingest)
+    journal = file.path.with_name(f"{file.path.name}-wal")
+    if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
+        ingest.note(warning("journal-left", journal=printable(journal.name), bytes=size))
+
+
+def _opened(file: LogFile) -> sqlite3.Connection:
+    """The database, read-only; an unpacked one is held in memory."""
+    if file.wrapping is None:
+        # Immutable: SQLite must not look for a journal, nor write one beside a user's bag.
+        uri = f"{file.path.absolute().as_uri()}?mode=ro&immutable=1"
+        db = sqlite3.connect(uri, uri=True)
+    else:
+        db = sqlite3.connect(":memory:")
+        db.deserialize(bytes(file.content))
+    db.text_factory = bytes
+    size = len(file.content)
+    db.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, min(MESSAGE_LIMIT, max(size, 1 << 16)))
+    db.setlimit(sqlite3.SQLITE_LIMIT_ATTACHED, 0)
+    db.execute("PRAGMA trusted_schema = OFF")
+    steps = iter(range((SPARE_STEPS + STEPS_PER_BYTE * size) // STEPS))
+    db.set_progress_handler(lambda: next(steps, None) is None, STEPS)
+    return db
+
+
+def _permission(action: int, name: str | None, *_: str | None) -> int:
+    reads = action == sqlite3.SQLITE_READ and name in TABLES
+    return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
+
+
+def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[ChannelRun]:
+    """The messages of a database of a size, one by one."""
+    tables = _checked_tables(db, ingest)
+    db.set_authorizer(_permission)
+    # Topics and definitions are read beside the messages.
+    left = 2 * size + 4096
+
+    def rows(table: str, columns: str) -> Iterator[tuple[Any, ...]]:
+        """Rows of a table; what is read in all cannot be more than the file holds."""
+        nonlocal left
+        for row in db.execute(f"SELECT {columns} FROM {table}"):
+            left -= 4 + sum(len(value) for value in row if isinstance(value, bytes))
+            if left < 0:
+                raise LogError(f"{ingest.path}: its rows hold more than the file does; damaged.")
+            yield row
+
+    definitions = {}
+    if "message_definitions" in tables:
+        columns = "topic_type, encoding, encoded_message_definition"
+        definitions = {row[0]: row[1:] for row in rows("message_definitions", columns)}
+    channels = {}
+    for number, topic, kind, encoding in rows("topics", "id, name, type, serialization_format"):
+        language, text = definitions.get(kind, (b"", b""))
+        channels[number] = Channel(
+            topic=printable(_text(topic)),
+            type=type_name(_text(kind)),
+            encoding="cdr" if encoding == b"cdr" else "other",
+            definition=_text(text),
+            idl=language == b"ros2idl",
+        )
+    for number, time, content in rows("messages ORDER BY id", "topic_id, timestamp, data"):
+        if not isinstance(content, bytes) or not isinstance(time, int):
+            raise LogError(
+                f"{ingest.path}: a message of topic {number!s:.20} is no bytes; damaged."
+            )
+        is_packed = content.startswith(ZSTD)
+        yield ChannelRun(
+            channels.get(number), [time], [_unzstd(content, ingest) if is_packed else content]
+        )
+
+
+def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
+    """The tables of a bag that a database has."""
+    # A view and a virtual table have no root page.
+    query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
+    found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
+    if not found >= {"topics", "messages"}:
+        raise LogError(
+            f"{ingest.path}: an SQLite database without plain tables of a ROS 2 bag (topics, "
+            f"messages; it has {', '.join(sorted(found)) or 'none of them'})."
+        )
+    for name in sorted(found):
+        # The last of a column's traits says whether it is hidden or computed.
+        traits = db.execute(f"PRAGMA table_xinfo({name})").fetchall()
+        if missing := sorted(TABLES[name] - {_text(row[1]) for row in traits if row[6] == 0}):
+            raise LogError(
+                f"{ingest.path}: the table {name} has no stored column {missing[0]}: it is "
+                "computed or not there. No recorder writes such a bag; it was edited."
+            )
+    return found
+
+
+def _text(value: Any) -> str:  # noqa: ANN401 - whatever a cell holds
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
+
+
+def _unzstd(message: bytes, ingest: Ingest) -> bytes:
+    import zstandard
+
+    size = zstandard.frame_content_size(message)
+    ingest.claim(size if size >= 0 else MESSAGE_LIMIT)
+    unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+    return unpacker.decompress(message, max_output_size=MESSAGE_LIMIT)

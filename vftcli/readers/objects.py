@@ -1,17 +1,135 @@
-"""Pickles: opened only if they rebuild nothing but NumPy arrays. They are never executed."""
+"""Objects of JSON, parsed within bounds, and of pickles, which are never executed.
+
+A pickle is opened only if it rebuilds nothing but NumPy arrays.
+"""
 
 import io
+import json
 import pickle
 import pickletools
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import numpy as np
 
-from vftcli.readers.reader import LogFile
+from vftcli.readers.opening import LogFile, reason_of
+from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
+from vftcli.signals.parsing import printable
+from vftcli.signals.remarks import Remark, fact
+
+#: Bytes of objects that a document may be _parsed into; one a line may be of any length.
+MEMORY_LIMIT = 768 * 1024 * 1024
+#: Letter → bytes of the object that it begins, at most.
+COSTS = {b"[": 64, b"{": 72, b",": 40, b":": 110}
+LONGEST_LINE = 1 << 20  #: Letters of one sample.
+CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
+#: Numbers that are none as C++ streams print them, libfranka's among them.
+NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
+
+Data = Any  #: Whatever a document or a pickle holds.
+Objects = list[dict[str, Any]]
+
+
+def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
+    """The lines that are not empty, with their numbers from 1."""
+    start, number = 0, 0
+    data: Any = content.obj
+    if data.find(b"\n") < 0:
+        data = bytes(data).replace(b"\r", b"\n")
+    while start < len(content):
+        number += 1
+        end = data.find(b"\n", start)
+        end = len(content) if end < 0 else end
+        if line := data[start : min(end, start + LONGEST_LINE + 1)].strip():
+            yield number, line
+        start = end + 1
+
+
+def columns_of_lines(
+    file: LogFile, lines: Iterable[tuple[int, bytes]]
+) -> tuple[dict[str, Column], tuple[Remark, ...]]:
+    """The numbers of objects, one a line; a last one that is cut is left out and said."""
+    blocks: list[dict[str, Column]] = []
+    objects: Objects = []
+    waiting: int | None = None
+    first = number = 1
+    for number, line in lines:
+        if waiting is not None:
+            raise LogError(f"{file.path}: line {waiting} is not one JSON object.")
+        if (found := _object_in(line)) is None:
+            waiting = number
+            continue
+        objects.append(found)
+        if len(objects) == CHUNK_LINES:
+            blocks.append(columns_of(file, objects, first))
+            objects, first = [], number + 1
+    if objects:
+        blocks.append(columns_of(file, objects, first))
+    if not blocks:
+        raise LogError(f"{file.path}: no line holds a JSON object.")
+    if any(block.keys() != blocks[0].keys() for block in blocks):
+        raise LogError(f"{file.path}: its lines do not hold the same fields.")
+    try:
+        columns = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
+    except ValueError:
+        raise LogError(f"{file.path}: a field differs in length from line to line.") from None
+    return columns, (fact("line-cut"),) if waiting is not None else ()
+
+
+def _object_in(line: bytes) -> dict[str, Any] | None:
+    if len(line) > LONGEST_LINE:
+        return None
+    words = {b"nan": b"NaN", b"inf": b"Infinity"}
+    try:
+        found = json.loads(NOT_JSON.sub(lambda m: m[1] + words[m[2]], line))
+    except (ValueError, RecursionError):
+        return None
+    if not isinstance(found, dict):
+        return None
+    flat: dict[str, Any] = {}
+    for name, value in found.items():
+        inner = value.items() if isinstance(value, dict) else ()
+        flat |= {f"{name}.{key}": v for key, v in inner} if inner else {name: value}
+    return flat
+
+
+def columns_of(file: LogFile, objects: Objects, first: int) -> dict[str, Column]:
+    """The numeric fields of some objects, a row an object."""
+    columns: dict[str, Column] = {}
+    for name, value in objects[0].items():
+        held = value if isinstance(value, list) and value else [value]
+        if not all(isinstance(v, int | float) for v in held):
+            continue
+        try:
+            columns[name] = np.array([entry[name] for entry in objects], dtype=np.float64)
+        except (KeyError, ValueError, TypeError, OverflowError):
+            shown = printable(name[:40])
+            raise LogError(
+                f"{file.path}: {shown} is not the same numbers in each of the objects from "
+                f"{first} to {first + len(objects) - 1}."
+            ) from None
+    return columns
+
+
+def parsed(file: LogFile) -> Data:
+    """The one value of a file: an object or a list."""
+    content = bytes(file.content)
+    if sum(cost * content.count(letter) for letter, cost in COSTS.items()) > MEMORY_LIMIT:
+        raise LogError(
+            f"{file.path}: a JSON document of {len(file.content) >> 20} MiB, too many values to "
+            "hold. Save the log with np.savez, or an object a line."
+        )
+    try:
+        return json.loads(content)
+    except RecursionError:
+        raise LogError(f"{file.path}: JSON nested too deeply to be a log.") from None
+    except ValueError as error:
+        reason = printable(reason_of(error))
+        raise LogError(f"{file.path}: looks like JSON and is not ({reason}).") from None
+
 
 #: Numbers that a pickle of any size may build; a larger one as many as it has bytes.
 BUILT_LIMIT = 1 << 20
@@ -40,7 +158,7 @@ class PickledType:
         dtype: The type of plain numbers, letters or booleans; None for any other.
     """
 
-    def __init__(self, code: Any = None, *_: Any) -> None:  # noqa: ANN401 - whatever is pickled
+    def __init__(self, code: Data = None, *_: Data) -> None:
         if isinstance(code, str) and re.search(r"O|object", code):
             raise Refused("an array of objects")
         plain = isinstance(code, str) and re.fullmatch(
@@ -48,7 +166,7 @@ class PickledType:
         )
         self.dtype: np.dtype[Any] | None = np.dtype(code) if plain else None
 
-    def __setstate__(self, state: Any) -> None:  # noqa: ANN401
+    def __setstate__(self, state: Data) -> None:
         """Take up the byte order, the second of what NumPy pickles of a type."""
         _version, order, subarray, names = state[:4]
         if subarray is not None or names is not None or order not in {"<", ">", "=", "|"}:
@@ -66,17 +184,17 @@ class PickledArray:
 
     __slots__ = ("array",)
 
-    def __init__(self, kind: Any = Marker, *_: Any) -> None:  # noqa: ANN401
+    def __init__(self, kind: Data = Marker, *_: Data) -> None:
         if kind is not Marker:
             raise Refused("an array of a kind of its own")
         self.array = NOTHING
 
-    def __setstate__(self, state: Any) -> None:  # noqa: ANN401
+    def __setstate__(self, state: Data) -> None:
         """Take up shape, type, order and bytes, as NumPy pickles them."""
         shape, kind, fortran, content = state[-4:]
         self.fill(content, kind, shape, "F" if fortran else "C")
 
-    def fill(self, content: Any, kind: Any, shape: Any, order: str) -> None:  # noqa: ANN401
+    def fill(self, content: Data, kind: Data, shape: Data, order: str) -> None:
         """Lay the array over some bytes."""
         if not isinstance(kind, PickledType) or not isinstance(content, bytes | bytearray):
             raise Refused("an array of objects")
@@ -89,15 +207,13 @@ Built = tuple[Any, int]  #: What was built of a part of a pickle, and how many n
 NOTHING = np.empty(0, dtype="V1")  #: What stands for an array that holds no numbers.
 
 
-def _from_buffer(buffer: Any, kind: Any, shape: Any, order: Any = "C") -> PickledArray:  # noqa: ANN401
-    """An array over a buffer of the pickle, as newer protocols hold it."""
+def _from_buffer(buffer: Data, kind: Data, shape: Data, order: Data = "C") -> PickledArray:
     array = PickledArray()
     array.fill(buffer, kind, shape, order)
     return array
 
 
-def _scalar(kind: Any, content: Any = None) -> Any:  # noqa: ANN401
-    """One number of its bytes."""
+def _scalar(kind: Data, content: Data = None) -> Data:
     if not isinstance(kind, PickledType) or kind.dtype is None or not isinstance(content, bytes):
         raise Refused("a scalar that is no number")
     return np.frombuffer(content, dtype=kind.dtype, count=1)[0].item()
@@ -130,7 +246,7 @@ class ArrayUnpickler(pickle.Unpickler):
         super().__init__(io.BytesIO(content))
         self._left = max(BUILT_LIMIT, len(content))
 
-    def find_class(self, module: str, name: str) -> Any:  # noqa: ANN401
+    def find_class(self, module: str, name: str) -> Data:
         """Return what a name may stand for."""
         if (module, name) == ("_codecs", "encode"):
             return self._encoded
@@ -141,31 +257,29 @@ class ArrayUnpickler(pickle.Unpickler):
         except KeyError:
             raise Refused(f"{module}.{name}"[:80]) from None
 
-    def _encoded(self, text: Any, encoding: Any = "latin1") -> bytes:  # noqa: ANN401
+    def _encoded(self, text: Data, encoding: Data = "latin1") -> bytes:
         """Text that old pickles hold the bytes of an array as."""
         if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
             raise Refused("an odd encoding")
         self._claim(len(text))
         return text.encode("latin1")
 
-    def _ordered(self, items: Any = ()) -> dict[Any, Any]:  # noqa: ANN401
-        """A dictionary that keeps its order, as every dictionary does today."""
+    def _ordered(self, items: Data = ()) -> dict[Data, Data]:
         self._claim(len(items))
         return dict(items)
 
     def _claim(self, size: int) -> None:
-        """Count what is about to be built."""
         self._left -= size
         if self._left < 0:
             raise Refused(TOO_MUCH)
 
-    def built(self, value: Any) -> Any:  # noqa: ANN401 - whatever the pickle holds
+    def built(self, value: Data) -> Data:
         """What was loaded, with arrays for pickled arrays, once its size is known to be bounded."""
         built, size = self._settled(value, {}, 0)
         self._claim(size)
         return built
 
-    def _settled(self, value: Any, known: dict[int, Built | None], depth: int) -> Built:  # noqa: ANN401
+    def _settled(self, value: Data, known: dict[int, Built | None], depth: int) -> Built:
         """A value with arrays for pickled arrays, and how many numbers it takes laid out in full.
 
         A part that is named again is not walked again: a few lists that hold one another a few
@@ -197,7 +311,7 @@ class ArrayUnpickler(pickle.Unpickler):
 PICKLE_LIMIT = 512 * 1024 * 1024
 
 
-def load_arrays_only(file: LogFile) -> Any:  # noqa: ANN401 - whatever the pickle holds
+def load_arrays_only(file: LogFile) -> Data:
     """Load a pickle that holds only arrays, numbers, strings, lists and dictionaries."""
     content = bytes(file.content)
     if len(content) > PICKLE_LIMIT:
