@@ -341,20 +341,20 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     That is so under a load, where no free motion tells what is no contact, and where the user asks
     for the smoother by its name.
     """
-    from vftcli.contacts.rows import loosened
+    from vftcli.contacts.rows import with_wider_force
     from vftcli.virtual_sensor.sensing import Gate
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
     learned = found.model.prior
-    prior = None if learned is None else loosened(learned)
+    prior = None if learned is None else with_wider_force(learned)
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
 def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContacts":
     """What is known of the log's contacts: its list, and where nothing touches the arm."""
-    from vftcli.contacts.untouched import free_part
+    from vftcli.contacts.free_statistics import free_part
     from vftcli.virtual_sensor.detection import KnownContacts, read_in_free_runs
 
     motion, rows = unloaded_motion(analysis.motion, choice), analysis.contacts

@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from test_error_process import B, blocks, drawn, noise
 
-from vftcli.contacts.candidates import (
+from vftcli.contacts.search import (
     STRETCH,
     WARM_UP,
     filtered_contacts,
     stretches_of,
-    threshold_contacts,
+    turned_round,
     two_state_odds,
 )
-from vftcli.contacts.search import turned_round
 from vftcli.robots.disturbance import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import runs_of
@@ -70,7 +69,7 @@ def test_a_long_log_is_searched_in_stretches_as_if_in_one(monkeypatch: pytest.Mo
     courses = error_process(noise(), log), error_process(noise(), turned_round(log))
     size = np.full((2000, 1), 15.0)
     apart = two_state_odds(log, courses, size)
-    monkeypatch.setattr("vftcli.contacts.candidates.STRETCH", 1000.0)
+    monkeypatch.setattr("vftcli.contacts.search.STRETCH", 1000.0)
     whole = two_state_odds(log, courses, size)
     for one, other in zip(apart, whole, strict=True):
         for a, b in zip(one, other, strict=True):
@@ -86,13 +85,3 @@ def test_stretches_cover_the_log() -> None:
     assert begins[0] == 0
     assert begins[-1] + length >= 5000
     assert stretches_of(100, B) == ([0], 0, 100)
-
-
-def test_a_threshold_takes_what_lasts() -> None:
-    t = 0.01 * np.arange(300)
-    torque = np.zeros((300, 2))
-    torque[50, 0] = 9.0  # one sample
-    torque[100:110, 1] = 9.0  # .1 s
-    torque[120:130, 1] = -9.0  # closer than .2 s: the same
-    found = threshold_contacts(t, torque, np.full((300, 2), 2.0))
-    assert runs_of(found) == [(100, 130)]

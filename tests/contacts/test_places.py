@@ -8,7 +8,6 @@ from vftcli.contacts.places import (
     link_jacobian,
     places,
     point_fits,
-    those_that_fit,
 )
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
@@ -59,11 +58,11 @@ def test_a_force_on_the_forearm_is_told_from_one_on_the_flange() -> None:
         fits = point_fits(chain, Q, torque, np.full(6, 0.05))
         assert fits[0].misfit < 1.0
         # The prior of 100 N draws by (sd over lever over 100)², a millionth.
-        assert link in {fit.link for fit in those_that_fit(fits)}
+        assert link in {fit.link for fit in fits}
         best = next(fit for fit in fits if (fit.link, fit.share) == (link, share))
         np.testing.assert_allclose(best.force, force, rtol=1e-2)
         assert best.size == pytest.approx(np.linalg.norm(force), rel=1e-2)
-    parts = {arm_parts(6)[fit.link] for fit in those_that_fit(fits)}
+    parts = {arm_parts(6)[fit.link] for fit in fits}
     assert parts == {"wrist"}
 
 
@@ -74,6 +73,6 @@ def test_what_loads_the_first_joints_alone_can_be_anywhere() -> None:
         np.array([9.0, 9.0, 4.0, 2.0, 2.0, 2.0]),
     )
     fits = point_fits(load_robot("ur10e").chain, Q, torque, sd)
-    parts = {arm_parts(6)[fit.link] for fit in those_that_fit(fits)}
+    parts = {arm_parts(6)[fit.link] for fit in fits}
     assert "upper arm" in parts
     assert fits == sorted(fits, key=lambda fit: fit.score)

@@ -8,9 +8,9 @@ from contact_logs import FIXTURES, motion
 from test_error_process import blocks, drawn, noise
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.contacts.places import PointFit, arm_parts
+from vftcli.contacts.places import PointFit
 from vftcli.contacts.rows import (
-    Site,
+    ContactLocation,
     force_course,
     from_flange,
     quiet_error,
@@ -55,8 +55,8 @@ def test_the_vendors_torque_is_a_force_at_the_flange() -> None:
     J = flange_jacobian(plain.robot.chain, plain.recording.q)[0]
     torque = np.tile(J.T @ [3.0, 4.0, 12.0, 0.0, 0.0, 0.0], (100, 1))
     told = still(tau_ext=torque)
-    assert vendor_force(told, J, 50, told.recording.t) == pytest.approx(13.0)
-    assert vendor_force(plain, J, 50, plain.recording.t) is None
+    assert vendor_force(told, J, 0.5) == pytest.approx(13.0)
+    assert vendor_force(plain, J, 0.5) is None
 
 
 def test_a_sensors_force_needs_no_frame() -> None:
@@ -97,16 +97,15 @@ def test_a_size_is_as_sure_as_its_place() -> None:
         force = np.array([size, 0.0, 0.0])
         return PointFit(link=link, share=share, misfit=0.0, score=score, force=force, band=1.0)
 
-    parts = arm_parts(6)
-    alike = Site([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
+    alike = ContactLocation([fit(5, 40.0, 1.0), fit(4, 60.0, 1.0)], 6)
     assert alike.spread(40.0) == 0.0  # both on the wrist, whose wrench holds them
-    apart = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], parts, np.zeros((1, 6, 6)))
+    apart = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 1.0)], 6)
     assert apart.spread(40.0) == pytest.approx(20.0 / np.sqrt(2.0))
-    assert apart.links(6) == (3, 5)
-    tip = Site([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], parts, np.zeros((1, 6, 6)))
-    assert tip.links(6) == (0, 3)  # the last link's end is the flange, and that of no other
+    assert apart.links == (3, 5)
+    tip = ContactLocation([fit(6, 40.0, 1.0, share=1.0), fit(3, 40.0, 1.0, 1.0)], 6)
+    assert tip.links == (0, 3)  # the last link's end is the flange, and that of no other
     # Four in the score are e⁻² in likelihood.
-    less = Site([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], parts, np.zeros((1, 6, 6)))
+    less = ContactLocation([fit(5, 40.0, 1.0), fit(3, 60.0, 5.0)], 6)
     assert less.spread(40.0) == pytest.approx(20.0 * np.sqrt(np.exp(-2) / (1 + np.exp(-2))))
 
 

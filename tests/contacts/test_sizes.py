@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from test_error_process import B
 
-from vftcli.contacts.sizes import (
+from vftcli.contacts.search import quiet_pauses, split_at_turns, split_run
+from vftcli.contacts.windows import (
     START,
+    BlockLog,
+    WindowWrench,
+    contact_lanes,
     learn_prior,
-    quiet_pauses,
-    smooth_contacts,
-    split_at_turns,
-    split_run,
+    smooth_lanes,
 )
-from vftcli.contacts.windows import BlockLog, WindowWrench
 from vftcli.robots.disturbance import Blocks
 from vftcli.virtual_sensor.model_error import TorqueNoise, error_process
 
@@ -79,15 +79,14 @@ def test_a_drawn_wrench_is_measured_and_its_prior_learned() -> None:
         dry=np.ones(6), seen=np.ones(6, dtype=bool),
         at_rest=np.full(6, 0.09), pushed=np.full(6, 0.36),
     )  # fmt: skip
-    log = BlockLog.of(blocks, error_process(noise, blocks))
+    log = BlockLog(blocks, error_process(noise, blocks))
     prior = learn_prior(log, jacobian, runs, START, rounds=2)
     assert prior.time == 0.3
     # A dozen pushes of 1.6 correlation times and three axes: some 60 numbers, 10 %; two of these.
     assert abs(prior.force / 30.0 - 1.0) < 0.25
     assert abs(prior.moment / 3.0 - 1.0) < 0.25
-    for run, course in zip(
-        runs, smooth_contacts(log, [jacobian] * len(runs), runs, [prior] * len(runs)), strict=True
-    ):
+    lanes = contact_lanes(log, [jacobian] * len(runs), runs, [prior] * len(runs))
+    for run, course in zip(runs, smooth_lanes(log, lanes), strict=True):
         inside = course.within(run)
         sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
         assert np.mean(np.abs(inside.values - true[slice(*run)]) < 1.96 * sd) > 0.85

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     import polars as pl
     from matplotlib.figure import Figure
 
+    from vftcli.contacts.free_statistics import Basis
     from vftcli.contacts.places import ArmPart
-    from vftcli.contacts.untouched import Basis
     from vftcli.virtual_sensor.smoother import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
@@ -214,7 +214,7 @@ class Unexplained(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class ContactModel(Shown):
-    """What the list rests on."""
+    """Noise model behind a list, for `run.json`."""
 
     #: How the wrench of the contacts moves, None where it was not learned.
     prior: "WrenchPrior | None"
@@ -237,20 +237,20 @@ class ContactList(Shown):
     #: What may be contacts, and what may be errors of the model, with less evidence.
     candidates: tuple[Contact, ...] = ()
     basis: "Basis"  #: What tells a contact from an error of the model.
-    free: tuple[Remark, ...]  #: What is known of free motion, as remarks; none where nothing is.
-    free_seconds: float  #: How much of it there is. [s]
+    free: tuple[Remark, ...] = ()  #: Remarks on known free motion; none where nothing is known.
+    free_seconds: float = 0.0  #: How much of it there is. [s]
     #: Contacts listed in the log's own free part, None where it has none.
-    false_on_free: int | None
-    threshold: float | None  #: Evidence that a contact must have, None without. [nats]
+    false_on_free: int | None = None
+    threshold: float | None = None  #: Evidence that a contact must have, None without. [nats]
     #: The smallest force that this log can tell, None without a wrench. [N]
-    smallest_force: float | None
+    smallest_force: float | None = None
     #: Where nothing can be listed the largest torque, else None.
     unexplained: Unexplained | None = None
     #: A load that the arm carries and its model lacks, None where none shows.
     load: CarriedLoad | None = None
     #: When the arm stopped so abruptly that what follows is no contact. [s]
-    stops: tuple[float, ...]
-    model: ContactModel  #: What the list rests on.
+    stops: tuple[float, ...] = ()
+    model: ContactModel  #: Noise model behind the list.
     remarks: tuple[Remark, ...] = ()  #: What limits the list as a whole.
 
     def __getitem__(self, place: int) -> Contact:

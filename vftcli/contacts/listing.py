@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,21 +13,25 @@ from vftcli.contacts.contact_list import (
     ContactModel,
     Unexplained,
 )
-from vftcli.contacts.evidence import LEAST_EVIDENCE, LEAST_IN_MOTION
-from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
-from vftcli.contacts.places import places
-from vftcli.contacts.rows import NORMAL, SHORT, Measurer
-from vftcli.contacts.search import Found, search
-from vftcli.contacts.untouched import (
+from vftcli.contacts.free_statistics import (
     BLOCK,
     SETTLED,
-    Untouched,
+    FreeStatistics,
     block_length,
-    inferred_motion,
+    free_statistics,
+    inferred_statistics,
     observed,
-    untouched_motion,
 )
-from vftcli.contacts.windows import BlockLog, BlockSpan
+from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
+from vftcli.contacts.places import places
+from vftcli.contacts.rows import (
+    BENT_SHORT,
+    NORMAL,
+    SHORT,
+    ContactMeasurement,
+)
+from vftcli.contacts.search import Candidates, search
+from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, BlockLog, BlockSpan
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.repetition.free_motion import FreeMotion
@@ -39,10 +44,10 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
 from vftcli.signals.series import covered
-from vftcli.virtual_sensor.model_error import UNKNOWN, UNSEEN_SHARE, error_process
+from vftcli.virtual_sensor.model_error import UNSEEN_SHARE, error_process
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
-SHORTEST = 0.5  #: A log shorter than this tells no contact. [s]
+SHORTEST = 0.5  #: No contact can be told in a log shorter than this. [s]
 SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie between two samples. [Hz]
 #: A contact's evidence must be this much above that of any row in the log's own free part.
 FALSE_MARGIN = 1.5
@@ -53,24 +58,32 @@ SAME_MASS = 0.1
 #: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the samples from
 #: so long before it to so long after it. [s]
 AROUND = 1.0
+#: Fields of a contact that are unknown where no wrench is.
+OF_FORCES = (
+    "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
+    "anywhere", "course", "vendor_force",
+)  # fmt: skip
 
 
 def list_contacts(
     motion: FreeMotion, bias: WholeLogBias | None = None, *, referenced: bool = False
 ) -> ContactList:
     """What touched the arm along a log."""
-    check_log(motion.log)
-    seconds = block_length(motion.log.t)
-    free = untouched_motion(motion, seconds)
+    log = motion.log
+    check_log(log)
+    seconds = block_length(log.t)
+    free = free_statistics(motion, seconds)
     if free is None:
-        free = inferred_motion(motion.log, bias or whole_log_bias(motion.log), seconds)
+        free = inferred_statistics(log, bias or whole_log_bias(log), seconds)
     if free is None:
-        return without_list(motion.log)
-    made = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")
-    if is_load(motion.log.recording, made.contacts) and has_wrench(motion.log):
-        row = load_row(motion, made.contacts)
-        made = replace(made, contacts=(row,), remarks=(*made.remarks, caution("contact-is-load")))
-    return made if has_wrench(motion.log) else without_forces(made)
+        return without_list(log)
+    found = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")
+    if log.robot.joints < 6:
+        return without_forces(found)
+    if is_load(log.recording, found.contacts):
+        remarks = (*found.remarks, caution("contact-is-load"))
+        found = replace(found, contacts=(load_row(motion, found.contacts),), remarks=remarks)
+    return found
 
 
 def check_log(run: Run) -> None:
@@ -95,20 +108,14 @@ def check_log(run: Run) -> None:
         )
 
 
-def has_wrench(run: Run) -> bool:
-    """Whether the arm has joints enough to tell the six components of a wrench."""
-    return run.robot.joints >= 6
-
-
-def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList:
+def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> ContactList:
     """The list by the two-state filter, evidence, and the gated smoother."""
     run, named = free.log, free.basis == "free motion"
     found = search(run, free.noise, free.level, seconds)
     t = found.log.blocks.t
     middle = [float(np.mean(t[slice(*span)])) for span in found.runs]
-    own = np.flatnonzero(free.own[np.searchsorted(run.t, middle)])
-    false = int(np.count_nonzero(found.best[own] > LEAST_EVIDENCE))
-    least = max(LEAST_EVIDENCE, FALSE_MARGIN * float(found.best[own].max(initial=-np.inf)))
+    own = found.best[free.own[np.searchsorted(run.t, middle)]]
+    least = max(LEAST_EVIDENCE, FALSE_MARGIN * float(own.max(initial=-np.inf)))
     ends = t[0] + AT_ENDS, t[-1] - AT_ENDS
     found = found.kept(
         [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= ends[0] and t[a] <= ends[1]]
@@ -117,32 +124,31 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
     passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
     if not named:
         passed |= at_rest & np.array(found.beyond, dtype=bool)
-    seen = [k for k in range(len(found.runs)) if passed[k] or found.best[k] > LEAST_EVIDENCE]
-    halted = {k for k in seen if is_stop(run, found, k, seconds)}
-    stops = [float(t[found.runs[k][0]]) for k in sorted(halted) if passed[k]]
-    kept = [k for k in seen if passed[k] and k not in halted]
-    measurer = Measurer.of(run, found.kept(kept), free)
-    rows = measured_rows(free, measurer)
-    groups = adjoining(measurer.found.runs, rows)
+    seen = np.flatnonzero(passed | (found.best > LEAST_EVIDENCE)).tolist()
+    halted = [k for k in seen if is_stop(run, found, k, seconds)]
+    stops = tuple(float(t[found.runs[k][0]]) for k in halted if passed[k])
+    kept, others = (
+        [k for k in seen if passed[k] == wanted and k not in halted] for wanted in (True, False)
+    )
+    measurement = ContactMeasurement.of(found.kept(kept), free)
+    rows = measured_rows(free, measurement)
+    groups = adjoining(measurement.found.runs, rows)
     if len(groups) < len(rows):
-        measurer = Measurer.of(run, measurer.found.joined(groups), free)
-        rows = measured_rows(free, measurer)
-    others = [k for k in seen if not passed[k] and k not in halted]
+        measurement = ContactMeasurement.of(measurement.found.joined(groups), free)
+        rows = measured_rows(free, measurement)
     weak = [row for row in rows if not row.is_told]
     if others:
-        beside = Measurer.of(run, found.kept(others), free, measurer)
-        weak = [*measured_rows(free, replace(beside, bent=measurer.bent)), *weak]
-    told = [replace(row, inferred=not proven) for row in rows if row.is_told]
-    smallest = measurer.test.smallest_force
-    if not np.isfinite(smallest) and not named and has_wrench(run):
+        beside = ContactMeasurement.of(found.kept(others), free, measurement)
+        weak = [*measured_rows(free, beside), *weak]
+    smallest = measurement.test.smallest_force
+    if not np.isfinite(smallest) and not named and run.robot.joints >= 6:
         smallest = felt_by(run, free.level)
+    false = int(np.count_nonzero(own > LEAST_EVIDENCE))
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
-        contacts=numbered(told),
-        candidates=numbered(
-            sorted((replace(row, inferred=True) for row in weak), key=lambda row: row.start)
-        ),
+        contacts=numbered([row for row in rows if row.is_told], inferred=not proven),
+        candidates=numbered(weak, inferred=True),
         basis=free.basis,
         free=free.remarks,
         free_seconds=free.noise.free_seconds,
@@ -150,15 +156,15 @@ def by_smoother(free: Untouched, seconds: float, *, proven: bool) -> ContactList
         threshold=least if named else LEAST_IN_MOTION,
         smallest_force=smallest,
         load=None if free.load is None else carried(free.load, run),
-        stops=tuple(stops),
+        stops=stops,
         model=ContactModel(
-            prior=measurer.prior,
+            prior=measurement.prior,
             noise_sd=np.sqrt(free.noise.white),
             error_sd=np.sqrt(free.noise.variance),
             error_time=free.noise.time,
             block=seconds,
         ),
-        remarks=tuple(limits(run, free, tuple(stops), smallest)),
+        remarks=tuple(limits(run, free, stops, smallest)),
     )
 
 
@@ -185,16 +191,17 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
     return groups
 
 
-def measured_rows(free: Untouched, measurer: Measurer) -> list[Contact]:
-    """The rows of all that a measurer holds, those of short contacts from finer blocks."""
-    found, rows = measurer.found, dict(enumerate(measurer.rows()))
+def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
+    """The rows of all contacts of a measurement, those of short contacts from finer blocks."""
+    found, rows = measurement.found, measurement.rows()
     length = found.log.blocks.length
     if brief := [k for k, span in enumerate(found.runs) if length[slice(*span)].sum() < SHORT]:
-        rows |= fine_rows(free, brief, measurer)
-    return [rows[k] for k in sorted(rows)]
+        for k, row in zip(brief, fine_rows(free, brief, measurement), strict=False):
+            rows[k] = row
+    return rows
 
 
-def rests_around(recording: Recording, found: Found, span: BlockSpan) -> bool:
+def rests_around(recording: Recording, found: Candidates, span: BlockSpan) -> bool:
     """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
     first, last = np.searchsorted(recording.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
@@ -202,41 +209,39 @@ def rests_around(recording: Recording, found: Found, span: BlockSpan) -> bool:
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
 
-def numbered(rows: Sequence[Contact]) -> tuple[Contact, ...]:
-    """The rows with their numbers, from 1."""
-    return tuple(replace(row, number=k) for k, row in enumerate(rows, start=1))
+def numbered(rows: Sequence[Contact], *, inferred: bool) -> tuple[Contact, ...]:
+    """The rows in the order of time with their numbers, from 1."""
+    ordered = sorted(rows, key=lambda row: row.start)
+    return tuple(replace(row, number=k, inferred=inferred) for k, row in enumerate(ordered, 1))
 
 
-def fine_rows(free: Untouched, brief: Sequence[int], measurer: Measurer) -> dict[int, Contact]:
-    """Rows of short contacts, from blocks that cut their peaks less.
-
-    Returns:
-        Number → row; nothing where the log has no shorter blocks.
-    """
-    recording, found = free.log.recording, measurer.found
+def fine_rows(
+    free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
+) -> list[Contact]:
+    """Rows of short contacts by blocks that cut their peaks less, none where there are no such."""
+    recording, found = free.log.recording, measurement.found
     seconds, usual = max(FINE, float(recording.median_step)), block_length(recording.t)
     # On a clock that jitters blocks are as short as they may be.
     fine = free.in_blocks(seconds) if seconds < 0.7 * usual <= 0.7 * BLOCK else None
     if fine is None:
-        return {}
+        return []
     blocks = disturbance_blocks(fine.log.terms, recording.q, seconds)
     edges = found.log.blocks.t - 0.5 * found.log.blocks.length
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
     spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
-    course = error_process(fine.noise, blocks)
-    others = covered([spans[k] for k in range(len(spans)) if k not in set(brief)], len(blocks.t), 1)
-    white = np.where(others[:, None], UNKNOWN, course.white)
+    others = [span for k, span in enumerate(spans) if k not in brief]
+    process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
-        log=BlockLog.of(blocks, course._replace(white=white)),
+        log=BlockLog(blocks, process),
         places=places(fine.log.robot.loaded_chain, blocks.q),
         runs=[spans[k] for k in brief],
     )
-    # Where it is takes no peak, and is told best from the longer blocks.
-    sites = [measurer.sites[k] for k in brief]
-    return dict(zip(brief, Measurer.of(fine.log, some, fine, measurer).rows(sites), strict=True))
+    # Where it is takes no peak, and is known best from the longer blocks.
+    locations = [measurement.locations[k] for k in brief]
+    return ContactMeasurement.of(some, fine, measurement, BENT_SHORT).rows(locations)
 
 
-def is_stop(run: Run, found: Found, number: int, seconds: float) -> bool:
+def is_stop(run: Run, found: Candidates, number: int, seconds: float) -> bool:
     """Whether a candidate follows an abrupt stop of the arm."""
     first, last = found.runs[number]
     t, half = found.log.blocks.t, 0.5 * found.log.blocks.length
@@ -245,7 +250,7 @@ def is_stop(run: Run, found: Found, number: int, seconds: float) -> bool:
     )
 
 
-def false_rows(free: Untouched, seconds: float) -> int:
+def false_rows(free: FreeStatistics, seconds: float) -> int:
     """Rows that the same search lists in free runs of other logs."""
     count = 0
     for run in free.runs:
@@ -255,7 +260,9 @@ def false_rows(free: Untouched, seconds: float) -> int:
     return count
 
 
-def limits(run: Run, free: Untouched, stops: tuple[float, ...], smallest: float) -> list[Remark]:
+def limits(
+    run: Run, free: FreeStatistics, stops: tuple[float, ...], smallest: float
+) -> list[Remark]:
     """What limits the list as a whole; the smallest force as the free part shows it. [N]"""
     found = [caution("arm-stopped-abruptly", Where(span=(at, at)), at_s=at) for at in stops]
     if free.basis != "free motion":
@@ -283,61 +290,33 @@ def felt_by(run: Run, torque: Array) -> float:
 
 
 def without_list(run: Run) -> ContactList:
-    """A list without rows: nothing tells a contact from an error of the model."""
+    """A list without rows, where nothing tells a contact from an error of the model.
+
+    It has the largest torque that the momentum observer reads along the log.
+    """
     unknown = np.full(run.robot.joints, np.nan)
+    torque = np.abs(observed(run))
+    torque[run.t < run.t[0] + SETTLED] = 0.0
+    k, j = np.unravel_index(np.argmax(torque), torque.shape)
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
         contacts=(),
-        candidates=(),
         basis="none",
-        free=(),
-        free_seconds=0.0,
-        false_on_free=None,
-        threshold=None,
-        smallest_force=None,
-        unexplained=largest_torque(run),
-        stops=(),
+        unexplained=Unexplained(float(torque[k, j]), int(j) + 1, float(run.t[k])),
         model=ContactModel(
             prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
         ),
     )
 
 
-def largest_torque(run: Run) -> Unexplained:
-    """The largest torque that the momentum observer reads along a log."""
-    t = run.t
-    torque = np.abs(observed(run))
-    torque[t < t[0] + SETTLED] = 0.0
-    k, j = np.unravel_index(np.argmax(torque), torque.shape)
-    return Unexplained(float(torque[k, j]), int(j) + 1, float(t[k]))
-
-
-def without_forces(made: ContactList) -> ContactList:
+def without_forces(found: ContactList) -> ContactList:
     """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
-    bare = [
-        [
-            replace(
-                row,
-                peak_force=None,
-                peak_band=None,
-                place_band=None,
-                wrench=None,
-                wrench_sd=None,
-                mean_force=None,
-                impulse=None,
-                anywhere=None,
-                course=None,
-                vendor_force=None,
-            )
-            for row in rows
-        ]
-        for rows in (made.contacts, made.candidates)
-    ]
+    nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
     return replace(
-        made,
-        contacts=tuple(bare[0]),
-        candidates=tuple(bare[1]),
+        found,
+        contacts=tuple(replace(row, **nothing) for row in found.contacts),
+        candidates=tuple(replace(row, **nothing) for row in found.candidates),
         smallest_force=None,
-        remarks=(*made.remarks, caution("no-wrench-of-few-joints")),
+        remarks=(*found.remarks, caution("no-wrench-of-few-joints")),
     )

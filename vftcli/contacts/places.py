@@ -32,12 +32,7 @@ class ContactPlace(NamedTuple):
 
 
 def places(chain: Chain, q: Array) -> list[ContactPlace]:
-    """The flange, and the middle of every link from the second on.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (K, n) [rad]
-    """
+    """The flange, and the middle of every link from the second on, at q (K, n)."""
     poses, n = link_poses(chain, q), chain.joints
     found = [ContactPlace(0, LEAST_LEVER, point_jacobian(poses, n, poses.translation[:, n]))]
     for link in range(FIRST_LINK, n + 1):
@@ -49,13 +44,7 @@ def places(chain: Chain, q: Array) -> list[ContactPlace]:
 
 
 def point_jacobian(poses: LinkPoses, link: int, point: Array) -> Array:
-    """Jacobian of a point that moves with a link, in base axes. (K, 6, n)
-
-    Args:
-        poses: The arm's frames.
-        link: The link, from 1; joints behind it do not move the point.
-        point: The point in base axes. (K, 3) [m]
-    """
+    """Jacobian of a point (K, 3) that moves with a link, from 1, in base axes. (K, 6, n)"""
     axes = poses.rotation[:, :-1, :, 2]
     arms = point[:, None, :] - poses.translation[:, :-1]
     J = np.concatenate([np.cross(axes, arms), axes], axis=2).transpose(0, 2, 1)
@@ -102,7 +91,9 @@ class PointFit(NamedTuple):
 
 
 def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFit]:
-    """A force at each of `POINTS` points a link, from `FIRST_LINK` on, the best first.
+    """A force at each of the points of the links that fit within `ALIKE`, the best first.
+
+    `POINTS` a link are tried, from `FIRST_LINK` on.
 
     F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind the point
     count with a prediction of zero, which is what tells the place.
@@ -114,9 +105,8 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
         sd: Its standard deviation. (n,) [N·m]
     """
     poses, n = link_poses(chain, q[None]), chain.joints
-    shares = np.arange(1, POINTS + 1) / POINTS
     links = np.repeat(np.arange(FIRST_LINK, n + 1), POINTS)
-    along = np.tile(shares, n + 1 - FIRST_LINK)
+    along = np.tile(np.arange(1, POINTS + 1) / POINTS, n + 1 - FIRST_LINK)
     start, end = poses.translation[0, links - 1], poses.translation[0, links]
     points = start + along[:, None] * (end - start)
     axes, origins = poses.rotation[0, :-1, :, 2], poses.translation[0, :-1]
@@ -131,7 +121,9 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     sizes = np.maximum(np.linalg.norm(forces, axis=1), 1e-12)
     u = forces / sizes[:, None]
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
-    fits = [
+    least = float(score.min()) + ALIKE
+    order = np.argsort(score, kind="stable")[: np.count_nonzero(score <= least)]
+    return [
         PointFit(
             link=int(links[i]),
             share=float(along[i]),
@@ -140,24 +132,12 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
             force=forces[i],
             band=float(bands[i]),
         )
-        for i in range(len(links))
+        for i in order
     ]
-    return sorted(fits, key=lambda fit: fit.score)
-
-
-def those_that_fit(fits: list[PointFit]) -> list[PointFit]:
-    """The fits within `ALIKE` of the best."""
-    return [fit for fit in fits if fit.score <= fits[0].score + ALIKE]
 
 
 def from_flange(chain: Chain, q: Array, fit: PointFit) -> Array:
-    """A fitted point's position from the flange point, in base axes. (3,) [m]
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (n,) [rad]
-        fit: The point.
-    """
+    """A fitted point's position from the flange point at q (n,), in base axes. (3,) [m]"""
     frames = link_poses(chain, q[None]).translation[0]
     start, end = frames[fit.link - 1], frames[fit.link]
     offset: Array = start + fit.share * (end - start) - frames[-1]

@@ -1,29 +1,74 @@
-"""The search along one log: candidates of both kinds, split, each with its evidence."""
+"""The search along one log: candidates of two kinds, split, each with its evidence.
+
+The first kind is found by an interacting two-state filter (IMM) in joint space, for any arm and any
+place of contact. Its mode "free" says d = b + n, its mode "contact" d = b + x + n with x of every
+joint an Ornstein–Uhlenbeck process, as large as a push of 30 N and 3 N·m at the flange makes; the
+mode is shared by all joints, the states are each joint's own. It runs forward and backward in time,
+so that ends are as sharp as beginnings, for taps and for leans.
+
+The second is beyond a threshold on a momentum observer: what rises slowly or loads one joint alone,
+which the filter takes for friction.
+
+References:
+    H. A. P. Blom, Y. Bar-Shalom, "The interacting multiple model algorithm for systems with
+    Markovian switching coefficients", IEEE Trans. Automatic Control 33(8), 1988.
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.candidates import filtered_contacts, threshold_contacts
-from vftcli.contacts.evidence import evidence
+from vftcli.contacts.free_statistics import GAIN, beyond_threshold
 from vftcli.contacts.places import ContactPlace, places
-from vftcli.contacts.sizes import START, learn_prior, smooth_contacts, split_run
-from vftcli.contacts.untouched import GAIN, SETTLED, expected_torque, observed
-from vftcli.contacts.windows import BlockLog, BlockSpan
+from vftcli.contacts.windows import (
+    START,
+    BlockLog,
+    BlockSpan,
+    WindowWrench,
+    contact_lanes,
+    evidence,
+    learn_prior,
+    smooth_lanes,
+)
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array
-from vftcli.signals.series import runs_of
-from vftcli.virtual_sensor.model_error import UNKNOWN, TorqueNoise, error_process, spiked_white
+from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.linear_model import SPIKE
+from vftcli.signals.series import covered, intervals, runs_of
+from vftcli.virtual_sensor.model_error import (
+    ErrorProcess,
+    TorqueNoise,
+    error_process,
+    spiked_white,
+    steps,
+)
 from vftcli.virtual_sensor.smoother import WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
 #: observer's lag is over, friction has turned. [s]
 LASTING = 1.0
+#: A push as it may be: standard deviation of force and moment at the flange. [N, N·m]
+PUSH = np.repeat([30.0, 3.0], 3)
+#: Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]
+SEARCHES = (0.3, 0.5), (2.0, 3.0)
+#: Stretches in which a long log is searched, and what of the log before each is taken along. [s]
+WARM_UP, STRETCH = 5.0, 10.0
+BETWEEN = 30.0  #: Mean time from one contact to the next. [s]
+AT_FIRST = 0.1  #: Probability that a log begins in contact.
+#: Probability that a contact must reach in one direction of time, and in the other.
+SURE, LIKELY = 0.99, 0.5
+GAP = 0.12  #: Contacts closer than this are one. [s]
+MOST_ODDS = 300.0  #: Log odds are kept within ± this many nats.
+#: A contact is split where the force is below so many standard deviations for so long [s], and
+#: below this share of the peaks on both sides.
+RELEASED, RELEASE_TIME, RELEASE_SHARE = 1.5, 0.08, 0.25
+#: A contact is split too where the force falls below this share of the peaks on both sides, if
+#: these point so far apart (cosine) and each side lasts so long [s]: one hand follows another.
+HALF, TURNED, APART = 0.5, np.cos(np.radians(60.0)), 0.25
 
 
-class Found(NamedTuple):
+class Candidates(NamedTuple):
     """What may be contacts along a log."""
 
     log: BlockLog  #: The log in blocks, b strict.
@@ -40,24 +85,21 @@ class Found(NamedTuple):
         found: Array = self.evidence.max(axis=1)
         return found
 
-    def kept(self, chosen: Sequence[int]) -> "Found":
+    def kept(self, chosen: Sequence[int]) -> "Candidates":
         """Some of the candidates."""
-        return self._replace(
-            runs=[self.runs[i] for i in chosen],
-            evidence=self.evidence[list(chosen)],
-            beyond=[self.beyond[i] for i in chosen],
-        )
+        return self.joined([[i] for i in chosen])
 
-    def joined(self, groups: Sequence[Sequence[int]]) -> "Found":
+    def joined(self, groups: Sequence[Sequence[int]]) -> "Candidates":
         """The candidates of each group as one, their evidence added."""
+        sums = [self.evidence[list(group)].sum(axis=0) for group in groups]
         return self._replace(
             runs=[(self.runs[group[0]][0], self.runs[group[-1]][1]) for group in groups],
-            evidence=np.array([self.evidence[list(group)].sum(axis=0) for group in groups]),
+            evidence=np.reshape(sums, (-1, len(self.places))),
             beyond=[any(self.beyond[i] for i in group) for group in groups],
         )
 
 
-def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Found:
+def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
     """Look for contacts along a log.
 
     Args:
@@ -67,58 +109,272 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Found:
         seconds: Length of a block. [s]
     """
     blocks = disturbance_blocks(run.terms, run.q, seconds)
-    there = places(run.robot.loaded_chain, blocks.q)
-    J = there[0].jacobian
+    options = places(run.robot.loaded_chain, blocks.q)
+    J = options[0].jacobian
     ahead, back = error_process(noise, blocks), error_process(noise, turned_round(blocks))
-    taken = filtered_contacts(blocks, (ahead, back), J)
-    beyond = beyond_threshold(run, level, blocks)
-    struck = taken.copy()
+    inside = filtered_contacts(blocks, (ahead, back), J)
+    beyond = []
+    for start, stop in runs_of(beyond_threshold(run, level)):
+        # The observer lags by 1/gain.
+        span = np.array([run.t[start], run.t[stop - 1]]) - 1.0 / GAIN
+        first, last = (int(k) for k in np.searchsorted(blocks.t, span))
+        last = min(max(last, first + 1), len(blocks.t))
+        if first < last:
+            beyond.append((first, last))
+    struck = inside.copy()
     # The filter takes a load that hangs on for many seconds for an error of the model, and sees
     # only what strikes it in the meantime: before, between and behind that the torque goes on.
     for start, stop in beyond:
         within, t = struck[start:stop], blocks.t[start:stop]
         for a, b in runs_of(~within) if within.any() else ():
-            taken[start + a : start + b] |= t[b - 1] - t[a] > LASTING
-    apart = [r for r in beyond if not taken[max(r[0] - 1, 0) : r[1] + 1].any()]
-    runs = sorted([*runs_of(taken), *apart])
-    for start, stop in runs:
-        taken[start:stop] = True
+            inside[start + a : start + b] |= t[b - 1] - t[a] > LASTING
+    apart = [r for r in beyond if not inside[max(r[0] - 1, 0) : r[1] + 1].any()]
+    runs = sorted([*runs_of(inside), *apart])
+    inside |= covered(runs, len(inside))
     # What is no candidate keeps its spikes, whatever hypothesis is weighed.
-    hidden = ahead._replace(white=np.where(taken[:, None], UNKNOWN, ahead.white))
-    white = np.where(taken[:, None], ahead.white, spiked_white(blocks.d, hidden))
-    log = BlockLog.of(blocks, ahead._replace(white=white))
+    spiked = spiked_white(blocks.d, ahead.hiding(inside))
+    white = np.where(inside[:, None], ahead.white, spiked)
+    log = BlockLog(blocks, ahead._replace(white=white))
     if not runs:
-        return Found(log, there, [], np.zeros((0, len(there))), [], START)
+        return Candidates(log, options, [], np.zeros((0, len(options))), [], START)
     prior = learn_prior(log, J, runs, START, rounds=1)
-    courses = smooth_contacts(log, [J] * len(runs), runs, [prior] * len(runs))
-    pairs = zip(courses, runs, strict=True)
-    pieces = [piece for course, run in pairs for piece in split_run(blocks.t, course, run, J)]
+    count = len(runs)
+    wrenches = smooth_lanes(log, contact_lanes(log, [J] * count, runs, [prior] * count))
+    pairs = zip(wrenches, runs, strict=True)
+    pieces = [piece for wrench, run in pairs for piece in split_run(blocks.t, wrench, run, J)]
     passed = [any(a < stop and b > start for a, b in beyond) for start, stop in pieces]
-    return Found(log, there, pieces, evidence(log, there, pieces, prior), passed, prior)
+    return Candidates(log, options, pieces, evidence(log, options, pieces, prior), passed, prior)
 
 
 def turned_round(blocks: Blocks) -> Blocks:
     """The blocks of the log played backward."""
-    return Blocks(
-        t=-blocks.t[::-1],
-        length=blocks.length[::-1],
-        d=blocks.d[::-1],
-        q=blocks.q[::-1],
-        velocity=-blocks.velocity[::-1],
-        known=blocks.known[::-1],
+    turned = blocks.part(slice(None, None, -1))
+    return turned._replace(t=-turned.t, velocity=-turned.velocity)
+
+
+def filtered_contacts(
+    blocks: Blocks, processes: tuple[ErrorProcess, ErrorProcess], J: Array
+) -> Mask:
+    """Blocks that the two-state filter calls contact. (K,)
+
+    They are the runs in which the mean of the log odds of both directions is positive, one of them
+    sure.
+
+    Args:
+        blocks: The log.
+        processes: b forward along it, and along the log turned round.
+        J: Jacobian of the flange. (K, 6, n)
+    """
+    size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
+    sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
+    inside = np.zeros(len(blocks.t), dtype=bool)
+    for forward, backward in two_state_odds(blocks, processes, size):
+        high, low = np.maximum(forward, backward), np.minimum(forward, backward)
+        seed = (high > sure) & (low > likely)
+        runs = intervals(blocks.t, 0.5 * (forward + backward) > 0.0, gap=GAP)
+        inside |= covered([run for run in runs if seed[slice(*run)].any()], len(seed))
+    return inside
+
+
+def two_state_odds(
+    blocks: Blocks, processes: tuple[ErrorProcess, ErrorProcess], size: Array
+) -> list[tuple[Array, Array]]:
+    """Log odds of contact of the search for taps and of that for leans, forward and backward.
+
+    A long log is searched in stretches side by side, each after `WARM_UP` seconds of the log before
+    it, in which the filter forgets that it has just begun.
+
+    Args:
+        blocks: The log.
+        processes: b forward and backward.
+        size: Standard deviation of each joint's torque in contact. (K, n) [N·m]
+    """
+    step, usual, many = steps(blocks), float(np.median(blocks.length)), len(SEARCHES)
+    step[0] = usual
+    back = np.concatenate([step[:1], step[:0:-1]])
+    ahead = (blocks.d, *processes[0], size**2, step[:, None])
+    turned = (blocks.d[::-1], *processes[1], size[::-1] ** 2, back[:, None])
+    begins, warm, length = stretches_of(len(step), usual)
+    # The last block is repeated beyond the end.
+    at = np.minimum(np.add.outer(begins, np.arange(length)), len(step) - 1)
+    inputs = []
+    for pair in zip(ahead, turned, strict=True):
+        each = np.repeat(np.stack([series[at] for series in pair]), many, axis=1)
+        inputs.append(each.reshape(-1, *each.shape[2:]).swapaxes(0, 1))
+    table = filtered_odds(*inputs).reshape(length, 2, len(begins), many)
+    joined = np.concatenate([table[(warm if k else 0) :, :, i] for i, k in enumerate(begins)])
+    odds = joined[: len(step)]
+    return [(odds[:, 0, s], odds[::-1, 1, s]) for s in range(many)]
+
+
+def stretches_of(count: int, step: float) -> tuple[list[int], int, int]:
+    """First blocks of the stretches that are searched, their warm-up and their length. [blocks]"""
+    warm, own = max(round(WARM_UP / step), 1), max(round(STRETCH / step), 2)
+    if count <= warm + 2 * own:
+        return [0], 0, count
+    return [0, *range(own, count - warm, own)], warm, warm + own
+
+
+class ImmState(NamedTuple):
+    """State of the two-mode filter, of every search and direction of time."""
+
+    b: Array  #: Mean of b in mode 0, 1. (2, S, n)
+    x: Array  #: Mean of x in mode 1. (S, n)
+    bb: Array  #: Variance of b in mode 0, 1. (2, S, n)
+    bx: Array  #: Covariance of b and x in mode 1. (S, n)
+    xx: Array  #: Variance of x in mode 1. (S, n)
+    odds: Array  #: ln P(contact)/P(free). (S,)
+
+
+def filtered_odds(
+    d: Array, decay: Array, added: Array, white: Array, spikes: Array, variance: Array, dt: Array
+) -> Array:
+    """Log odds ln P(contact)/P(free) along S searches side by side. (K, S)
+
+    Args:
+        d: Mean disturbance. (K, S, n) [N·m]
+        decay: Share of b that is kept. (K, S, n)
+        added: Variance that b is given. (K, S, n)
+        white: R. (K, S, n)
+        spikes: How often an innovation is a spike. (K, S, n)
+        variance: Variance of a contact's torque. (K, S, n) [(N·m)²]
+        dt: Time from the block before. (K, S, 1) [s]
+    """
+    blocks, count, n = d.shape
+    time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
+    kept = np.exp(-dt[..., 0] / time)[..., None]
+    # Behind a long gap neither mode is certain: 1 exactly would leave 0/0 of a certain one.
+    begins, ends = (np.minimum(-np.expm1(-dt[..., 0] / s), 1.0 - 1e-9) for s in (BETWEEN, lasts))
+    often = np.log(spikes) - 0.5 * np.log(SPIKE), np.log1p(-spikes)
+    # A stretch begins with what b is like anywhere.
+    added[0] /= np.maximum(1.0 - decay[0] ** 2, 1e-9)
+    nought, first = np.zeros((count, n)), np.full(count, np.log(AT_FIRST / (1.0 - AT_FIRST)))
+    both = np.zeros((2, count, n))
+    state = ImmState(both, nought, both, nought, variance[0].copy(), first)
+    odds = np.empty((blocks, count))
+    for k in range(blocks):
+        mixed = imm_mix(state, begins[k], ends[k], variance[k])
+        predicted = imm_predict(mixed, decay[k], added[k], kept[k], variance[k])
+        state = imm_update(predicted, d[k], white[k], (often[0][k], often[1][k]))
+        odds[k] = state.odds
+    return odds
+
+
+def imm_mix(state: ImmState, begins: Array, ends: Array, variance: Array) -> ImmState:
+    """The states with which each mode begins the next block, moments matched."""
+    p1 = 1.0 / (1.0 + np.exp(-state.odds))
+    p0 = 1.0 - p1
+    ahead0, ahead1 = p0 * (1.0 - begins) + p1 * ends, p0 * begins + p1 * (1.0 - ends)
+    # Share of the contact mode in what each mode begins with. (2, S, 1)
+    w = np.stack([p1 * ends / ahead0, p1 * (1.0 - ends) / ahead1])[:, :, None]
+    apart = state.b[1] - state.b[0]
+    b = state.b[0] + w * apart
+    spread = w * (1.0 - w)
+    bb = (1.0 - w) * state.bb[0] + w * state.bb[1] + spread * apart * apart
+    w1, s1 = w[1], spread[1]
+    x = w1 * state.x
+    xx = w1 * state.xx + (1.0 - w1) * variance + s1 * state.x * state.x
+    bx = w1 * state.bx + s1 * apart * state.x
+    return ImmState(b, x, bb, bx, xx, np.log(ahead1 / ahead0))
+
+
+def imm_predict(state: ImmState, f: Array, added: Array, g: Array, variance: Array) -> ImmState:
+    """The states a block later; x keeps the share g and wanders within its variance."""
+    return ImmState(
+        f * state.b,
+        g * state.x,
+        f * f * state.bb + added,
+        f * g * state.bx,
+        g * g * state.xx + variance * (1.0 - g * g),
+        state.odds,
     )
 
 
-def beyond_threshold(run: Run, level: Array, blocks: Blocks) -> list[BlockSpan]:
-    """Runs of blocks in which a joint's torque is beyond its threshold."""
-    t = run.t
-    above = threshold_contacts(t, observed(run), expected_torque(run, level))
-    above &= t >= t[0] + SETTLED
-    found = []
-    for start, stop in runs_of(above):
-        # The observer lags by 1/gain.
-        span = np.array([t[start], t[stop - 1]]) - 1.0 / GAIN
-        first, last = (int(k) for k in np.searchsorted(blocks.t, span))
-        last = max(last, first + 1)
-        found.append((first, min(last, len(blocks.t))))
-    return [each for each in found if each[0] < each[1]]
+def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Array]) -> ImmState:
+    """The states with a block's disturbance in them; a joint that spikes tells a 40th."""
+    S0 = state.bb[0] + white
+    b1, cross, own = state.bb[1], state.bb[1] + state.bx, state.bx + state.xx
+    S1 = cross + own + white
+    S = np.stack([S0, S1])
+    nu = np.stack([d - state.b[0], d - state.b[1] - state.x])
+    square = nu * nu / S
+    usual = often[1] - 0.5 * square
+    spiked = often[0] - 0.5 * square / SPIKE
+    likely = np.logaddexp(usual, spiked) - 0.5 * np.log(S)
+    odds = state.odds + (likely[1] - likely[0]).sum(axis=1)
+    S = np.where(spiked > usual, SPIKE * S, S)
+    K0, K1, Kx = state.bb[0] / S[0], cross / S[1], own / S[1]
+    return ImmState(
+        np.stack([state.b[0] + K0 * nu[0], state.b[1] + K1 * nu[1]]),
+        state.x + Kx * nu[1],
+        np.stack([state.bb[0] * (1.0 - K0), b1 - K1 * cross]),
+        state.bx - K1 * own,
+        state.xx - Kx * own,
+        np.clip(odds, -MOST_ODDS, MOST_ODDS),
+    )
+
+
+def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -> list[BlockSpan]:
+    """A contact's blocks, split where force and joint torque are gone for a while between peaks.
+
+    Args:
+        t: Time. (K,) [s]
+        wrench: The wrench in the contact's window.
+        run: The contact's blocks.
+        jacobian: J of the wrench's point. (K, 6, n)
+    """
+    inside = wrench.within(run)
+    size = inside.size
+    torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
+    sd = np.sqrt(np.trace(inside.covariance[:, :3, :3], axis1=1, axis2=2))
+    low, at = size < RELEASED * sd, t[run[0] : run[1]]
+    pieces, begin = [], 0
+    for k, end in quiet_pauses(low, at):
+        if is_valley((size[begin:], torque[begin:]), k - begin, end - begin, RELEASE_SHARE):
+            pieces.append((run[0] + begin, run[0] + k))
+            begin = end
+    pieces.append((run[0] + begin, run[1]))
+    force = inside.values[:, :3]
+    return [
+        (first + run[0], last + run[0])
+        for piece in pieces
+        for first, last in split_at_turns(at, force, torque, (piece[0] - run[0], piece[1] - run[0]))
+    ]
+
+
+def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
+    """A stretch of a contact, split at valleys of force and torque between different directions.
+
+    Args:
+        t: Time along the contact. (k,) [s]
+        force: Its force. (k, 3) [N]
+        torque: |Jᵀw|. (k,) [N·m]
+        piece: First and last block of the stretch.
+    """
+    span = slice(*piece)
+    at, there, load = t[span], force[span], torque[span]
+    size = np.linalg.norm(there, axis=1)
+    inner = np.flatnonzero((at - at[0] >= APART) & (at[-1] - at >= APART))
+    for k in inner[np.argsort(size[inner])].tolist():
+        if not is_valley((size, load), k, k + 1, HALF):
+            continue
+        i, j = int(np.argmax(size[:k])), k + int(np.argmax(size[k:]))
+        if there[i] @ there[j] < TURNED * size[i] * size[j]:
+            ends = (piece[0], piece[0] + k), (piece[0] + k, piece[1])
+            return [part for end in ends for part in split_at_turns(t, force, torque, end)]
+    return [piece]
+
+
+def is_valley(series: Sequence[Array], start: int, stop: int, share: float) -> bool:
+    """Whether all series fall below a share of their peaks on both sides."""
+    return all(x[start:stop].min() < share * min(x[:start].max(), x[stop:].max()) for x in series)
+
+
+def quiet_pauses(low: Mask, t: Array) -> list[tuple[int, int]]:
+    """Runs of low blocks within a contact that last at least `RELEASE_TIME`."""
+    usual = float(np.median(np.diff(t))) if len(t) > 1 else 0.0
+    return [
+        (start, stop)
+        for start, stop in runs_of(low)
+        if start > 0 and stop < len(low) and t[stop - 1] - t[start] + usual >= RELEASE_TIME
+    ]

@@ -1,24 +1,26 @@
 """What motion that nobody touched tells."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from contact_logs import FIXTURES, motion
 
-from vftcli.contacts.sizes import START
-from vftcli.contacts.untouched import (
+from vftcli.contacts.free_statistics import (
     BLOCK,
     DRY_SHARE,
+    beyond_threshold,
     block_length,
     expected_torque,
     free_part,
+    free_statistics,
     is_touched,
     pseudo_contacts,
     self_test,
     torque_level,
-    untouched_motion,
 )
+from vftcli.contacts.windows import START
 from vftcli.readers import read
 from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots import load_robot
@@ -27,6 +29,7 @@ from vftcli.robots.run import Run
 from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.recording import Recording
+from vftcli.signals.series import runs_of
 
 LOG = read(FIXTURES / "ur5_circle.csv")
 
@@ -62,7 +65,7 @@ def test_another_log_is_a_free_part_whatever_its_motion() -> None:
 
 def test_what_repeats_nothing_has_no_free_part() -> None:
     short = read(FIXTURES / "ur5_taps_ur_rtde.csv")
-    assert untouched_motion(motion(short, "ur5"), BLOCK) is None
+    assert free_statistics(motion(short, "ur5"), BLOCK) is None
     with pytest.raises(ParameterError, match="free part"):
         free_part(motion(short, "ur5", "90:95"))
 
@@ -104,9 +107,9 @@ def test_resting_joints_are_given_their_stiction() -> None:
 
 
 def test_contacts_that_are_none_read_little() -> None:
-    free = untouched_motion(motion(LOG, "ur5", "0.3:4"), BLOCK)
+    free = free_statistics(motion(LOG, "ur5", "0.3:4"), BLOCK)
     assert free is not None
-    found = self_test(free, motion(LOG, "ur5").log.robot, START)
+    found = self_test(free, START)
     assert np.all(found.widening >= 1.0)
     # Simulations told 4 to 9 N.
     assert 1.0 < found.smallest_force < 15.0
@@ -118,8 +121,8 @@ def test_a_load_in_the_free_part_is_no_noise() -> None:
     plain = motion(LOG, "ur5", "0.3:4")
     load = FreeLoad(mass=2.8, moment=np.zeros(3), sd=0.1, moment_sd=np.zeros(3), share=0.5)
     run = plain.log.less(-load.torque(plain.log))
-    heavy = untouched_motion(replace(plain, log=run), BLOCK)
-    light = untouched_motion(plain, BLOCK)
+    heavy = free_statistics(replace(plain, log=run), BLOCK)
+    light = free_statistics(plain, BLOCK)
     assert heavy is not None
     assert light is not None
     assert [remark.code for remark in heavy.remarks] == ["free-span", "free-part-loaded"]
@@ -150,3 +153,16 @@ def test_free_cycles_with_a_contact_in_every_one_are_not_believed() -> None:
     quiet = torque * ~((t % 4.0 > 2.0) & own)[:, None]
     p = np.cumsum(0.008 * quiet, axis=0)
     assert not is_touched(still.holding(terms=DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))), own)
+
+
+def test_a_threshold_takes_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
+    torque = np.zeros((300, 2))
+    torque[10:20, 0] = 9.0  # while the observer settles
+    torque[50, 0] = 9.0  # one sample
+    torque[100:110, 1] = 9.0  # .1 s
+    torque[120:130, 1] = -9.0  # closer than .2 s: the same
+    room = "vftcli.contacts.free_statistics"
+    monkeypatch.setattr(f"{room}.observed", lambda _: torque)
+    monkeypatch.setattr(f"{room}.expected_torque", lambda *_: np.full((300, 2), 2.0))
+    found = beyond_threshold(SimpleNamespace(t=0.01 * np.arange(300)), None)  # type: ignore[arg-type]
+    assert runs_of(found) == [(100, 130)]

@@ -6,29 +6,22 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.candidates import threshold_contacts
-from vftcli.contacts.places import places
-from vftcli.contacts.windows import (
-    BlockLog,
-    Lane,
-    smooth_lanes,
-    window_of,
-)
+from vftcli.contacts.windows import BlockLog, Lane, smooth_lanes, window_of
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.repetition.free_load import FreeLoad, free_load, without_load
 from vftcli.repetition.free_motion import FreeMotion, FreePart
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
-from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.rest import NEAR_REST, REST, faster, slower
-from vftcli.signals.series import covered, median_step, near, runs_of
+from vftcli.signals.series import covered, intervals, median_step, near, runs_of
 from vftcli.virtual_sensor.model_error import (
     DRY_SHARE,
     LEAST_ERROR,
@@ -43,6 +36,9 @@ from vftcli.virtual_sensor.smoother import WrenchPrior
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that a threshold is laid on. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
+LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
+#: How long it must stay there, and the pause up to which two such stretches are one. [s]
+LASTING, NEAR = 0.05, 0.2
 LEAST_MOVING = 50  #: Fewest samples in motion that a joint's level is taken from.
 #: What tells a contact from an error of the model: motion that is known to be free; the samples
 #: that the fit of the whole log calls free; the drives' dry friction; or nothing.
@@ -56,13 +52,13 @@ PSEUDO, MOST_PSEUDO = 0.6, 48
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Untouched:
-    """Motion that nobody touched, as a list of contacts needs it."""
+class FreeStatistics:
+    """Noise and level of motion that nobody touched, as a list of contacts needs them."""
 
     basis: Basis = "free motion"  #: What tells a contact from an error of the model.
     noise: TorqueNoise  #: Noise and model error.
     level: Array  #: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
-    own: Mask  #: RunSamples of the log itself that are known to be free. (T,)
+    own: Mask  #: Samples of the log itself that are known to be free. (T,)
     #: The log, less a load that the free part carries; less the model error of the whole log where
     #: the basis is that.
     log: Run
@@ -73,8 +69,8 @@ class Untouched:
     load: FreeLoad | None
     remarks: tuple[Remark, ...]  #: What it is and how it was found, and a load that it carries.
 
-    def in_blocks(self, seconds: float) -> "Untouched | None":
-        """The same in blocks of another length [s], None where no stretch holds enough of them."""
+    def in_blocks(self, seconds: float) -> "FreeStatistics | None":
+        """The statistics by blocks of another length [s]; None if no stretch holds enough."""
         known = self.basis == "free motion"
         found = noise_of(self.free, seconds) if known else inferred(self.log, self.free, seconds)
         return None if found is None else replace(self, noise=found[0], pieces=found[1])
@@ -89,23 +85,18 @@ def block_length(t: Array) -> float:
     return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
 
 
-def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
-    """The free motion of a log, None where nothing is known to be free.
-
-    Args:
-        motion: The log and what the user says is free.
-        seconds: Length of a block. [s]
-    """
+def free_statistics(motion: FreeMotion, seconds: float) -> FreeStatistics | None:
+    """Statistics of a log's free motion by blocks of a length [s]; None if none is known."""
     part = free_part(motion)
     if part is None:
         return None
     load = free_load(part.pieces)
-    # A load nobody told of is no noise: contacts are told beside it.
+    # An unknown load is no noise: contacts are found beside it.
     pieces = tuple(p._replace(run=without_load(p.run, load)) for p in part.pieces)
     found = noise_of(pieces, seconds)
     if found is None:
         return None
-    return Untouched(
+    return FreeStatistics(
         noise=found[0],
         level=torque_level(pieces),
         own=part.own,
@@ -118,16 +109,11 @@ def untouched_motion(motion: FreeMotion, seconds: float) -> Untouched | None:
     )
 
 
-def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched | None:
-    """What a log without known free motion lets infer of it, None where it lets infer nothing.
+def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeStatistics | None:
+    """Statistics that a log without known free motion lets infer, None where it lets infer none.
 
-    The model error that the whole log shows is taken off where its guard allows it, then a load.
-    Nothing is inferred without dry friction where that error is taken off no joint as a whole.
-
-    Args:
-        log: The log.
-        bias: The model error that was fitted to the whole log.
-        seconds: Length of a block. [s]
+    The model error that was fitted to the whole log is subtracted where its guard allows it, then a
+    load. Nothing is inferred without dry friction where it is subtracted from no joint as a whole.
     """
     if not (dry_torques(log.robot).any() or (bias.weight >= 1.0).any()):
         return None
@@ -140,7 +126,7 @@ def inferred_motion(log: Run, bias: WholeLogBias, seconds: float) -> Untouched |
     found = inferred(corrected, free, seconds)
     if found is None:
         return None
-    return Untouched(
+    return FreeStatistics(
         basis="whole log" if bias.fitted else "friction",
         noise=found[0],
         level=np.sqrt(found[0].variance + observer_noise(corrected) ** 2),
@@ -198,13 +184,24 @@ def free_part(motion: FreeMotion) -> FreePart | None:
 
 def is_touched(log: Run, own: Mask) -> bool:
     """Whether a free part that was found is none: no quieter than the rest, and beyond friction."""
-    above = threshold_contacts(log.t, observed(log), expected_torque(log, None))
-    if not (above & own & (log.t >= log.t[0] + SETTLED)).any():
+    if not (beyond_threshold(log, None) & own).any():
         return False
     try:
         return not looks_free(spectra_of(RunSamples(log, ~own), [RunSamples(log, own)]))
     except ParameterError:  # too short for a spectrum
         return False
+
+
+def beyond_threshold(run: Run, level: Array | None) -> Mask:
+    """Samples in which a joint's torque lies beyond `LEVEL` standard deviations for a while. (T,)
+
+    The standard deviation is that of the observer's torque in free motion, the level (n,) [N·m];
+    None without any.
+    """
+    t = run.t
+    above = np.any(np.abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
+    settled: Mask = t >= t[0] + SETTLED
+    return covered(intervals(t, above, least=LASTING, gap=NEAR), len(t)) & settled
 
 
 def observed(run: Run) -> Array:
@@ -227,13 +224,9 @@ def observer_noise(run: Run) -> Array:
 
 def torque_level(pieces: Sequence[RunSamples]) -> Array:
     """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
-    values, moves = [], []
-    for piece in pieces:
-        t = piece.run.t
-        use = piece.inside & (t >= t[0] + SETTLED)
-        values.append(observed(piece.run)[use])
-        moves.append(faster(piece.run.dq[use], REST))
-    torque, moving = np.abs(np.concatenate(values)), np.concatenate(moves)
+    uses = [(run, inside & (run.t >= run.t[0] + SETTLED)) for run, inside in pieces]
+    torque = np.abs(np.concatenate([observed(run)[use] for run, use in uses]))
+    moving = np.concatenate([faster(run.dq[use], REST) for run, use in uses])
     found = np.empty(torque.shape[1])
     for j, column in enumerate(torque.T):
         some = column[moving[:, j]]
@@ -243,12 +236,7 @@ def torque_level(pieces: Sequence[RunSamples]) -> Array:
 
 
 def expected_torque(run: Run, level: Array | None) -> Array:
-    """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]
-
-    Args:
-        run: The log.
-        level: What free motion shows, None without any. (n,) [N·m]
-    """
+    """Standard deviation of the observer's torque where nothing touches. (T, n) [N·m]"""
     dry, recording = dry_torques(run.robot), run.recording
     least = np.full(len(dry), LEAST_ERROR) if level is None else level
     sd = np.tile(np.maximum(least, DRY_SHARE * dry), (recording.samples, 1))
@@ -257,39 +245,37 @@ def expected_torque(run: Run, level: Array | None) -> Array:
     return np.where(close, np.maximum(sd, NEAR_REST_SHARE * dry), sd)
 
 
-class SelfTest(NamedTuple):
-    """What the smoother reads in free motion where it is told of contacts that are none."""
+class PseudoContactTest(NamedTuple):
+    """Smoothed wrench in made-up contacts of free motion, where it should be zero."""
 
     #: Factor on each axis' standard deviation that would hold 95 %, at least 1. (6,)
     widening: Array
     smallest_force: float  #: |F| that 95 % of the blocks stay below. [N]
 
 
-def self_test(free: Untouched, robot: Robot, prior: WrenchPrior) -> SelfTest:
-    """Make contacts up in free motion, whose wrench is zero, and see what is measured."""
+def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
+    """Make contacts up in free motion, where the wrench is zero, and see what is measured."""
     shares, forces = [], []
     each = max(MOST_PSEUDO // max(len(free.pieces), 1), 4)
     for blocks in free.pieces:
         made_up, count = pseudo_contacts(blocks, each), len(blocks.t)
         if not made_up:
             continue
-        course = error_process(free.noise, blocks, covered(made_up, count, 1))
-        J = places(robot.loaded_chain, blocks.q)[0].jacobian
-        nowhere = np.zeros(count, dtype=bool)
+        log = BlockLog(blocks, error_process(free.noise, blocks, covered(made_up, count, 1)))
+        J, nowhere = flange_jacobian(free.log.robot.loaded_chain, blocks.q), np.zeros(count, bool)
         lanes = [
             Lane(window_of(blocks.t, run), covered([run], count, 1), nowhere, J, prior)
             for run in made_up
         ]
-        measured = smooth_lanes(BlockLog.of(blocks, course), lanes)
-        for run, wrench in zip(made_up, measured, strict=True):
+        for run, wrench in zip(made_up, smooth_lanes(log, lanes), strict=True):
             inside = wrench.within(run)
             sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
             shares.append(np.abs(inside.values) / np.maximum(sd, 1e-12))
             forces.append(inside.size)
     if not forces:
-        return SelfTest(np.ones(6), float("nan"))
+        return PseudoContactTest(np.ones(6), float("nan"))
     widening = np.maximum(np.quantile(np.concatenate(shares), 0.95, axis=0) / 1.96, 1.0)
-    return SelfTest(widening, float(np.quantile(np.concatenate(forces), 0.95)))
+    return PseudoContactTest(widening, float(np.quantile(np.concatenate(forces), 0.95)))
 
 
 def pseudo_contacts(blocks: Blocks, most: int) -> list[tuple[int, int]]:
