@@ -280,9 +280,7 @@ def limits(
 def felt_by(run: Run, torque: Array) -> float:
     """Median over the log of the force along its best axis that turns no joint further. [N]
 
-    Args:
-        run: The log.
-        torque: What each joint may hide: 1.96 standard deviations of it. (n,) [N·m]
+    Each joint may hide 1.96 standard deviations of its torque (n,) [N·m].
     """
     J = np.abs(flange_jacobian(run.robot.loaded_chain, run.q)[:, :3])
     each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)

@@ -97,12 +97,6 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
 
     F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind the point
     count with a prediction of zero, which is what tells the place.
-
-    Args:
-        chain: The arm.
-        q: Its joint positions. (n,) [rad]
-        torque: Joint torque of the contact. (n,) [N·m]
-        sd: Its standard deviation. (n,) [N·m]
     """
     poses, n = link_poses(chain, q[None]), chain.joints
     links = np.repeat(np.arange(FIRST_LINK, n + 1), POINTS)

@@ -159,11 +159,6 @@ def filtered_contacts(
 
     They are the runs in which the mean of the log odds of both directions is positive, one of them
     sure.
-
-    Args:
-        blocks: The log.
-        processes: b forward along it, and along the log turned round.
-        J: Jacobian of the flange. (K, 6, n)
     """
     size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
@@ -183,11 +178,6 @@ def two_state_odds(
 
     A long log is searched in stretches side by side, each after `WARM_UP` seconds of the log before
     it, in which the filter forgets that it has just begun.
-
-    Args:
-        blocks: The log.
-        processes: b forward and backward.
-        size: Standard deviation of each joint's torque in contact. (K, n) [N·m]
     """
     step, usual, many = steps(blocks), float(np.median(blocks.length)), len(SEARCHES)
     step[0] = usual
@@ -231,14 +221,8 @@ def filtered_odds(
 ) -> Array:
     """Log odds ln P(contact)/P(free) along S searches side by side. (K, S)
 
-    Args:
-        d: Mean disturbance. (K, S, n) [N·m]
-        decay: Share of b that is kept. (K, S, n)
-        added: Variance that b is given. (K, S, n)
-        white: R. (K, S, n)
-        spikes: How often an innovation is a spike. (K, S, n)
-        variance: Variance of a contact's torque. (K, S, n) [(N·m)²]
-        dt: Time from the block before. (K, S, 1) [s]
+    The arrays are (K, S, n): d, decay, added, white and spikes of b, the variance of a contact's
+    torque; dt (K, S, 1) is the time from the block before.
     """
     blocks, count, n = d.shape
     time, lasts = (np.tile(each, count // len(SEARCHES)) for each in zip(*SEARCHES, strict=True))
@@ -315,14 +299,7 @@ def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Arra
 
 
 def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -> list[BlockSpan]:
-    """A contact's blocks, split where force and joint torque are gone for a while between peaks.
-
-    Args:
-        t: Time. (K,) [s]
-        wrench: The wrench in the contact's window.
-        run: The contact's blocks.
-        jacobian: J of the wrench's point. (K, 6, n)
-    """
+    """A contact's blocks, split where force and joint torque are gone for a while between peaks."""
     inside = wrench.within(run)
     size = inside.size
     torque = np.linalg.norm(np.einsum("ki,kij->kj", inside.values, jacobian[slice(*run)]), axis=1)
@@ -345,11 +322,7 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
 def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
     """A stretch of a contact, split at valleys of force and torque between different directions.
 
-    Args:
-        t: Time along the contact. (k,) [s]
-        force: Its force. (k, 3) [N]
-        torque: |Jᵀw|. (k,) [N·m]
-        piece: First and last block of the stretch.
+    Along the contact are t, the force (k, 3) and the torque |Jᵀw|.
     """
     span = slice(*piece)
     at, there, load = t[span], force[span], torque[span]

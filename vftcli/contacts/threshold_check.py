@@ -119,14 +119,7 @@ def checked(
     size: Array,
     alarms: Sequence[tuple[str, ContactInterval]],
 ) -> CheckedContact:
-    """A contact with its peak force, and who raises the first of the alarms within it.
-
-    Args:
-        contact: From and to. [s]
-        t: Time. (T,) [s]
-        size: Size of the force, NaN where it is not known. (T, …) [N]
-        alarms: Who raises them and when, in the order of time.
-    """
+    """A contact with its peak force, and who raises the first of the alarms within it."""
     force = size[(t >= contact.start) & (t <= contact.stop)]
     peak = float(np.fmax.reduce(force[np.isfinite(force)], initial=np.nan))
     begun = [

@@ -107,14 +107,9 @@ def contact_lanes(
     priors: Sequence[WrenchPrior | None],
     margin: float = MARGIN,
 ) -> list[Lane]:
-    """A lane for every run of blocks, those of the others hidden.
+    """A lane for every run of blocks, the others' hidden, with J (K, 6, n) and prior of each.
 
-    Args:
-        log: The log.
-        jacobians: J of each contact's point along the log. (K, 6, n) each
-        runs: The blocks of every contact; one may stand several times.
-        priors: How the wrench of each may move.
-        margin: How far a lane reaches beyond its contact. [s]
+    One run may come several times.
     """
     count = len(log.blocks.t)
     every, own = covered(runs, count, 1), {}
@@ -214,15 +209,7 @@ def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearMode
 def learn_prior(
     log: BlockLog, jacobian: Array, runs: Sequence[BlockSpan], prior: WrenchPrior, rounds: int
 ) -> WrenchPrior:
-    """The prior by expectation and maximisation: τ_w by likelihood, then σ_f and σ_m by the mean.
-
-    Args:
-        log: The log.
-        jacobian: J of the flange. (K, 6, n)
-        runs: The blocks of every contact.
-        prior: Where to start.
-        rounds: How often.
-    """
+    """The prior by expectation and maximisation: τ_w by likelihood, σ_f and σ_m by the mean."""
     for _ in range(rounds):
         priors = [prior._replace(time=time) for time in TIMES for _ in runs]
         each = [jacobian] * len(priors)

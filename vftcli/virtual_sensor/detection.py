@@ -72,12 +72,8 @@ def true_intervals(
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     """Largest departure over the columns, in half widths of the free band; 0 if unknown. (T,)
 
-    The band is the median of what is read untouched ± `BAND` × its largest departure.
-
-    Args:
-        values: A wrench or joint torques, NaN where unknown. (T, k)
-        quiet: Those where nothing touches the arm. (S, k)
-        least: Smallest half width, one or one a column.
+    The band is the median of what is read untouched (S, k) ± `BAND` × its largest departure, at
+    least so much.
     """
     inside = quiet[np.all(np.isfinite(quiet), axis=1)]
     if len(inside) == 0:

@@ -76,10 +76,7 @@ def frame_pose(frame: str, mounting: Mounting) -> Pose:
 def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     """Matrices that take a wrench in base axes about the flange point to a named frame. (T, 6, 6)
 
-    Args:
-        frame: A key of `FRAMES`.
-        flange: Orientation of the flange in the base. (T, 3, 3)
-        mounting: Where tool and sensor sit.
+    The flange has the orientation (T, 3, 3) in the base.
     """
     if check_frame(frame) == "base":
         # A wrench in base axes needs no pose at all, not even the tool's.
@@ -109,28 +106,18 @@ def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
 
 def pose_of_numbers(values: Sequence[float], what: str) -> Pose:
     """A pose from x, y, z [m] with roll, pitch, yaw [rad] or nine entries of R by rows."""
-    p = np.array(values[:3], dtype=np.float64)
-    if len(values) == 3:
-        return checked_pose(np.eye(3), p, what)
-    if len(values) == 6:
-        return checked_pose(rpy_matrix(values[3:]), p, what)
-    if len(values) == 12:
-        return checked_pose(np.reshape(values[3:], (3, 3)), p, what)
-    raise ParameterError(
-        f"{what}: {len(values)} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
-        "nine entries of a rotation matrix, row by row [m, rad]"
-    )
+    if (count := len(values)) not in {3, 6, 12}:
+        raise ParameterError(
+            f"{what}: {count} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
+            "nine entries of a rotation matrix, row by row [m, rad]"
+        )
+    turn = np.eye(3) if count == 3 else np.asarray(values[3:], dtype=np.float64)
+    R = rpy_matrix(turn) if count == 6 else turn.reshape(3, 3)
+    return checked_pose(R, np.asarray(values[:3]), what)
 
 
 def read_pose(text: str, robot: Robot, section: str, option: str) -> Pose:
-    """A pose from the command line: numbers, or a name in the robot file.
-
-    Args:
-        text: ``x,y,z``, ``x,y,z,roll,pitch,yaw``, twelve numbers, or NAME of ``[section.NAME]``.
-        robot: Its file's sections are looked up.
-        section: "tool" or "sensor".
-        option: How the option is called, for messages.
-    """
+    """A pose from the command line: numbers, or NAME of ``[section.NAME]`` in the robot file."""
     if (values := numbers(text)) is not None:
         return pose_of_numbers(values, option)
     poses = {"tool": robot.tools, "sensor": robot.sensors}[section]

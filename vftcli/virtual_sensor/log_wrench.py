@@ -136,12 +136,7 @@ def controller_point(
 
 
 def unexplained(beyond: Array, torque: Array) -> Array:
-    """Share of each joint's variance that a line in a torque leaves. (n,)
-
-    Args:
-        beyond: Measured less target current. (T, n) [A]
-        torque: What might explain it. (T, n) [N·m]
-    """
+    """Share of each joint's variance (T, n) that a line in a torque (T, n) leaves. (n,)"""
     y, x = beyond - beyond.mean(axis=0), torque - torque.mean(axis=0)
     tiny = np.finfo(np.float64).tiny
     slope = np.sum(x * y, axis=0) / np.maximum(np.sum(x**2, axis=0), tiny)

@@ -160,12 +160,7 @@ def torque_noise(
 
 
 def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
-    """Noise of free pieces for a list of contacts, None where no stretch is long enough.
-
-    Args:
-        free: Blocks of every free piece.
-        dry: F_c of each joint. (n,) [N·m]
-    """
+    """Noise of free pieces for a list of contacts, None where no stretch is long enough."""
     pieces = [stretch for piece in free for stretch in long_stretches(piece)]
     if not pieces:
         return None
@@ -188,10 +183,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
 def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueNoise | None:
     """Noise of a log without known free motion, None where it has too few known blocks.
 
-    Args:
-        log: The whole log.
-        dry: F_c of each joint. (n,) [N·m]
-        learned: Noise of the samples that the fit of the whole log calls free; None without.
+    Learned is that of the samples that the fit of the whole log calls free; None without.
     """
     bends = [np.diff(log.d[a:b], n=2, axis=0) for a, b in runs_of(log.known) if b - a > 2]
     if not bends:

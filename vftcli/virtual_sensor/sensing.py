@@ -211,12 +211,7 @@ def smooth_all(
 ) -> dict[str, SmoothedWrench]:
     """The smoothed wrench of each observer, computed once for all that have the same log.
 
-    Args:
-        names: The observers.
-        plain: The log as the robot's model alone has it.
-        own: The log as an observer has it that has another.
-        unloaded: Samples of the log that its zero says are unloaded. (T,)
-        gate: The contacts, outside of which there is no wrench; None where the log is one.
+    A log is an observer's own, else the plain one, as the robot's model alone has it.
     """
     logs = {name: own.get(name, plain) for name in names}
     each = {log.run: log for log in reversed(logs.values())}

@@ -136,10 +136,6 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
 
     The best orthogonal matrix (improper ones allowed, as loggers swap axes freely) is rounded to
     the signed permutation with the largest sum of matching entries.
-
-    Args:
-        ours: Force on the robot. (T, 3) [N]
-        theirs: The field, in its own axes. (T, 3) [N]
     """
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)

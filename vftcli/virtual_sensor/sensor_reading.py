@@ -82,10 +82,6 @@ def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
     """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
 
     None too where the channel is not known in any sample of the free part.
-
-    Args:
-        wrench: A virtual sensor's wrench.
-        free: Samples of the unloaded part. (T,)
     """
     if wrench.null_space is None:
         return None
@@ -196,8 +192,8 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
 
 def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
     """A wrench less its mean over the first span of a choice, or over its own unloaded start."""
-    chosen = zero_spans(choice, wrench)
-    return without_drift(wrench, zero_drift(wrench, chosen.zero)) if chosen.zero else wrench
+    spans = zero_spans(choice, wrench).spans
+    return without_drift(wrench, zero_drift(wrench, spans[0])) if spans else wrench
 
 
 def zero_moved(first: Drift, last: Drift) -> Remark:
@@ -218,11 +214,6 @@ class ZeroSpans(NamedTuple):
     #: Those that were chosen: the first is the zero, further ones show its drift. [s]
     spans: tuple[Span, ...]
     start: Span | None  #: The unloaded start that was found where none was chosen. [s]
-
-    @property
-    def zero(self) -> Span | None:
-        """The span whose mean is removed."""
-        return self.spans[0] if self.spans else None
 
     def chosen(self, t: Array) -> Mask:
         """Samples of the chosen spans. (T,)"""

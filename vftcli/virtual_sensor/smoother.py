@@ -71,10 +71,6 @@ class WrenchPrior(NamedTuple):
         """Share that is kept from the block before, and variance that is added. (K, 1), (K, 6)
 
         None is kept where the gate opens, and outside, where none is added either.
-
-        Args:
-            inside: Blocks in which there may be a wrench. (K,)
-            step: Time from the block before. (K,) [s]
         """
         goes_on = inside & np.concatenate([[False], inside[:-1]])
         kept = np.where(goes_on, np.exp(-step / self.time), 0.0)[:, None]

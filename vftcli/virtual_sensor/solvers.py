@@ -108,10 +108,6 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
 
     A wrench at the flange leaves it unchanged; a contact further down the arm, or an error of the
     model, does not. Singular directions count as explained by nothing.
-
-    Args:
-        parts: The decomposed Jacobian.
-        tau: Joint torque. (T, n) [N·m]
     """
     # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
     tall = np.swapaxes(parts.scaled, 1, 2) @ parts.U
@@ -134,11 +130,6 @@ def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrenc
     """Least squares (46) from torques and given Jacobians, for logs and loops that hold one.
 
     `VirtualSensor` takes the Jacobian from the robot, and knows frames and bands besides.
-
-    Args:
-        tau: Joint torque on the robot. (T, n) [N·m]
-        jacobian: Jacobian; its axes are the wrench's. (T, 6, n)
-        left_out: Singular values of S J up to this tell nothing of their direction. [m]
     """
     parts = decompose(jacobian)
     gain = least_squares_gain(parts, left_out)

@@ -41,14 +41,9 @@ def torque_error(
     torques: Sequence[ExternalTorque],
     free: Mask,
 ) -> TorqueError:
-    """The torque error behind the band: what is stated, else measured, else none.
+    """The torque error behind the band: as ``virtual-sensor.torque-sd`` states, else measured.
 
-    Args:
-        stated: ``virtual-sensor.torque-sd``, None where it is not given.
-        log: The log.
-        observers: The observers.
-        torques: Their estimates.
-        free: Samples of the zero spans; none if no zero was given. (T,)
+    It is measured on the samples of the zero spans (T,); without any there is none.
     """
     if stated is not None:
         return given_error(stated, torques)
