@@ -111,8 +111,8 @@ def pose_of_numbers(values: Sequence[float], what: str) -> Pose:
             f"{what}: {count} numbers; a pose is x,y,z or x,y,z,roll,pitch,yaw or x,y,z and "
             "nine entries of a rotation matrix, row by row [m, rad]"
         )
-    turn = np.eye(3) if count == 3 else np.asarray(values[3:], dtype=np.float64)
-    R = rpy_matrix(turn) if count == 6 else turn.reshape(3, 3)
+    turn = values[3:] or np.eye(3)
+    R = rpy_matrix(values[3:]) if count == 6 else np.reshape(turn, (3, 3))
     return checked_pose(R, np.asarray(values[:3]), what)
 
 
