@@ -5,8 +5,8 @@ import numpy as np
 from vftcli.robots import load_robot
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 

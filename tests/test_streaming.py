@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 from vftcli import streaming
 from vftcli.cli import app
 from vftcli.doctor import examination
-from vftcli.robots.terms import DynamicsTerms, RunningTerms
+from vftcli.robots.terms import RunningTerms
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"

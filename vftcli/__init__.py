@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from vftcli.robots import Payload, Robot, load_robot
     from vftcli.robots.chain import flange_jacobian, link_poses
     from vftcli.robots.run import Run
-    from vftcli.robots.terms import DynamicsTerms
     from vftcli.signals.errors import VftError
+    from vftcli.signals.external_torque import DynamicsTerms
     from vftcli.signals.recording import Recording
 else:
     #: The modules in which a public name is looked for, those that load quickly first.
@@ -51,13 +51,12 @@ else:
         __name__,
         "signals.errors",
         "signals.recording",
-        "signals.wrench",
+        "signals.external_torque",
         "robots",
         "readers",
         "readers.reading",
         "robots.run",
         "robots.chain",
-        "robots.terms",
         "observers",
         "evaluation",
         "repetition.two_cycle",

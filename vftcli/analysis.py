@@ -10,10 +10,10 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import RunSamples
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Remarks
 from vftcli.signals.shown import Shown, joined
-from vftcli.signals.wrench import ExternalTorque
 
 if TYPE_CHECKING:
     import polars as pl

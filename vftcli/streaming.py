@@ -14,11 +14,11 @@ from vftcli.pipeline import AnalysisChoice, observe, read, sense
 from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.robots.run import Run, Runs
 from vftcli.robots.terms import RunningTerms
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
-from vftcli.signals.wrench import ExternalTorque
 
 
 def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:

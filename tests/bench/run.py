@@ -45,8 +45,9 @@ from vftcli.reproduction.timing import (
 )
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms, literal_momentum_terms
+from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import EFFORTS, EXAMINED, Recording
 
 RATIOS = {

@@ -26,8 +26,8 @@ from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import runs_of
 

@@ -6,8 +6,9 @@ import pytest
 from vftcli.contacts.threshold_check import check_contacts
 from vftcli.contacts.thresholds import ComparedSignals, SignalThreshold, Thresholds
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 
 T = np.arange(0.0, 20.0, 0.01)
 PUSHES = ((5.0, 6.0, 40.0), (9.0, 10.0, 10.0), (14.0, 15.0, 25.0))

@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.evaluation import SCHEMA, evaluate, rmse
 from vftcli.signals.errors import ShapeError
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.008 * np.arange(1500)
 

@@ -18,7 +18,7 @@ from vftcli.evaluation.intervals import (
     student_quantile,
 )
 from vftcli.signals.arrays import Array
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 STEP = 0.008
 

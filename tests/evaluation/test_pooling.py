@@ -5,7 +5,7 @@ import pytest
 
 from vftcli.evaluation import evaluate, evaluate_pooled
 from vftcli.evaluation.errors import POOLED, PoolMember
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.008 * np.arange(1500)
 WAVE = np.sin(2.0 * np.pi * 0.7 * T)

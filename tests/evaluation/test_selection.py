@@ -14,7 +14,7 @@ from vftcli.evaluation.published import (
 from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 
 STEP = 0.002

@@ -5,7 +5,7 @@ import pytest
 
 from vftcli.evaluation import paired_significance
 from vftcli.evaluation.intervals import p_value
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 
 T = 0.01 * np.arange(500)
 

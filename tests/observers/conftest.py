@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.observers import MomentumObserver
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark
 
 

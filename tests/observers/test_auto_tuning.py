@@ -19,7 +19,7 @@ from vftcli.observers.auto_tuning import (
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import OBSERVERS, LogSpectra, Setup, build_observers
 from vftcli.robots.run import RunSamples
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 
 STEP = 0.008
 

@@ -15,8 +15,8 @@ from vftcli.observers.kalman_model import (
     gain_sequence,
     zero_order_hold,
 )
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.steady_filter import PIECE
 
 R = np.array([0.5, 0.5, 0.5, 1.3, 1.3, 1.3])  # the paper's UR5 values, Sec. IV-A

@@ -7,7 +7,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import LEAD, LONGEST, estimate_from_rest, lead_samples, settling_samples
 from vftcli.observers.paper import MomentumObserver
 from vftcli.robots import load_robot
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 
 PANDA = load_robot("panda")
 

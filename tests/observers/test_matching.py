@@ -6,8 +6,8 @@ import pytest
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import PAPER, Setup, build_observers
 from vftcli.observers.tuning import match_observers, parse_target
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms
 
 GAINS = {
     "fdo": {"omega": 10.0},

@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.observers.smoother import KalmanSmoother
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 
 R, Q_P, Q_TAU = np.array([0.5, 1.3]), np.array([0.01, 0.02]), np.array([5000.0, 5000.0])
 STEP = 0.008

@@ -9,8 +9,8 @@ from made_runs import samples_of
 
 from vftcli.observers.spectra import Spectra, looks_free, neighbour_mean, spectra_of
 from vftcli.robots.disturbance import raw_disturbance
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms
 
 STEP = 0.008
 

@@ -5,7 +5,7 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.observers.kalman_model import Covariance, Gains, gain_sequence
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 
 SAMPLES = 3000
 

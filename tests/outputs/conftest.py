@@ -19,9 +19,9 @@ from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import caution, fact
-from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 HOSTILE = '<script>alert("x")</script>&_%.csv'

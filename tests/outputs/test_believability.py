@@ -23,8 +23,8 @@ from vftcli.outputs.believability import (
 from vftcli.outputs.screen import facts
 from vftcli.robots import load_robot
 from vftcli.robots.friction import dry_friction
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
-from vftcli.signals.wrench import ExternalTorque
 
 
 def of(analysis: Analysis, subject: str) -> list[Ground]:

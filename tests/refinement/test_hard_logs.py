@@ -21,8 +21,8 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import ExternalTorque
 
 BEST = AnalysisChoice(observers=ObserverChoice(names=("best",)), contacts=False)
 

@@ -16,9 +16,9 @@ from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark
-from vftcli.signals.wrench import ExternalTorque
 
 
 class Circle(Protocol):

@@ -11,7 +11,7 @@ from vftcli.robots.disturbance import (
     disturbance_stretches,
     raw_disturbance,
 )
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import welch
 
 STEP = 0.004

@@ -8,14 +8,9 @@ import pytest
 
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.terms import (
-    DynamicsTerms,
-    RunningTerms,
-    drive_torque,
-    dynamics_terms,
-    effort_name,
-)
+from vftcli.robots.terms import RunningTerms, drive_torque, dynamics_terms, effort_name
 from vftcli.signals.errors import MissingSignalError, RobotError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.signals.series import clock_of
 

@@ -8,10 +8,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, Remarks, caution, fact
 from vftcli.signals.shown import LONGEST, Shown, frame_of
-from vftcli.signals.wrench import AXES, ExternalTorque, Wrench
+from vftcli.signals.wrench import AXES, Wrench
 
 T = np.linspace(0.0, 1.0, 501)
 Q = np.outer(T, np.arange(1.0, 7.0))

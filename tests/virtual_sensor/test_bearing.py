@@ -8,7 +8,7 @@ import pytest
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals.wrench import COVERS
+from vftcli.signals.external_torque import COVERS
 from vftcli.simulation import load_scenario, simulate
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 

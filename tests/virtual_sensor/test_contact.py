@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.detection import (
     ContactInterval,
     assignment,

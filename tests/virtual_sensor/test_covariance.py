@@ -5,8 +5,7 @@ import pytest
 
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
-from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 STEP = 0.008

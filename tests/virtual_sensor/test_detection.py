@@ -10,7 +10,8 @@ from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.external_torque import ExternalTorque
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import (
     LEAST_TORQUE,
     WRENCH_LIMITS,

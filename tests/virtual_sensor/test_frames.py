@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 
 from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
-from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.frames import (
     Mounting,
     check_frame,

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.robots.terms import DynamicsTerms
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.virtual_sensor.sensing import HALF, mean_disturbance
 
 

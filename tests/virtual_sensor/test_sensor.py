@@ -6,9 +6,10 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import MissingSignalError, ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.pose import Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import ExternalTorque, WrenchFrame
+from vftcli.signals.wrench import WrenchFrame
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.sensor import find_mounting, fit_pose
 

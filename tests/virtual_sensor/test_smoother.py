@@ -14,9 +14,9 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import Blocks
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.model_error import TorqueNoise
 from vftcli.virtual_sensor.smoother import (

@@ -7,7 +7,7 @@ import pytest
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,
     PRIOR,

@@ -13,10 +13,9 @@ from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 from vftcli.virtual_sensor.torque_error import (

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero

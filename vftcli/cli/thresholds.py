@@ -11,8 +11,9 @@ from vftcli.signals.option import COMPARE, Option
 
 if TYPE_CHECKING:
     from vftcli.robots.run import Run
+    from vftcli.signals.external_torque import ExternalTorque
     from vftcli.signals.recording import Recording
-    from vftcli.signals.wrench import ExternalTorque, Wrench
+    from vftcli.signals.wrench import Wrench
 
 
 @opt.command

@@ -9,8 +9,9 @@ import numpy as np
 from vftcli.contacts.tail import SETTLING, events
 from vftcli.contacts.thresholds import ComparedSignals, Thresholds, worst_of
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.wrench import AXES, ExternalTorque, Wrench
+from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.detection import (
     EARLY,
     TRUE_TORQUE,

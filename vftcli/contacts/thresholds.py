@@ -27,10 +27,11 @@ from vftcli.robots.run import Run
 from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.shown import Shown, joined
-from vftcli.signals.wrench import AXES, POINTS, ExternalTorque, unit_of
+from vftcli.signals.wrench import AXES, POINTS, unit_of
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 if TYPE_CHECKING:

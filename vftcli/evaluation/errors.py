@@ -13,11 +13,11 @@ import polars as pl
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
 from vftcli.signals.arrays import Array, Mask, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
+from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags_of_each
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.progress import steps
 from vftcli.signals.series import median_step
-from vftcli.signals.wrench import COVERS, ExternalTorque
 
 #: Columns of the errors table; `joint` counts from 1, `at_rest` is a share of the samples.
 #:

@@ -13,8 +13,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
-from vftcli.signals.wrench import ExternalTorque
 
 REPETITIONS = 1000  #: Bootstrap repetitions; the ends of a 95 % interval rest on 25 of them.
 SEED = 20250811  #: Seed of every bootstrap: a log has one interval.

@@ -18,9 +18,10 @@ from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import VftError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.detection import KnownContacts, judge_contacts
 from vftcli.virtual_sensor.frames import NOTHING, from_base
 from vftcli.virtual_sensor.sensor_reading import SensorReading, with_reference

@@ -11,9 +11,10 @@ from vftcli.evaluation.wrenches import evaluate_wrenches
 from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.sensor import RESEMBLES, fit_axes
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, decompose, null_space, wrench_of

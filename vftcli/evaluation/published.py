@@ -10,9 +10,9 @@ import polars as pl
 from vftcli.evaluation.errors import joint_means
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import Remark, fact, on_joints
 from vftcli.signals.series import median_step
 

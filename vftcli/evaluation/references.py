@@ -17,11 +17,12 @@ from vftcli.robots.run import Run
 from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, warning
 from vftcli.signals.series import resample_columns, runs_of
-from vftcli.signals.wrench import ExternalTorque, Wrench, WrenchFrame
+from vftcli.signals.wrench import Wrench, WrenchFrame
 from vftcli.virtual_sensor.frames import NOTHING, Mounting
 from vftcli.virtual_sensor.log_wrench import in_base_axes, logged_wrench
 

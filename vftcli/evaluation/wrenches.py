@@ -6,7 +6,8 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import SCHEMA, correlation, number, rmse
-from vftcli.signals.wrench import AXES, COVERS, Wrench
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.detection import ContactScore
 from vftcli.virtual_sensor.sensor_reading import SensorReading
 

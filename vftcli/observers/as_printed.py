@@ -18,8 +18,8 @@ and so does the covariance: all four entries are carried, and the gain is its le
 import numpy as np
 
 from vftcli.observers.kalman_model import Covariance, Densities, Discrete, Gains, KalmanState
-from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import DynamicsTerms, one_sample_earlier
 from vftcli.signals.steady_filter import filtered
 
 #: Relative change of a covariance in one sample from which on rounding moves it alone.

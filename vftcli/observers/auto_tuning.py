@@ -18,11 +18,10 @@ from vftcli.observers.observer import Complex, Observer, Tuning
 from vftcli.observers.paper import KalmanObserver
 from vftcli.observers.smoother import KalmanSmoother
 from vftcli.observers.spectra import Spectra
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.remarks import Remark, Where, warning
 from vftcli.signals.shown import Shown
-from vftcli.signals.wrench import ExternalTorque
 
 SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
 #: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother

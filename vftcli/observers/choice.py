@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from vftcli.observers.table import LogSpectra, Settings
     from vftcli.observers.tuning import Goal
     from vftcli.robots.robot import Robot
-    from vftcli.robots.terms import DynamicsTerms
+    from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
     from vftcli.signals.remarks import Remark
-    from vftcli.signals.wrench import ExternalTorque
 
 PAPER_GAINS = "paper"  #: The word for the gains of the robot's file, the paper's where it has them.
 LOG_GAINS = "auto"  #: The word for the gains that the spectra of the log call for.

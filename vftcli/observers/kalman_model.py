@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, empty_series
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.steady_filter import Fold, moved, run_blocks, spans
 
 #: Below this a·Ts the integrals are summed as series: their closed forms cancel there.

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vftcli.observers.observer import Observer
-from vftcli.robots.terms import DynamicsTerms
-from vftcli.signals.wrench import ExternalTorque
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 
 LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
 LONGEST = 1 << 17  #: Samples of that time at most.

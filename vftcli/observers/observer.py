@@ -2,20 +2,16 @@
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
 from vftcli.signals.errors import ShapeError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, HasTerms
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.shown import Shown
-from vftcli.signals.wrench import ExternalTorque
-
-if TYPE_CHECKING:
-    from vftcli.robots.run import Run
 
 Complex = NDArray[np.complex128]
 
@@ -68,7 +64,7 @@ class BlockObserver(Shown):
     def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
         """Estimate of a block, and the observer's state after; None at a log's start."""
 
-    def estimate(self, terms: "DynamicsTerms | Run") -> ExternalTorque:
+    def estimate(self, terms: DynamicsTerms | HasTerms) -> ExternalTorque:
         """The estimate of a whole log, from rest at its first sample, by its run or its terms."""
         found: Any = getattr(terms, "terms", terms)
         return self.run(found)[0]

@@ -51,14 +51,13 @@ from vftcli.observers.observer import (
     numbers_of,
     per_joint,
 )
-from vftcli.robots.terms import DynamicsTerms, one_sample_earlier
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array
 from vftcli.signals.errors import ParameterError, ShapeError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, one_sample_earlier
 from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Where, caution, warning
 from vftcli.signals.series import Clock
 from vftcli.signals.steady_filter import recursion, steady_filter
-from vftcli.signals.wrench import ExternalTorque
 
 GAP = 3.0  #: A step of more than this many nominal ones is a gap.
 #: Weights of the external torque in a Kalman filter's two states. (2, 1)

@@ -23,11 +23,10 @@ import numpy as np
 from vftcli.observers.kalman_model import closed_loop, error_filter, gain_sequence
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, handed_over
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.shown import Shown
 from vftcli.signals.steady_filter import filtered
-from vftcli.signals.wrench import ExternalTorque
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

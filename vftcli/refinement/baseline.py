@@ -22,9 +22,9 @@ from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.rest import standing
-from vftcli.signals.wrench import ExternalTorque
 
 STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
 

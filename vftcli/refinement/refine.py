@@ -29,13 +29,12 @@ from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.refinement.whole_log import stride_of
 from vftcli.robots.friction import HELD, ONE_STOP, dry_friction
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ClockError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.series import resample_columns
 from vftcli.signals.shown import Shown
-from vftcli.signals.wrench import ExternalTorque
 
 #: The cause that is not part of an error's sum: it says what a standing joint may hide.
 STICTION = "stiction at rest"

@@ -25,8 +25,8 @@ from vftcli.refinement.model_error import (
 from vftcli.refinement.normal_equations import Rows, slow_loads
 from vftcli.refinement.robust_fit import Guarded, WholeLogFit, faded, fit_robustly, guarded
 from vftcli.robots.run import Run
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
 from vftcli.signals.rest import faster

@@ -23,10 +23,10 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.rest import REST, faster
-from vftcli.signals.wrench import ExternalTorque
 
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
 #: Standard errors from which on a change is believed: contacts alone rarely look like one.

@@ -26,8 +26,8 @@ from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, Run
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Runs
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.simulation import load_scenario, simulate

@@ -22,8 +22,9 @@ from vftcli.observers.table import BEST, PAPER
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms, dynamics_terms, literal_momentum_terms
+from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother import smooth_wrench
 

@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, is_uniform
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.rest import REST, slower
 from vftcli.signals.series import gaps_of, median_step, resample_columns, runs_of
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
-from vftcli.robots.terms import DynamicsTerms, check_joints, drive_torque, dynamics_terms
+from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
 from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
 from vftcli.signals.recording import Recording
 from vftcli.signals.repairs import without_isolated

@@ -13,8 +13,8 @@ from vftcli.observers.observer import Observer
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import intervals, runs_of
-from vftcli.signals.wrench import ExternalTorque
 from vftcli.virtual_sensor.sensor_reading import SETTLING, SensorReading
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 

@@ -14,13 +14,13 @@ from vftcli.robots.chain import link_poses
 from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
-from vftcli.robots.terms import DynamicsTerms
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.series import resample_columns
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import from_base
 from vftcli.virtual_sensor.sensor import check_vendor, find_mounting

@@ -18,9 +18,9 @@ from vftcli.robots.friction import dry_friction
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import numbers
 from vftcli.signals.remarks import Remark, Where, caution, fact
-from vftcli.signals.wrench import ExternalTorque
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
 

@@ -9,9 +9,10 @@ import numpy as np
 from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.errors import ShapeError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.parsing import check_known
 from vftcli.signals.shown import Shown
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.frames import Mounting, check_frame, frame_pose, from_base
 from vftcli.virtual_sensor.solvers import (
     LEAST_SIGMA,

@@ -46,9 +46,10 @@ from vftcli.outputs.rerun_arm import (
 from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thinned
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
+from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
-from vftcli.signals.wrench import COVERS, ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER
 from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
 

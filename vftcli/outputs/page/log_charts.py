@@ -18,7 +18,8 @@ from vftcli.outputs.charts import (
 )
 from vftcli.outputs.log.rmse_tables import blocks
 from vftcli.signals.arrays import Array
-from vftcli.signals.wrench import AXES, COVERS, unit_of
+from vftcli.signals.external_torque import COVERS
+from vftcli.signals.wrench import AXES, unit_of
 
 FREQUENCIES = 120  #: Points of a frequency response.
 #: Gain below which a response is drawn as -240 dB, so that its logarithm is finite; and the lowest

@@ -1,0 +1,195 @@
+"""What an observer takes and gives: dynamics terms in, external torque out."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import InitVar, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+import numpy as np
+
+from vftcli.signals.arrays import (
+    Array,
+    Mask,
+    check_clock,
+    check_series,
+    check_shape,
+    empty_series,
+    frozen_mask,
+    handed_over,
+    seal,
+)
+from vftcli.signals.errors import ShapeError
+from vftcli.signals.remarks import Remark
+from vftcli.signals.series import Clock, clock_of
+from vftcli.signals.shown import Shown, frame_of, joined, per_joint
+
+if TYPE_CHECKING:
+    import polars as pl
+
+ALL = slice(None)  #: All rows.
+COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
+
+
+class Instant(NamedTuple):
+    """The terms of one sample, from which those of the next block of a log go on."""
+
+    t: float  #: Time. [s]
+    p: Array  #: Generalised momentum. (n,) [kg·m²/s]
+    mu: Array  #: μ. (n,) [N·m]
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class DynamicsTerms(Shown):
+    r"""Momentum form of the equations of motion: :math:`\dot p = \mu + \tau_{ext}` (33)."""
+
+    t: Array  #: Time. (T,) [s]
+    p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
+    mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
+    #: The whole log's clock where these are a block of it; None for a whole log.
+    log_clock: Clock | None = None
+    #: The sample before the first, where these are a later block of a log.
+    before: Instant | None = None
+    room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
+    #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model leaves
+    #: unexplained: the one input of every observer. Zero at a log's first sample. (T, n) [N·m·s]
+    d: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self, room: Array | None) -> None:
+        seal(self, "t", "p", "mu")
+        if self.p.ndim != 2:
+            raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
+        check_clock(self.t, "the dynamics terms")
+        check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
+        check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
+        d = momentum_change(self, empty_series(*self.p.shape) if room is None else room)
+        object.__setattr__(self, "d", handed_over(d))
+
+    @cached_property
+    def clock(self) -> Clock:
+        """How the log is sampled that these are the terms of."""
+        return clock_of(self.t) if self.log_clock is None else self.log_clock
+
+    @cached_property
+    def dt(self) -> Array:
+        """Time since the sample before: nominal at a log's first. (T, 1), (1, 1) if uniform [s]"""
+        if self.clock.uniform:
+            return np.array([[self.clock.step]])
+        first = self.t[0] - self.clock.step if self.before is None else self.before.t
+        return np.diff(self.t, prepend=first)[:, None]
+
+    @property
+    def last(self) -> Instant:
+        """The last sample, which is the one before the next block's first."""
+        return Instant(float(self.t[-1]), self.p[-1], self.mu[-1])
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.p.shape[1])
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.t)
+
+
+class HasTerms(Protocol):
+    """Whatever has dynamics terms of its own, as a run."""
+
+    @property
+    def terms(self) -> DynamicsTerms:
+        """P and μ."""
+        ...
+
+
+def momentum_change(terms: DynamicsTerms, out: Array) -> Array:
+    """Fill `out` with `DynamicsTerms.d`, joint by joint, so that the passes stay in the cache."""
+    half, before = 0.5 * terms.dt[:, 0], terms.before
+    explained = np.zeros(terms.samples)
+    for p, mu, d in zip(terms.p.T, terms.mu.T, out.T, strict=True):
+        np.subtract(p[1:], p[:-1], out=d[1:])
+        np.add(mu[1:], mu[:-1], out=explained[1:])
+        explained *= half
+        d[1:] -= explained[1:]
+    out[:1] = 0.0
+    if before is not None:
+        out[0] = terms.p[0] - before.p - half[0] * (terms.mu[0] + before.mu)
+    return out
+
+
+def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
+    """Series "p" or "mu" of each sample's predecessor; a log's first sample is its own. (T, n)"""
+    series: Array = getattr(terms, name)
+    first = series[:1] if terms.before is None else getattr(terms.before, name)[None]
+    return np.concatenate([first, series[:-1]])
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class ExternalTorque(Shown):
+    """Torque the environment exerts on the robot, positive along each joint axis."""
+
+    #: Short name of the observer or of the reference, as used in tables and column names.
+    name: str
+    t: Array  #: Time on the recording's clock. (T,) [s]
+    tau: Array  #: External torque; NaN where it is not known. (T, n) [N·m]
+    #: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]
+    sd: Array | None = None
+    #: Root-mean-square error that the estimate itself is known to have. (n,) [N·m]
+    floor: Array | None = None
+    #: One standard deviation of the error of `tau` as the log itself shows it, model error and lag
+    #: included; None where no free part is known to measure it on. (T, n) [N·m]
+    error_sd: Array | None = None
+    #: Whether the joint moves, so that the sample may be relied on; where it stands, stiction hides
+    #: what `tau` cannot know. None where that was not looked at. (T, n)
+    moving: Mask | None = None
+    remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
+
+    def __post_init__(self) -> None:
+        seal(self, "t", "tau", "sd", "floor", "error_sd")
+        if self.moving is not None:
+            object.__setattr__(self, "moving", frozen_mask(self.moving))
+        check_series(self.tau, None, "tau", self.name)
+        check_clock(self.t, self.name)
+        check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
+        for name in ("sd", "error_sd", "moving"):
+            if (value := getattr(self, name)) is not None:
+                check_shape(value, self.tau.shape, name, self.name)
+        if self.floor is not None:
+            check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
+
+    def _headline(self) -> str:
+        rms = np.sqrt(np.nanmean(np.where(self.known.any(axis=0), self.tau, 0.0) ** 2, axis=0))
+        return f"of {self.name}: rms {joined(rms)} N·m over {len(self.t)} samples"
+
+    def _rows(self) -> Iterator[Sequence[object]]:
+        yield "joint", "rms [N·m]", "largest [N·m]", "95 % band [N·m]", "known"
+        for j, known in enumerate(self.known.T):
+            tau = self.tau[known, j]
+            sd = None if self.error_sd is None else self.error_sd[known, j]
+            sizes: tuple[float | None, float | None] = (None, None)
+            if len(tau):
+                sizes = float(np.sqrt(np.mean(tau**2))), float(np.abs(tau).max())
+            band = None if sd is None or not len(sd) else COVERS * float(np.sqrt(np.mean(sd**2)))
+            yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
+
+    def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
+        """Name and values of every joint, as ``tau_ext/gmo/1``, and of its deviations."""
+        yield from per_joint(f"tau_ext/{self.name}", self.tau[rows])
+        if self.sd is not None:
+            yield from per_joint(f"sd/{self.name}", self.sd[rows])
+        if self.error_sd is not None:
+            yield from per_joint(f"band/{self.name}", self.error_sd[rows])
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Time ``t`` and every joint, named as in ``estimates.parquet``; unknown is null."""
+        return frame_of([("t", self.t), *self.columns()])
+
+    @property
+    def joints(self) -> int:
+        """Number of joints n."""
+        return int(self.tau.shape[1])
+
+    @property
+    def known(self) -> Mask:
+        """Whether a joint's torque is known, sample by sample. (T, n)"""
+        return np.isfinite(self.tau)
