@@ -1,5 +1,6 @@
 """The line that says how far the work is: bar, stage, time left, and nothing printed into it."""
 
+import json
 import os
 import re
 import subprocess
@@ -9,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.cli.progress import BAR, Stages, clock
+from vftcli.cli.progress import BAR, Stages, clock, fitted
 from vftcli.signals.progress import steps
 
-LOG = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
+FIXTURES = Path(__file__).parents[2] / "fixtures"
+LOG, CIRCLE = FIXTURES / "ur5_taps_ur_rtde.csv", FIXTURES / "ur5_circle.csv"
+BEARING, EPISODES = FIXTURES / "panda_bearing.csv", FIXTURES / "panda_episodes"
 
 
 @pytest.fixture
@@ -129,7 +132,7 @@ def on_a_terminal(*words: object, **variables: str) -> list[str]:
     reader.join()
     os.close(mine)
     text = b"".join(kept).decode("utf-8")
-    assert ("[#" in text or "[·" in text) == ("TERM" not in variables)
+    assert "TERM" not in variables or "[·" not in text
     return [on_screen(line) for line in text.replace("\r\n", "\n").split("\n")]
 
 
@@ -141,24 +144,66 @@ def on_screen(line: str) -> str:
     return seen.rstrip()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "words",
-    [
-        (LOG,),
-        ("report", LOG, "--wrench", "-o", "out"),
-        ("estimate", LOG, "-o", "out"),
-        ("compare", LOG, "--reference", "zero"),
-        ("compare", LOG, "--reference", "zero", "--json"),
-    ],
+SHORT = ("--robot", "ur5", "--interval", "3:6")
+GMO = (*SHORT, "--observer", "gmo")
+#: Commands, quick ones of each.
+COMMANDS = (
+    (LOG, *SHORT),
+    ("contacts", LOG, CIRCLE, *SHORT),
+    ("contacts", CIRCLE, "--robot", "ur5e"),
+    ("report", LOG, *SHORT, "--wrench", "-o", "out"),
+    ("estimate", LOG, *GMO, "-v", "-o", "out"),
+    ("compare", LOG, *GMO, "--reference", "zero", "-v"),
+    ("compare", LOG, *SHORT, "--reference", "zero"),
+    ("inspect", CIRCLE),
+    ("identify", CIRCLE, *SHORT, "-o", "out.toml"),
+    ("identify", CIRCLE, "--robot", "ur5", "--method", "gains", "-o", "out.toml"),
+    ("thresholds", BEARING, "--robot", "panda", "--rate", 60, "--anyway"),
+    ("convert", LOG, "-o", "out.csv"),
+    ("batch", LOG, *GMO, "--do", "estimate", "--jobs", 0, "-o", "out"),
+    ("annotate", EPISODES, "--robot", "panda", "--jobs", 0, "-o", "out"),
+    ("admit", CIRCLE, "--robot", "ur5", "--interval", "0:6"),
+    ("simulate", "list"),
+    ("simulate", "ur5-circle", "--set", "duration=1", "-o", "out.csv"),
+    ("reproduce", "huang2025", "--only", "table1", "--fast"),
+    ("bench", "--set", "bench.samples=2000", "--set", "bench.rounds=1"),
+    ("help",),
+    ("help", "settings"),
+    ("help", "robots", "ur5"),
+    ("report", "--help"),
+    ("contact", LOG),
+    ("contacts", LOG, "--robot", "ur55"),
 )
-def test_on_a_terminal_no_line_is_printed_into_the_line(
-    words: tuple[object, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [80, 120])
+@pytest.mark.parametrize("words", COMMANDS, ids=lambda words: " ".join(map(str, words))[-40:])
+def test_no_line_is_wider_than_the_terminal_or_printed_into_the_line(
+    words: tuple[object, ...], width: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Commands and paths may be, which are copied."""
     monkeypatch.chdir(tmp_path)
-    lines = on_a_terminal(*words, "--robot", "ur5", "--interval", "3:6")
+    lines = on_a_terminal(*words, COLUMNS=str(width))
     assert len(lines) > 1
-    assert not [line for line in lines if re.search(r"\[[#·.]+\] +\d+ %", line)]
+    assert lines[0]
+    for line in lines:
+        assert not re.search(r"\[[#·.]+\] +\d+ %", line)
+        longest = max(map(len, line.split()), default=0)
+        assert len(line) <= width or line.lstrip().startswith("vftcli ") or longest > width // 2
+
+
+@pytest.mark.slow
+def test_what_is_for_programs_is_printed_as_it_is() -> None:
+    lines = on_a_terminal("compare", LOG, *GMO, "--reference", "zero", "--json", "-q")
+    assert json.loads("\n".join(lines))["rows"][0]["observer"] == "gmo"
+
+
+def test_a_line_is_fitted_but_colours_have_no_width() -> None:
+    bright = "\x1b[32m" + "word " * 3 + "\x1b[0m"
+    assert fitted(f"{bright}\nvftcli {'x' * 20}\n  {'word ' * 5}", 16) == "\n".join(
+        [bright, f"vftcli {'x' * 20}", "  word word word", "    word word"]
+    )
 
 
 def test_a_dumb_terminal_has_no_line() -> None:

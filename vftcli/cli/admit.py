@@ -8,7 +8,7 @@ import typer
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo, echo_data
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:
@@ -117,7 +117,7 @@ def show(found: "Replayed", shown: ShownOptions) -> None:
         say_json(logs, result.remarks, rows=result.rows)
         return
     if shown.latex:
-        echo(latex_text(result).rstrip("\n"))
+        echo_data(latex_text(result))
         return
     say(f"{result.robot.title or result.robot.name}: {result.source}")
     say(parameter_text(result))

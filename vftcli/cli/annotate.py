@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo_data
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import check_known
@@ -94,7 +94,7 @@ def annotate_dataset(
         force=force,
     )
     if json:
-        echo(to_json(record), nl=False)
+        echo_data(to_json(record))
         return
     for line in told_lines(record, asked):
         say(line)

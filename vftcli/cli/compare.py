@@ -7,7 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo, echo_data
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
@@ -126,5 +126,5 @@ def compare(
         judged = [jacobian_entry(made.log) for made in left_out.judged]
         say_json([*(a.recording for a in analyses), *judged], every, rows=rows.to_dicts())
     else:
-        echo(tables.FORMS[table.form](rows, bounds))
+        echo_data(tables.FORMS[table.form](rows, bounds))
     left_out.end(len(analyses) + len(left_out.judged))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from vftcli.cli.config import effective, typed
-from vftcli.cli.progress import STAGES, echo, is_watched
+from vftcli.cli.progress import STAGES, echo, echo_data, is_terminal, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import printable, printable_lines
@@ -114,11 +114,10 @@ def canvas() -> "Canvas":
 
     stream = sys.stdout
     letters = (getattr(stream, "encoding", None) or "utf-8").lower().replace("-", "")
-    seen = getattr(stream, "isatty", bool)() and os.environ.get("TERM") != "dumb"
     return Canvas.of(
         columns=shutil.get_terminal_size().columns,
         unicode=letters.startswith("utf"),
-        colour=seen and not os.environ.get("NO_COLOR"),
+        colour=is_terminal(stream) and not os.environ.get("NO_COLOR"),
     )
 
 
@@ -131,7 +130,7 @@ def say_json(
     from vftcli.outputs.log.run_record import envelope, log_entry, to_json
 
     entries = [log if isinstance(log, Mapping) else log_entry(log) for log in logs]
-    echo(to_json(envelope(command_line(), entries, remarks, found)), nl=False)
+    echo_data(to_json(envelope(command_line(), entries, remarks, found)))
 
 
 class LeftOut:

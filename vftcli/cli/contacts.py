@@ -7,7 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo, echo_data
 from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Option
 
@@ -81,7 +81,7 @@ def print_stored(estimates: Path, form: ListOptions) -> None:
     if form.json:
         say_json([record])
     elif form.csv:
-        echo(contacts_csv([stored_list(record)]), nl=False)
+        echo_data(contacts_csv([stored_list(record)]))
     else:
         echo(list_screen(stored_list(record), canvas(), every=form.all), nl=False)
 
@@ -98,9 +98,9 @@ def print_lists(
 
     lists = [made.contacts for made in found if made.contacts is not None]
     if form.json:
-        echo(to_json(contacts_envelope(found, command_line(), failed)), nl=False)
+        echo_data(to_json(contacts_envelope(found, command_line(), failed)))
     elif form.csv:
-        echo(contacts_csv(lists), nl=False)
+        echo_data(contacts_csv(lists))
     else:
         screen = canvas()
         texts = (

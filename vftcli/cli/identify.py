@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo, echo_data
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.refinement.choice import RefinementChoice
@@ -122,7 +122,10 @@ def identify_robot(
     for remark in found.remarks:
         detail(f"note: {remark}")
     say(f"wrote {', '.join(map(str, beside(output).values()))}")
-    echo(record.rstrip("\n") if made.json else tables_text(found))
+    if made.json:
+        echo_data(record)
+    else:
+        echo(tables_text(found))
     if show:
         open_made(output.with_suffix(".html"))
 

@@ -2,10 +2,13 @@
 
 import atexit
 import os
+import re
 import shutil
 import sys
+import textwrap
 import threading
 import time
+from typing import TextIO
 
 import typer
 
@@ -61,10 +64,18 @@ class Stages:
     def echo(
         self, text: str, *, err: bool = False, nl: bool = True, colour: bool | None = None
     ) -> None:
-        """Print where the line stands, which comes again below; colours on a terminal only."""
+        """Print over the line, which comes again below; on a terminal fitted to its width."""
+        if is_terminal(sys.stderr if err else sys.stdout):
+            text = fitted(text, shutil.get_terminal_size().columns)
         with self._lock:
             self.clear()
             typer.echo(text, err=err, nl=nl, color=colour)
+
+    def echo_data(self, text: str) -> None:
+        """Print a result for other programs as it is."""
+        with self._lock:
+            self.clear()
+            typer.echo(text.rstrip("\n"))
 
     def _see(self, share: float) -> None:
         self._share = share
@@ -111,10 +122,34 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"
 
 
+def is_terminal(stream: TextIO) -> bool:
+    """Whether somebody looks at a stream, on a terminal that can take a line away again."""
+    return stream.isatty() and os.environ.get("TERM") != "dumb"
+
+
 def is_watched() -> bool:
-    """Whether somebody looks at stderr, on a terminal that can take a line away again."""
-    return sys.stderr.isatty() and os.environ.get("TERM") != "dumb"
+    """Whether somebody looks at stderr."""
+    return is_terminal(sys.stderr)
+
+
+#: What has no width, as colours, and what is copied whole.
+COLOUR, COMMAND = re.compile(r"\x1b\[[0-9;]*m"), "vftcli "
+
+
+def fitted(text: str, width: int) -> str:
+    """A text in lines of a width, but for commands, which are copied."""
+    lines: list[str] = []
+    for line in text.split("\n"):
+        words = line.lstrip()
+        if len(COLOUR.sub("", line)) <= width or words.startswith(COMMAND):
+            lines.append(line)
+            continue
+        indent = " " * (len(line) - len(words) + 2)
+        lines += textwrap.wrap(
+            line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+        )
+    return "\n".join(lines)
 
 
 STAGES = Stages()  #: The one line that a program has.
-echo = STAGES.echo  #: What prints everything that a command prints.
+echo, echo_data = STAGES.echo, STAGES.echo_data  #: What prints everything that a command prints.

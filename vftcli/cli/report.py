@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo_data
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import WRITE, Choice, Option, setting
 
@@ -85,7 +85,7 @@ def report(
     record = written_record(output, analyses, left_out.reasons, **how)
     say_left_out(FILES)
     if json:
-        echo(record)
+        echo_data(record)
     else:
         show_report(analyses, output, left_out, written.extras, details=analysis.talk.details)
     if show:
@@ -194,7 +194,7 @@ def estimate(
         return
     say_left_out(names)
     if json:
-        echo(record)
+        echo_data(record)
     else:
         show_estimates(made, output, names)
     if show:
@@ -230,7 +230,7 @@ def write_by_jacobian(
     made = judge_by_jacobian(log, found, choice)
     record = write_jacobian_folder(output, made, command_line(), force=force)
     if json:
-        echo(record)
+        echo_data(record)
         return
     if made.errors is not None:
         show(to_terminal(made.errors, every=False))

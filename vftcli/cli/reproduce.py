@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.progress import echo
+from vftcli.cli.progress import echo, echo_data
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import Choice, Option, setting
 
@@ -98,7 +98,7 @@ def bench(
     )
     if latex:
         table = replace(bench_grid(result), title=f"Computing time: {title}")
-        echo(grid.latex(table), nl=False)
+        echo_data(grid.latex(table))
         return
     echo(title)
     echo(grid.terminal(bench_grid(result)))
