@@ -4,7 +4,7 @@ import json
 import os
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -57,15 +57,15 @@ class Library:
         self, paths: Iterable[str | Path | Recording], choice: ReadChoice, *, whole: bool = False
     ) -> Iterator[Recording]:
         """Read some logs, each episode as a log of its own where all are chosen."""
+        asked = choice.all_episodes or (whole and choice.episode is None)
         for path in paths:
-            if isinstance(path, Recording):
+            numbers: Sequence[int] = ()
+            if asked and not isinstance(path, Recording):
+                numbers = reading.episode_numbers(path, choice)
+            if not numbers or (len(numbers) == 1 and not choice.all_episodes):
                 yield self.open(path, choice)
                 continue
-            unasked = whole and choice.episode is None and reading.holds_episodes(path, choice)
-            if not (choice.all_episodes or unasked):
-                yield self.open(path, choice)
-                continue
-            for number in reading.episode_numbers(path, choice):
+            for number in numbers:
                 yield self.open(path, replace(choice, episode=number, all_episodes=False))
 
     def label(self, path: str | Path) -> str:
@@ -96,17 +96,16 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
     # Spellings of one path count once, or no tail of it would be unique.
     parts = {path: absolute(path).parts for path in given}
     tails = Counter(each[-k:] for each in set(parts.values()) for k in range(1, len(each) + 1))
-    return {path: printable(_shortest_tail(parts[path], tails)) for path in given}
+    labels = {}
+    for path, names in parts.items():
+        own = (names[-count:] for count in range(1, len(names) + 1))
+        labels[path] = printable(str(Path(*next((t for t in own if tails[t] == 1), names))))
+    return labels
 
 
 def absolute(path: str | Path) -> Path:
     """A path from the root, without `.` and `..`; links are not followed, they have names too."""
     return Path(os.path.abspath(path))  # noqa: PTH100 - Path.absolute leaves `..` in the path
-
-
-def _shortest_tail(parts: tuple[str, ...], tails: Mapping[tuple[str, ...], int]) -> str:
-    own = (parts[-count:] for count in range(1, len(parts) + 1))
-    return str(Path(*next((tail for tail in own if tails[tail] == 1), parts)))
 
 
 class LogEntry(NamedTuple):
@@ -161,12 +160,9 @@ class LogCollection:
                     own = lerobot.data_file(path, episode)
                     yield LogEntry(path, episode.number, (*meta, own))
             return
-        numbers = reader.numbers(open_log(path))
-        if chosen is not None or len(numbers) < 2:
-            yield LogEntry(path, chosen, files)
-            return
-        for number in numbers:
-            yield LogEntry(path, int(number), files)
+        numbers = reader.numbers(open_log(path)) if chosen is None else ()
+        for number in numbers if len(numbers) > 1 else (chosen,):
+            yield LogEntry(path, number, files)
 
     def _inside(self, folder: Path) -> Iterator[LogEntry]:
         """A folder that is a log, or the logs in it and below, in the order of their names."""

@@ -139,7 +139,7 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
             "contacts, thresholds, identify); name one: --episode K"
         )
     file = open_log(path)
-    reader = _reader(file, choice.format, choice.columns)
+    reader = _reader(file, choice)
     if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     digest = Digest((path,))
@@ -159,19 +159,12 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
-    """The numbers of the episodes that a file holds, rising."""
+    """The numbers of the episodes that a file holds, rising; none of one recording."""
     file = open_log(Path(path))
-    reader = _reader(file, choice.format, choice.columns)
-    if not reader.episodes:
+    reader = _reader(file, choice)
+    if choice.all_episodes and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
     return reader.numbers(file)
-
-
-def holds_episodes(path: str | Path, choice: ReadChoice) -> bool:
-    """Whether a file holds several episodes."""
-    file = open_log(Path(path))
-    reader = _reader(file, choice.format, choice.columns)
-    return len(reader.numbers(file)) > 1
 
 
 def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> Recording:
@@ -185,25 +178,24 @@ def read_first_recording(path: str | Path, choice: ReadChoice | None = None) -> 
     except RestartError as error:
         segment = f"{choice.columns},segment=1" if choice.columns else "segment=1"
         first = read_chosen(path, replace(choice, columns=segment))
-        told = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
-        remarks = (told, *first.source.remarks)
+        remark = warning("time-reset", restarts=len(error.rows), rows=list(error.rows))
+        remarks = (remark, *first.source.remarks)
         return replace(first, source=replace(first.source, remarks=remarks))
 
 
 def recognise(path: str | Path, choice: ReadChoice | None = None) -> LogFormat:
     """The format that a path's content calls for, or that is chosen."""
-    choice = choice or ReadChoice()
-    return _reader(open_log(Path(path)), choice.format, choice.columns)
+    return _reader(open_log(Path(path)), choice or ReadChoice())
 
 
-def _reader(file: LogFile, name: str | None, columns: str | None) -> LogFormat:
-    """The format that is named, or that the content calls for."""
+def _reader(file: LogFile, choice: ReadChoice) -> LogFormat:
+    name = choice.format
     if name is not None and name not in FORMATS:
         raise UnknownFormatError(
             f"no format {name!r}; known formats: {', '.join(FORMATS)}.{did_you_mean(name, FORMATS)}"
         )
-    reader = FORMATS[name] if name else _recognise(file)
-    if columns is None:
+    reader = FORMATS[name] if name else _recognised(file)
+    if choice.columns is None:
         return reader
     if not reader.takes_columns:
         takers = ", ".join(r.name for r in FORMATS.values() if r.takes_columns)
@@ -215,7 +207,7 @@ def _reader(file: LogFile, name: str | None, columns: str | None) -> LogFormat:
     return reader if whole else FORMATS["table"]
 
 
-def _recognise(file: LogFile) -> LogFormat:
+def _recognised(file: LogFile) -> LogFormat:
     # A general format would take nearly any text, also that of a vendor: it is asked last.
     found = [r for r in FORMATS.values() if not r.general and r.recognises(file)]
     if not found and known_kind(file) is None:
@@ -254,8 +246,10 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
     arrays = {key: np.array(number_array(value, key, name)) for key, value in signals.items()}
     for key, value in arrays.items():
         if value.ndim != 2 or len(value) != np.size(t):
-            told = f"{key} of {name} has shape {value.shape}"
-            raise ShapeError(f"{told}; expected ({np.size(t)}, n), a row for each stamp of t")
+            raise ShapeError(
+                f"{key} of {name} has shape {value.shape}; expected ({np.size(t)}, n), a row for "
+                "each stamp of t"
+            )
     raw = RawLog(
         stamps=np.array(number_array(t, "t", name)), tick=1.0, clock="as given", signals=arrays
     )

@@ -12,7 +12,16 @@ from vftcli.readers.delimited import TextTable
 from vftcli.readers.opening import Digest, open_log
 from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.reader import ReadChoice
-from vftcli.readers.table import JACOBIAN, Cell, JacobianError, Pick, Picks, Table, listed, picks_of
+from vftcli.readers.table import (
+    JACOBIAN,
+    Cell,
+    JacobianError,
+    Pick,
+    Picks,
+    Table,
+    listed,
+    unchecked_picks,
+)
 from vftcli.readers.tables import picked
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
@@ -39,8 +48,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     file = open_log(path)
     is_parquet = file.head.startswith(b"PAR1")
     table: Table = ParquetTable(file) if is_parquet else TextTable(file)
-    spec = parse_columns(columns, log=False) if columns else None
-    picks = found(table) if spec is None else picks_of(table, spec, as_given)
+    picks = _stated(table, columns) if columns else _found(table)
     raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     # No cleaning here: a reference is made by a program, and must be whole.
@@ -57,8 +65,9 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     )
 
 
-def as_given(table: Table, picks: Picks) -> Picks:
-    """Accept the picks of a reference: a torque or a wrench, and one column of time."""
+def _stated(table: Table, columns: str) -> Picks:
+    """The picks of a text: a torque or a wrench, and one column of time."""
+    picks = unchecked_picks(table, parse_columns(columns, log=False))
     signals = {pick.signal: pick for pick in picks.signals}
     if not {TORQUE, "wrench"} & set(signals):
         raise LogError(
@@ -69,7 +78,7 @@ def as_given(table: Table, picks: Picks) -> Picks:
     return picks
 
 
-def found(table: Table) -> Picks:
+def _found(table: Table) -> Picks:
     """Find the clock, the torques and the wrench by their names."""
     if not table.names:
         raise LogError(

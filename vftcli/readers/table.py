@@ -1,7 +1,7 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from mmap import ACCESS_READ, mmap
@@ -107,10 +107,13 @@ class JacobianError(LogError):
         self.table, self.picks = table, picks
 
 
-def picks_of(
-    table: Table, spec: ColumnSpec, check: Callable[[Table, Picks], Picks] | None = None
-) -> Picks:
-    """The columns that a --columns text means; `check` replaces the check for signals."""
+def picks_of(table: Table, spec: ColumnSpec) -> Picks:
+    """The columns that a --columns text of a log means."""
+    return checked(table, unchecked_picks(table, spec))
+
+
+def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
+    """The columns that a --columns text means, whatever signals they are."""
     if spec.named:
         if not table.names:
             raise LogError(
@@ -123,7 +126,7 @@ def picks_of(
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
     clock = next((pick for pick in found if pick.signal == "t"), None)
     rate = next((item.rate for item in spec.items if item.rate is not None), None)
-    return (check or checked)(table, Picks(signals=signals, clock=clock, rate=rate))
+    return Picks(signals=signals, clock=clock, rate=rate)
 
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,13 +24,9 @@ CB3_CYCLE = 8e-3
 E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
 #: Type words of the second line of the official client's binary file.
 BINARY_TYPES = {
-    b"DOUBLE": ">f8",
-    b"UINT64": ">u8",
-    b"INT32": ">i4",
-    b"UINT32": ">u4",
-    b"UINT8": "u1",
-    b"BOOL": "u1",
-}
+    b"DOUBLE": ">f8", b"UINT64": ">u8", b"INT32": ">i4",
+    b"UINT32": ">u4", b"UINT8": "u1", b"BOOL": "u1",
+}  # fmt: skip
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
@@ -48,11 +45,7 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
     The sensor in an e-Series' flange gives the moment about the flange: on three logs about the
     TCP it misses the joints' torque by four times as much. A sensor that a URCap brings gives it
     about the TCP. No field says which of the two is mounted. An e-Series log that has no
-    `ft_raw_wrench`, with stamps that all happen to be multiples of 8 ms, reads as a CB3's.
-
-    Args:
-        names: Columns of the log.
-        stamps: Controller clock. (T,) [s]
+    `ft_raw_wrench`, with stamps (T,) [s] that all are multiples of 8 ms, reads as a CB3's.
     """
     steps = stamps[np.isfinite(stamps)] / CB3_CYCLE
     # Half a millisecond: stamps may be written with three decimals.
@@ -62,34 +55,27 @@ def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
 
 def binary_table(file: LogFile) -> ArrayTable:
     """The official client's binary file: two lines of text, then big-endian records."""
-    names, types, start = binary_header(file)
-    fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
-    body, record, remarks = file.content[start:], np.dtype(fields), []
-    # Some clients write the id of the recipe before every record.
-    if len(body) % record.itemsize and len(body) % (record.itemsize + 1) == 0:
-        record = np.dtype([("id", "u1"), *fields])
-        remarks.append(fact("recipe-byte-skipped"))
-    if rest := len(body) % record.itemsize:
-        remarks.append(fact("record-cut", rest_bytes=rest))
-    records = np.frombuffer(body, dtype=record, count=len(body) // record.itemsize)
-    columns = {name: records[str(names.index(name))] for name in names}
-    return ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
-
-
-def binary_header(file: LogFile) -> tuple[tuple[str, ...], list[bytes], int]:
-    """Names and types of the columns, and where the records begin."""
     first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
     second, end_too, _ = rest.partition(b"\n")
-    names = tuple(first.decode("ascii", errors="replace").split())
-    types = second.split()
+    names, types = first.decode("ascii", errors="replace").split(), second.split()
     if not end or not end_too or len(names) != len(types) or not names:
         raise LogError(
             f"{file.path}: the header names {len(names)} columns and {len(types)} types; a binary "
             "RTDE file has one type a column. It is damaged or cut."
         )
-    if unknown := set(types) - set(BINARY_TYPES):
-        raise LogError(f"{file.path}: unknown column type {unknown.pop()!r} in the second line.")
-    return names, types, len(first) + len(second) + 2
+    if unknown := [word for word in types if word not in BINARY_TYPES]:
+        raise LogError(f"{file.path}: unknown column type {unknown[0]!r} in the second line.")
+    fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
+    body, record, remarks = file.content[len(first) + len(second) + 2 :], np.dtype(fields), []
+    # Some clients write the id of the recipe before every record.
+    if len(body) % record.itemsize and len(body) % (record.itemsize + 1) == 0:
+        record = np.dtype([("id", "u1"), *fields])
+        remarks.append(fact("recipe-byte-skipped"))
+    if left := len(body) % record.itemsize:
+        remarks.append(fact("record-cut", rest_bytes=left))
+    records = np.frombuffer(body, dtype=record, count=len(body) // record.itemsize)
+    columns = {name: records[str(names.index(name))] for name in names}
+    return ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
 
 
 STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
@@ -131,8 +117,8 @@ class EchoTable(TextTable):
 
 def joint_names(table: TextTable) -> tuple[str, ...]:
     """The joints' names that the rows hold, in the order of the columns."""
-    names = table.names
-    columns = [k for k, name in enumerate(names) if name.removeprefix("field.")[:4] == "name"]
+    each = enumerate(table.names)
+    columns = [k for k, name in each if name.removeprefix("field.")[:4] == "name"]
     found = [table.words(column) for column in columns]
     for words in found:
         if len(words) > 1:
@@ -141,19 +127,15 @@ def joint_names(table: TextTable) -> tuple[str, ...]:
                 f"{words[1][:60]}), as where two controllers publish on one topic. Keep the rows "
                 "of the arm."
             )
-    if len(found) == 1 and found[0][0].startswith(("[", "(")):
-        return _listed_names(table, found[0][0])
-    return tuple(words[0] for words in found)
-
-
-def _listed_names(table: TextTable, text: str) -> tuple[str, ...]:
-    try:
-        names = ast.literal_eval(text)
-    except (ValueError, SyntaxError, RecursionError, MemoryError):
-        names = None
-    if not isinstance(names, list | tuple) or not all(isinstance(name, str) for name in names):
-        raise LogError(f"{table.path}: the column name holds no list of joints: {text[:60]!r}")
-    return tuple(names)
+    names = tuple(words[0] for words in found)
+    if len(names) != 1 or not names[0].startswith(("[", "(")):
+        return names
+    listed: object = None
+    with suppress(ValueError, SyntaxError, RecursionError, MemoryError):
+        listed = ast.literal_eval(names[0])  # a list as Python prints it
+    if not isinstance(listed, list | tuple) or not all(isinstance(name, str) for name in listed):
+        raise LogError(f"{table.path}: the column name holds no list of joints: {names[0][:60]!r}")
+    return tuple(listed)
 
 
 def recognises(file: LogFile, _: LogFormat) -> bool:
