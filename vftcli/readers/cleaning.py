@@ -97,7 +97,7 @@ def cleaned(
     raw = measured(raw, path)
     fresh = without_repeats(raw, path)
     if raw.degrees_possible:
-        refuse_degrees(fresh, path)
+        _refuse_degrees(fresh, path)
     t, counts = seconds(fresh), raw.stamps.dtype.kind in "iu" and not raw.origin
     # In whole nanoseconds, where the log counts its stamps in them.
     per_tick = round(raw.tick * 1e9) if counts else 0
@@ -113,7 +113,7 @@ def cleaned(
         rows=rows,
         duplicates=len(raw.stamps) - len(fresh.stamps),
         row_samples=row_samples(fresh, rows),
-        remarks=(*fresh.remarks, *gap_remarks(t)),
+        remarks=(*fresh.remarks, *_gap_remarks(t)),
     )
     arrays: dict[str, Any] = {
         name: handed_over(np.ascontiguousarray(v)) for name, v in fresh.signals.items()
@@ -134,12 +134,10 @@ def measured(raw: RawLog, path: Path) -> RawLog:
     """Samples that a robot may have given: of the segment that is asked for, without garbage."""
     if len(raw.stamps) == 0:
         raise ClockError(f"{path}: no samples; the log holds a header only.")
-    if raw.segment is not None:
-        raw = segment_of(raw, raw.segment, path)
-    raw = without_leading_garbage(without_empty_joints(raw))
-    refuse_unknown_numbers(raw, path)
-    refuse_backward_steps(raw, path)
-    refuse_standing_clock(raw, path)
+    raw = raw if raw.segment is None else _segment_of(raw, raw.segment, path)
+    raw = without_leading_garbage(_without_empty_joints(raw))
+    for refuse in (_refuse_unknown_numbers, _refuse_backward_steps, _refuse_standing_clock):
+        refuse(raw, path)
     return raw
 
 
@@ -149,7 +147,7 @@ def seconds(raw: RawLog) -> Array:
     return elapsed if raw.tick == 1.0 else elapsed * raw.tick
 
 
-def without_empty_joints(raw: RawLog) -> RawLog:
+def _without_empty_joints(raw: RawLog) -> RawLog:
     """Leave out named joints of which a signal is NaN throughout, as a gripper's effort is."""
     names, width = raw.joint_names, len(raw.joint_names)
     if "q" not in raw.signals or raw.signals["q"].shape[1] != width:
@@ -218,7 +216,7 @@ def without_leading_garbage(raw: RawLog) -> RawLog:
 COLUMN = {"wrench": "axis", "jacobian": "cell"}
 
 
-def refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
+def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
     """Raise a LogError that names the row and column of the first NaN, infinity or absurd value."""
     if not np.isfinite(raw.stamps).all():
         row = raw.first_row + int(np.argmin(np.isfinite(raw.stamps)))
@@ -259,7 +257,7 @@ class RestartError(ClockError):
 SEGMENT_ROWS = 20
 
 
-def refuse_backward_steps(raw: RawLog, path: Path) -> None:
+def _refuse_backward_steps(raw: RawLog, path: Path) -> None:
     """Raise a ClockError that names the first sample whose stamp lies before the one before."""
     backward = np.diff(raw.stamps) < 0
     if not backward.any():
@@ -283,7 +281,7 @@ def refuse_backward_steps(raw: RawLog, path: Path) -> None:
     )
 
 
-def refuse_standing_clock(raw: RawLog, path: Path) -> None:
+def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
     """Raise a ClockError if the clock does not run, or as the clock of no robot's log can."""
     t, start = seconds(raw), float(raw.stamps[0]) * raw.tick + raw.origin
     rows, span, steps = len(t), float(t[-1]), np.diff(t)
@@ -308,7 +306,7 @@ def refuse_standing_clock(raw: RawLog, path: Path) -> None:
         )
 
 
-def segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
+def _segment_of(raw: RawLog, number: int, path: Path) -> RawLog:
     """One of several recordings in a file, counted from 1; the clock's restarts part them."""
     edges = [0, *(int(k) + 1 for k in np.flatnonzero(np.diff(raw.stamps) < 0)), len(raw.stamps)]
     if not 1 <= number < len(edges):
@@ -346,27 +344,21 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     return kept(raw, fresh, *remarks)
 
 
-def gap_remarks(t: Array) -> tuple[Remark, ...]:
-    """A remark on the gaps of a clock (T,) [s], if there are any."""
+def _gap_remarks(t: Array) -> tuple[Remark, ...]:
     gaps = gaps_of(t, GAP_STEPS)
     if not len(gaps):
         return ()
     longest = int(gaps[np.argmax(t[gaps + 1] - t[gaps])])
-    remark = caution(
-        "clock-gaps" if len(gaps) > 1 else "clock-gap",
-        gaps=len(gaps),
-        steps=GAP_STEPS,
-        longest_s=float(t[longest + 1] - t[longest]),
-        at_s=float(t[longest]),
-    )
-    return (remark,)
+    code, at = "clock-gaps" if len(gaps) > 1 else "clock-gap", float(t[longest])
+    length = float(t[longest + 1] - t[longest])
+    return (caution(code, gaps=len(gaps), steps=GAP_STEPS, longest_s=length, at_s=at),)
 
 
 #: Share of samples below which positions of another size are errors, and not of another unit.
 BAD_SHARE = 0.05
 
 
-def refuse_degrees(raw: RawLog, path: Path) -> None:
+def _refuse_degrees(raw: RawLog, path: Path) -> None:
     """Raise a LogError if positions of unstated unit can hardly be radians.
 
     The robot is not known yet, and a reader knows no robots: what holds for all must do. No joint

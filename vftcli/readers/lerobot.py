@@ -88,7 +88,7 @@ def read_episode(
 ) -> RawLog:
     """Read an episode of a dataset, of which meta/info.json says this."""
     path = data_file(file.path, episode)
-    table = rows_of(open_log(path), episode)
+    table = _rows_of(open_log(path), episode)
     names: tuple[str, ...] = ()
     remarks: tuple[Remark, ...] = ()
     if request.spec.item("q"):
@@ -97,35 +97,30 @@ def read_episode(
         each_of = info.get("features")
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
-        usual, names, side, remarks = columns_of(file.path, table, features, request)
+        usual, names, side, remarks = _columns_of(file.path, table, features, request)
     raw = described(table, usual, request, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
-        by_frames(raw, table, info.get("fps")),
+        _by_frames(raw, table, info.get("fps")),
         part=f"{side} arm" if side else "",
         files=(file.path / "meta" / "info.json", path),
         robot_hint=robot if robot in ROBOTS else None,
     )
 
 
-def columns_of(
+def _columns_of(
     path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
 ) -> tuple[str, tuple[str, ...], str, tuple[Remark, ...]]:
-    """Which columns hold which signals of which arm, by the names of features and their elements.
-
-    Returns:
-        The --columns text, the joints' names or none, the arm of two or "", what is to be said.
-    """
-    there = [e for name in table.names for e in elements_of(name, table, features.get(name))]
+    """The --columns text, the joints' names or none, the arm of two or "", what is to be said."""
+    there = [e for name in table.names for e in _elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
-    side = ""
-    taken = request.spec.item("wrench")
     # Nothing tells a sensor's wrench from an estimate.
     observed = [name for name in table.names if name.startswith("observation.")]
     left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
     remarks: tuple[Remark, ...] = ()
-    if left and not taken:
+    if left and not request.spec.item("wrench"):
         remarks = (fact("wrench-left-out", features=listed(left)),)
+    side = ""
     if len(sides) > 1:
         side, said = arm_of(path, request, sides)
         remarks = (*remarks, *said)
@@ -141,14 +136,14 @@ def columns_of(
     names = tuple(names[k] for k in kinematic_order(names))
     grammar = {field: word for word, field in SIGNALS.items()}
     items = [
-        f"{grammar[signal]}={'|'.join(e.column for e in in_order(path, signal, found, names))}"
+        f"{grammar[signal]}={'|'.join(e.column for e in _in_order(path, signal, found, names))}"
         for signal, found in by_signal.items()
         if found
     ]
     return ",".join(["t=timestamp", *items]), names, side, remarks
 
 
-def in_order(
+def _in_order(
     path: Path, signal: str, elements: list[Element], names: tuple[str, ...]
 ) -> list[Element]:
     """A signal's elements in the order of the joints, as they stand where they have no names."""
@@ -163,7 +158,7 @@ def in_order(
     return [by_joint[name] for name in names]
 
 
-def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+def _elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
@@ -189,7 +184,7 @@ def elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
 
 
-def by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+def _by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
     if not good or FRAME not in table.names or raw.clock != "column timestamp":
@@ -229,7 +224,7 @@ def episodes_told(folder: Path) -> list[Episode]:
     if there := tables or ([lines] if lines.is_file() else []):
         # Who reads all episodes asks for each again.
         states = tuple((path, path.stat().st_mtime_ns, path.stat().st_size) for path in there)
-        found = remembered_episodes(folder, states)
+        found = _remembered_episodes(folder, states)
     else:
         files = sorted((folder / "data").rglob("*.parquet"))
         each = (episodes_of(ParquetTable(open_log(path)).episodes()) for path in files)
@@ -241,22 +236,21 @@ def episodes_told(folder: Path) -> list[Episode]:
 
 
 @lru_cache(maxsize=2)
-def remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
-    """The episodes that tables of these paths, times and sizes tell."""
-    each = [
-        (_episodes_of_table if path.suffix == ".parquet" else _episodes_of_lines)(folder, path)
-        for path, _, _ in states
-    ]
-    return [episode for episodes in each for episode in episodes]
+def _remembered_episodes(folder: Path, states: tuple[tuple[Path, int, int], ...]) -> list[Episode]:
+    found: list[Episode] = []
+    for path, _, _ in states:
+        read = _episodes_of_table if path.suffix == ".parquet" else _episodes_of_lines
+        found += read(folder, path)
+    return found
 
 
 def _episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     table = ParquetTable(open_log(path))
-    names = list(table.names)
-    if missing := [name for name in EPISODES_TABLE if name not in names]:
+    if missing := [name for name in EPISODES_TABLE if name not in table.names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
-    loaded = table.load([names.index(name) for name in EPISODES_TABLE], None)
-    columns = [loaded[names.index(name)] for name in EPISODES_TABLE]
+    places = [table.names.index(name) for name in EPISODES_TABLE]
+    loaded = table.load(places, None)
+    columns = [loaded[place] for place in places]
     if not all(column.ndim == 1 and np.isfinite(column).all() for column in columns):
         raise LogError(f"{path}: a row of the table of episodes lacks a number.")
     for row in zip(*columns, strict=True):
@@ -292,14 +286,14 @@ def data_file(folder: Path, episode: Episode) -> Path:
     raise LogError(f"{folder}: no file of data/**/*.parquet holds episode {episode.number}.")
 
 
-def rows_of(file: LogFile, episode: Episode) -> ParquetTable:
+def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     """The rows of an episode in its data file, checked against the table of episodes."""
     table = ParquetTable(file)
     numbers = table.episodes()
     if not numbers.size:
         return table
     rows = np.flatnonzero(numbers == episode.number)
-    names = list(table.names)
+    names = table.names
     differs = episode.length is not None and len(rows) != episode.length
     if "index" in names and episode.start is not None and not differs:
         index = names.index("index")

@@ -88,9 +88,6 @@ def labelled(paths: Iterable[str | Path]) -> dict[Path, str]:
 
     A label is the file's name where that is unique, else as many folders before it as tell it from
     every other path: `a/log.csv` and `b/log.csv`. Spellings of one path have one label.
-
-    Returns:
-        Path as it was given → label, all of it letters that can be shown.
     """
     given = [Path(path) for path in paths]
     # Spellings of one path count once, or no tail of it would be unique.

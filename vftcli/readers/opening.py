@@ -134,11 +134,7 @@ class LogFile:
 
 
 def open_log(path: Path) -> LogFile:
-    """Open a path for recognition: unwrap the head of a file, list a folder.
-
-    Raises:
-        LogError: If there is no such path or it cannot be opened.
-    """
+    """Open a path for recognition: unwrap the head of a file, list a folder."""
     if path.is_dir():
         return LogFile(path=path, entries=tuple(sorted(p.name for p in path.iterdir())))
     if not path.exists():

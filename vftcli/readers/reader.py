@@ -199,10 +199,9 @@ Episodes = Mapping[int, Callable[[ReadChoice], RawLog]]
 def episode_of(
     path: Path | str, request: ReadChoice, numbers: Sequence[int]
 ) -> "tuple[int, str, tuple[Remark, ...]]":
-    """The episode that is read of those a file holds: the one asked for, else the first, and said.
+    """The number of the episode that is read, its name as a part, and what is to be said of it.
 
-    Returns:
-        Its number, its name as a part ("" for the only one), and what is to be said of it.
+    It is the one asked for, else the first; the only one has the name "".
     """
     from vftcli.signals.remarks import caution
 

@@ -184,11 +184,7 @@ PREFIX = "tau_ext/"
 
 
 def estimates_columns(path: Path, observer: str) -> str | None:
-    """How to read an ``estimates.parquet`` with one observer's torque as its tau_ext.
-
-    Returns:
-        A description for ``--columns``, or None if the file is not one of ours.
-    """
+    """The --columns text of one observer's torque as tau_ext; None of a file that is not ours."""
     if not (held := stored_observers(path)):
         return None
     if observer not in held:

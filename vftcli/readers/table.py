@@ -299,11 +299,7 @@ class JoinedRows:
         self._file: Any = None
 
     def add(self, rows: Column) -> None:
-        """Take up the next rows. (N, k) or (N,)
-
-        Raises:
-            LogError: If they have no room.
-        """
+        """Take up the next rows. (N, k) or (N,)"""
         self.count += len(rows)
         self.shapes.add(rows.shape[1:])
         self._kind = rows.dtype
@@ -339,14 +335,7 @@ class JoinedRows:
 
 
 def joined(parts: Iterable[Mapping[str, Array]]) -> dict[str, Array]:
-    """Signals that come part by part, each as one array.
-
-    Args:
-        parts: Signal → its next rows (N, k); all parts have the same signals.
-
-    Raises:
-        LogError: If there are no parts, or no room for them.
-    """
+    """Signals that come part by part, each as one array; all parts have the same signals."""
     found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():

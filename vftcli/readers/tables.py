@@ -39,9 +39,6 @@ def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table by its --columns text, else by the aliases of its column names.
 
     A text that names signals says something of these; what it leaves out is found by name.
-
-    Raises:
-        LogError: If the columns cannot be told.
     """
     spec = request.spec
     item = spec.item("q")
@@ -66,17 +63,7 @@ def read_layout(
     request: ReadChoice,
     **more: RawField,
 ) -> RawLog:
-    """Read a table by the columns of its format; what it has not of them is left out.
-
-    Args:
-        table: The table.
-        layout: Its format.
-        request: What is wanted.
-        more: Further fields of the RawLog.
-
-    Raises:
-        LogError: If it has no clock or no positions.
-    """
+    """Read a table by the columns of its format; what it has not of them is left out."""
     spec, names = parse_columns(layout.columns), table.names
     if spec.named:
         spec = replace(spec, items=tuple(_known_items(table, layout, spec)))

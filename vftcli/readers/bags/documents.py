@@ -129,20 +129,19 @@ class Documents:
         seconds and nanoseconds.
         """
         asked = {(item.pattern or "").rpartition(".")[2] for item in request.spec.items}
+        if not asked <= {"", "position", "velocity", "effort"}:
+            return []
         streams: list[Stream | None] = []
         for channel, (rows, times) in self.found.items():
-            if not asked <= {"", "position", "velocity", "effort"}:
-                break
             if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
                 streams.append(_stream(channel, WRENCH, rows, times, ()))
-                continue
-            by_names: dict[tuple[str, ...], list[int]] = {}
-            if all(map(_is_joint_state, rows)):
+            elif all(map(_is_joint_state, rows)):
+                by_names: dict[tuple[str, ...], list[int]] = {}
                 for k, row in enumerate(rows):
                     by_names.setdefault(tuple(row["name"]), []).append(k)
-            for names, at in by_names.items():
-                own, stamps = [rows[k] for k in at], [times[k] for k in at]
-                streams.append(_stream(channel, JOINT_STATE, own, stamps, names))
+                for names, at in by_names.items():
+                    own, stamps = [rows[k] for k in at], [times[k] for k in at]
+                    streams.append(_stream(channel, JOINT_STATE, own, stamps, names))
         return [stream for stream in streams if stream is not None]
 
     def read(self, request: ReadChoice) -> RawLog:
@@ -156,10 +155,14 @@ class Documents:
                 failures.append((len(rows), error))
                 continue
             left = sorted({other.topic for other in self.found} - {channel.topic})
-            told = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
-            return replace(raw, remarks=(*raw.remarks, *told))
+            said = [fact("topics-left-out", topics=tuple(left[:6]))] if left else []
+            return replace(raw, remarks=(*raw.remarks, *said))
         # The fullest channel is the one that was meant; what it lacks is what the user can mend.
         raise max(failures, key=lambda failure: failure[0])[1]
+
+
+#: Number of a field of a joint in foxglove.JointStates → its name.
+JOINT_FIELDS = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
 
 
 def joint_states(message: bytes) -> dict[str, Any]:
@@ -170,19 +173,14 @@ def joint_states(message: bytes) -> dict[str, Any]:
             stamp = dict(fields(value))
             document["timestamp"] = {"sec": stamp.get(1, 0), "nsec": stamp.get(2, 0)}
         elif number == 2 and isinstance(value, bytes):
-            document["joints"].append(_joint(value))
+            joint: dict[str, Any] = {}
+            for part, inner in fields(value):
+                if part == 1 and isinstance(inner, bytes):
+                    joint["name"] = inner.decode("utf-8", "replace")
+                elif part in JOINT_FIELDS and isinstance(inner, float):
+                    joint[JOINT_FIELDS[part]] = inner
+            document["joints"].append(joint)
     return document
-
-
-def _joint(message: bytes) -> dict[str, Any]:
-    names = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
-    joint: dict[str, Any] = {}
-    for number, value in fields(message):
-        if number == 1 and isinstance(value, bytes):
-            joint["name"] = value.decode("utf-8", "replace")
-        elif number in names and isinstance(value, float):
-            joint[names[number]] = value
-    return joint
 
 
 def fields(message: bytes) -> Iterator[tuple[int, int | float | bytes]]:

@@ -1,7 +1,12 @@
-"""MCAP files: mcap's stream reader from the start, so that a cut file reads up to its last chunk.
+"""Bags of ROS 2: MCAP files and SQLite databases.
 
-Format: https://mcap.dev/spec. The reader unpacks a chunk to whatever it holds, so chunks are
+An MCAP file (https://mcap.dev/spec) is read by mcap's stream reader from the start, so that a cut
+one reads up to its last chunk. The reader unpacks a chunk to whatever it holds, so chunks are
 unpacked here, within bounds, and handed to it as files of records.
+
+A database is code as much as data: a column may be computed by functions of SQLite from nothing.
+So only stored columns of plain tables are read, no function runs, and what is read is bounded by
+the size of the file.
 """
 
 import sqlite3
@@ -75,14 +80,19 @@ class _Mcap:
                 census.data_end = end
             if isinstance(record, records.Message):
                 census.kept += 1
-                yield ChannelRun(
-                    self.channels.get(record.channel_id), [record.log_time], [record.data]
-                )
+                channel = self.channels.get(record.channel_id)
+                yield ChannelRun(channel, [record.log_time], [record.data])
             elif isinstance(record, records.Chunk):
                 census.chunks += 1
                 yield from self._chunk(record)
             elif isinstance(record, records.Footer):
-                self._close(record, len(content) - end)
+                if (left := len(content) - end) != MAGIC_SIZE:
+                    raise LogError(
+                        f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} "
+                        "should; it is damaged."
+                    )
+                if record.summary_start:  # the messages should end before it
+                    census.missing = record.summary_start - DATA_END_BYTES - census.data_end
                 end = len(content)
                 break
             else:
@@ -95,36 +105,23 @@ class _Mcap:
         if isinstance(record, records.Schema):
             self.schemas[record.id] = record
         elif isinstance(record, records.Channel):
-            self._channel(record)
+            schema = self.schemas.get(record.schema_id, records.Schema(0, b"", "", ""))
+            is_ros = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
+            text = schema.data.decode("utf-8", "replace") if is_ros else ""
+            encoding = record.message_encoding
+            self.channels[record.id] = Channel(
+                topic=printable(record.topic),
+                type=type_name(schema.name) if text else printable(schema.name),
+                encoding=encoding if encoding in ENCODINGS else "other",
+                definition=text,
+                idl=schema.encoding == "ros2idl",
+            )
         elif isinstance(record, records.Statistics):
             self.census.closed, self.census.counted = True, record.message_count
         elif isinstance(record, records.ChunkIndex):
             self.indexed += 1
         elif isinstance(record, records.DataEnd):
             self.census.closed, self.census.data_end = True, end - DATA_END_BYTES
-
-    def _close(self, footer: records.Footer, left: int) -> None:
-        """Take up the footer, which says where the messages should end."""
-        if left != MAGIC_SIZE:
-            raise LogError(
-                f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} should; it "
-                "is damaged."
-            )
-        if footer.summary_start:
-            data_end = footer.summary_start - DATA_END_BYTES
-            self.census.missing = data_end - self.census.data_end
-
-    def _channel(self, record: records.Channel) -> None:
-        schema = self.schemas.get(record.schema_id, records.Schema(0, b"", "", ""))
-        is_ros = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
-        text = schema.data.decode("utf-8", "replace") if is_ros else ""
-        self.channels[record.id] = Channel(
-            topic=printable(record.topic),
-            type=type_name(schema.name) if text else printable(schema.name),
-            encoding=record.message_encoding if record.message_encoding in ENCODINGS else "other",
-            definition=text,
-            idl=schema.encoding == "ros2idl",
-        )
 
     def _chunk(self, chunk: records.Chunk) -> Iterator[ChannelRun]:
         """The messages of a chunk, unpacked and checked."""
@@ -234,10 +231,15 @@ def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Channel
             raise LogError(
                 f"{ingest.path}: a message of topic {number!s:.20} is no bytes; damaged."
             )
-        is_packed = content.startswith(ZSTD)
-        yield ChannelRun(
-            channels.get(number), [time], [_unzstd(content, ingest) if is_packed else content]
-        )
+        data = content
+        if content.startswith(ZSTD):  # on its own
+            import zstandard
+
+            length = zstandard.frame_content_size(content)
+            ingest.claim(length if length >= 0 else MESSAGE_LIMIT)
+            unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
+            data = unpacker.decompress(content, max_output_size=MESSAGE_LIMIT)
+        yield ChannelRun(channels.get(number), [time], [data])
 
 
 def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
@@ -263,12 +265,3 @@ def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
 
 def _text(value: Any) -> str:  # noqa: ANN401 - whatever a cell holds
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
-
-
-def _unzstd(message: bytes, ingest: Ingest) -> bytes:
-    import zstandard
-
-    size = zstandard.frame_content_size(message)
-    ingest.claim(size if size >= 0 else MESSAGE_LIMIT)
-    unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
-    return unpacker.decompress(message, max_output_size=MESSAGE_LIMIT)
