@@ -171,7 +171,7 @@ def _npz_arrays(file: LogFile) -> dict[str, Column]:
     return arrays
 
 
-def _npy_array(path: Path, head: bytes, content: Any) -> Column:  # noqa: ANN401 - a buffer
+def _npy_array(path: Path, head: bytes, content: bytes | memoryview) -> Column:
     """One array of an .npy file, never executing what it may carry.
 
     What the header claims is compared with the file's size before it is believed.

@@ -16,6 +16,8 @@ from vftcli.readers.table import Column
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
+Series = Any  #: A column of polars, which is imported when a text is read.
+
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
 BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time, of a long table.
@@ -78,17 +80,14 @@ class TextTable:
 
     @cached_property
     def separator(self) -> str:
-        """The separator that splits the first lines into the same, largest number of cells."""
-        lines = self.sample[:5]
-        best, most = " " if len(lines[0].split()) > 1 else ",", 1
+        """The separator that splits the first two lines into the same number of cells."""
+        lines = self.sample[:2]
         for separator in SEPARATORS:
-            counts = {len(split_cells(line.strip(" "), separator)) for line in lines[:2]}
-            if len(counts) == 1 and max(counts) > most:
-                if separator == "," and ";" in lines[0]:
-                    continue  # decimal commas between semicolons
-                best, most = separator, max(counts)
-                break
-        return best
+            counts = {len(split_cells(line.strip(" "), separator)) for line in lines}
+            decimal = separator == "," and ";" in lines[0]  # commas between semicolons
+            if len(counts) == 1 and max(counts) > 1 and not decimal:
+                return separator
+        return " " if len(lines[0].split()) > 1 else ","
 
     @cached_property
     def decimal_comma(self) -> bool:
@@ -177,7 +176,7 @@ class TextTable:
     def _is_quoted(self) -> bool:
         return any('"' in line for line in self.sample)
 
-    def _parse(self, source: Path | bytes, kinds: Mapping[int, str]) -> dict[int, Any] | None:
+    def _parse(self, source: Path | bytes, kinds: Mapping[int, str]) -> dict[int, Series] | None:
         """The wanted columns by polars, each of its type; None where it refuses the text."""
         import polars as pl
 
@@ -306,7 +305,7 @@ class TextTable:
         return LogError(f"{self.path}: cannot be parsed as a table of numbers; is it a log?")
 
 
-def _has_blank_rows(columns: Mapping[int, Any]) -> bool:
+def _has_blank_rows(columns: Mapping[int, Series]) -> bool:
     if all(series.null_count() == 0 for series in columns.values()):
         return False
     return bool(np.all([series.is_null() for series in columns.values()], axis=0).any())
@@ -327,7 +326,7 @@ def decoded(line: bytes) -> str:
         return line.decode("latin-1")
 
 
-def _numbers(series: Any, path: Path) -> Column:  # noqa: ANN401 - polars
+def _numbers(series: Series, path: Path) -> Column:
     """A parsed column: empty cells become NaN, dates nanoseconds since 1970."""
     import polars as pl
 

@@ -22,6 +22,8 @@ from vftcli.readers.tables import described
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
+Json = Any  #: A value of a description.
+
 TOLD_LIMIT = 64 * 1024 * 1024  #: Bytes of a description beside the data that are parsed.
 
 FRAME = "frame_index"
@@ -158,7 +160,7 @@ def _in_order(
     return [by_joint[name] for name in names]
 
 
-def _elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Element]:  # noqa: ANN401
+def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Element]:
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
@@ -184,7 +186,7 @@ def _elements_of(name: str, table: ParquetTable, labels: Any) -> Iterable[Elemen
             yield Element(f"{name}[{k}]" if width else name, signal, joint, side[1] if side else "")
 
 
-def _by_frames(raw: RawLog, table: ParquetTable, fps: Any) -> RawLog:  # noqa: ANN401 - of JSON
+def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
     """The log by its frames' numbers and rate, where its stamps are these rounded to 32 bits."""
     good = isinstance(fps, int | float) and 0 < fps < 1 / CLOCK_SLACK
     if not good or FRAME not in table.names or raw.clock != "column timestamp":

@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -57,7 +57,7 @@ class LogFormat:
     remedy: str = ""  #: What to do where clock or positions are missing.
 
     @property
-    def _module(self) -> Any:  # noqa: ANN401 - a module with `read`, and what else it needs
+    def _module(self) -> ModuleType:
         return import_module(f"vftcli.readers.{self.module}")
 
     def recognises(self, file: LogFile) -> bool:

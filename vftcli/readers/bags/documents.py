@@ -25,6 +25,7 @@ JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 #: Names of a document's stamp, and of the seconds and nanoseconds in it.
 STAMPS = ("header.stamp", "timestamp", "stamp")
 SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "nanosec")
+Json = Any  #: A value of a document.
 Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
 
 
@@ -227,7 +228,7 @@ def flattened(message: bytes, *, json_like: bool) -> dict[str, Any]:
     return flat
 
 
-def _flatten(value: Any, path: str, flat: dict[str, Any], depth: int) -> None:  # noqa: ANN401
+def _flatten(value: Json, path: str, flat: dict[str, Json], depth: int) -> None:
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
         raise ValueError("nested or long beyond any message of joints")
     if isinstance(value, dict):
@@ -271,7 +272,7 @@ def _read(
     return laid_along(raw, tuple(names), request)
 
 
-def _column(first: Any, values: list[Any]) -> Column | None:  # noqa: ANN401
+def _column(first: Json, values: list[Json]) -> Column | None:
     """Values of all messages as an array, or None if they are not numbers of one shape."""
     if isinstance(first, str | bool) or (isinstance(first, list) and not first):
         return None

@@ -263,5 +263,5 @@ def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
     return found
 
 
-def _text(value: Any) -> str:  # noqa: ANN401 - whatever a cell holds
+def _text(value: object) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""

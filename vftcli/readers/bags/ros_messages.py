@@ -35,6 +35,7 @@ class Field(NamedTuple):
 
 
 Types = Mapping[str, Sequence[Field]]
+Described = Any  #: Fields or their type as nested tuples of rosbags.
 
 
 class LayoutError(ValueError):
@@ -56,12 +57,12 @@ def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field,
     return {short(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
 
 
-def fields_of(fields: Any) -> tuple[Field, ...]:  # noqa: ANN401 - rosbags' nested tuples
+def fields_of(fields: Described) -> tuple[Field, ...]:
     """Fields as rosbags describes them, in our terms."""
     return tuple(Field(str(name), *_described(kind)) for name, kind in fields)
 
 
-def _described(kind: Any) -> tuple[str, int | None]:  # noqa: ANN401
+def _described(kind: Described) -> tuple[str, int | None]:
     node, inner = int(kind[0]), kind[1]
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None

@@ -320,7 +320,7 @@ def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
     return robot, 1.0, words, host
 
 
-def runs(stamps: Any) -> bool:  # noqa: ANN401 - whole numbers or seconds
+def runs(stamps: Array | Integers) -> bool:
     """Whether stamps are set and never run back."""
     good = bool(np.all(np.isfinite(stamps))) and bool(np.all(np.diff(stamps) >= 0))
     return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
