@@ -198,7 +198,7 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
 
 
 def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Remark]:
-    """Remarks on logs in which dry friction, beyond the log's, falls from third to third."""
+    """Remarks on logs in which dry friction falls from third to third."""
     models = [JointFriction() if fit is None else fit.friction for fit in fits]
     dry = dry_friction(models, data.robot.joints)
     remarks = []

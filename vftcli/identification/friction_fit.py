@@ -294,7 +294,10 @@ def choose_shape(data: JointData, length: float = 0.0) -> tuple[Shape, dict[Shap
 
 
 def candidate_shapes(best: Shape, data: JointData, speed: float = 0.0) -> list[Shape]:
-    """A joint's competing shapes up to its highest speed [rad/s]; `best`'s numbers stay."""
+    """A joint's competing shapes up to its highest speed. [rad/s]
+
+    Smoothing, bend and presliding length are those of `best`.
+    """
     shapes: list[Shape] = []
     line = bent(speed)
     for terms in (*CANDIDATES, *((*line.terms, *more) for more in BESIDE_POINTS if line)):
@@ -325,7 +328,7 @@ def pushing_terms(shape: Shape, values: Array) -> tuple[str, ...]:
 
 
 def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
-    """A shape less bounded terms at zero; whether velocities seem reversed (`TURNED`)."""
+    """A shape less its terms at zero; whether velocities seem reversed."""
     powers: dict[Shape, float] = {}
     for without in ((), *((term,) for term in BOUNDED), BOUNDED):
         one = shape._replace(terms=tuple(t for t in shape.terms if t not in without))
@@ -357,6 +360,6 @@ def non_negative_fit(shape: Shape, data: JointData) -> tuple[Shape, Array]:
 
 
 def is_dissipative(shape: Shape, values: Array, speed_limit: float) -> bool:
-    """Whether no dry term is negative and friction rises up to `speed_limit` [rad/s]."""
+    """Whether friction never pushes and rises up to a speed. [rad/s]"""
     friction = shape.friction(values[: len(shape.terms)])
     return not pushing_terms(shape, values) and bool(np.isnan(falling_speed(friction, speed_limit)))

@@ -115,7 +115,7 @@ def by_constant(data: Training, j: int, values: Array, sd: Array) -> tuple[Array
 
 
 def rotor_number(j: int, value: float, sd: float, before: float) -> tuple[Number, list[Remark]]:
-    """Rotor inertia of joint j (from 0) [kg·m²], and a remark where it is not known well.
+    """Rotor inertia of joint j (from 0) [kg·m²], a remark where it is not known.
 
     The logs determine it too where it is `REFUTED` sd off the profile's.
     """

@@ -81,9 +81,9 @@ class LoadFit(NamedTuple):
 def load_at_flange(
     x: Array, sd: Array, left: Array, robot: Robot, loaded: Sequence[Recording], origin: Remark
 ) -> LoadFit:
-    """A load in flange axes from mass and first moments in the last link's frame, with their sd.
+    """A load in flange axes from a solution in the last link's frame.
 
-    (4,) each [kg, kg·m]; `left` is the RMS torque left in each joint. (n,) [N·m]
+    x and sd are of mass and first moments (4,) [kg, kg·m], `left` is RMS torque (n,) [N·m].
     """
     names, mass, mass_sd = names_of(loaded), float(x[0]), float(sd[0])
     if mass <= 0 or mass_sd > 0.5 * mass:
@@ -138,10 +138,10 @@ class JointsFit(NamedTuple):
         return self.cluster_covariance(stretches) + self.gain_covariance(y, gain)
 
     def gain_covariance(self, y: Array, gain: float) -> Array:
-        """Covariance of x by drive constants of this relative sd, y (N, n) explained. (k, k)
+        """Covariance of x by drive constants of a relative deviation. (k, k)
 
         Half of their variance belongs to all joints (gear, warmth) and scales the mass; half to
-        each one.
+        each one. The torque y (N, n) is what is explained.
         """
         # Each joint's torque adds its part to the solution.
         shares = np.einsum("knp,kn->np", self.A, y * self.weights) @ self.inverse

@@ -179,7 +179,7 @@ def pulled_links(
 def nearest_physical_links(
     triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]
 ) -> Array:
-    """Physical parameters that predict nearly as least squares, by one of `WEIGHTS`. (size,)"""
+    """Physical parameters pulled to the profile by one of `WEIGHTS`. (size,)"""
     return next(x for pull, x in pulled_links(triangles, profile) if pull <= weight)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.robots.kernels import CHUNK, momentum_terms
+from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature
@@ -27,7 +27,7 @@ GAP = 10.0  #: Steps longer than this many median steps are left out.
 
 
 def settings_record(cutoff: float, step: float) -> dict[str, str | float]:
-    """The settings of a log of this median step [s], for the robot file and `run.json`."""
+    """The filter's settings for the robot file and `run.json`."""
     return {
         "filter": f"Butterworth order {STEEP}, forwards and backwards (zero phase)",
         "cutoff_hz": cutoff,
@@ -124,12 +124,8 @@ def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
 
 
 def gravity_torque(robot: Robot, q: Array) -> Array:
-    """Gravity torques of the loaded arm, chunk by chunk. (T, n) [N·m]"""
-    out = np.empty(q.shape)
-    for start in range(0, len(q), CHUNK):
-        span = slice(start, start + CHUNK)
-        out[span] = momentum_terms(robot.loaded_chain, q[span], np.zeros_like(q[span])).gravity
-    return out
+    """Gravity torques of the loaded arm. (T, n) [N·m]"""
+    return momentum_terms(robot.loaded_chain, q, np.zeros_like(q)).gravity
 
 
 def rigid_torque(robot: Robot, motion: PreparedLog) -> Array:

@@ -211,7 +211,7 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
 
 
 def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
-    """Causes of a held-out log's residual where it is much larger than in training (n,) [N·m].
+    """Causes of a held-out residual far above the training's. (n,) [N·m]
 
     A load on the flange, which explains all joints at once, is looked for first.
     """
@@ -242,7 +242,7 @@ def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[f
 
 
 def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
-    """Whether friction explains joint j's (from 0) residual beyond training's RMS [N·m].
+    """Whether friction explains joint j's (from 0) residual beyond training's.
 
     Coulomb and viscous friction and an offset are fitted to the residual; where they explain
     `EXPLAINS` of it, friction is named as its cause.

@@ -97,16 +97,14 @@ def targets_method(data: Training) -> MethodResult:
     numbers: list[Number] = []
     remarks: list[Remark] = []
     for j, model in enumerate(models):
-        for name, (value, sd, known), before in (
-            ("torque_constant", model.constant, constants[j]),
-            ("rotor_inertia", model.rotor, rotor[j]),
+        for name, found, own in (
+            ("torque_constant", model.constant, constants),
+            ("rotor_inertia", model.rotor, rotor),
         ):
-            numbers.append(number(j, name, value, sd, before, known))
+            numbers.append(number(j, name, found.value, found.sd, own[j], found.known))
+            if found.known:
+                own[j] = round_digits(found.value)
         remarks += target_remarks(j, model, robot)
-        if model.constant.known:
-            constants[j] = round_digits(model.constant.value)
-        if model.rotor.known:
-            rotor[j] = round_digits(model.rotor.value)
         if model.friction is not None:
             frictions[j], more = identified_friction(data, j, *model.friction, "targets")
             numbers += more
@@ -164,7 +162,7 @@ class ControllerTargets(NamedTuple):
 
 
 def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[ControllerModel]:
-    """The controller's model of every joint, by its targets, filtered like the motion."""
+    """The controller's model of every joint, by its filtered targets."""
     if robot.torque_constant is None:
         raise IdentificationError(
             f"robot {robot.name!r} has no torque constants, so its log has no target currents to "

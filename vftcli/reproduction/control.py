@@ -159,7 +159,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
 def released(
     _seed: int, *, robot: str, deviation: float, alphas: Sequence[float] = ()
 ) -> RunResult:
-    """Parameters of a table, and how the arm returns from `deviation` [m] by the law alone."""
+    """Parameters of a table; its return from a deviation [m] at rest."""
     arm, result = load_robot(robot), RunResult()
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):

@@ -206,7 +206,7 @@ def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence
 
 
 def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
-    """Errors joint by joint, lags, rms of the first, free cycle, the guidelines' facts."""
+    """Errors joint by joint, lags, free rms, and the guidelines' facts."""
     recording = simulate(load_scenario(scenario, ()), seed).recording
     robot, models, result = load_robot("ur5"), Runs(), RunResult()
     # The paper's difference: cycle by cycle, neither corrected nor filtered.

@@ -51,7 +51,7 @@ Result = RunResult | str  #: What a job gave, or the one line on why it failed.
 
 
 def jobs_of(paper: Paper, names: Sequence[str], fast: bool) -> list[Job]:
-    """Experiments of these items in the paper's order, once a seed; the first if `fast`."""
+    """Experiments of these items, once a seed; only the first if `fast`."""
     wanted = {e for name in names for e in paper.items[name].experiments}
     return [
         Job(paper.name, name, seed)

@@ -52,21 +52,15 @@ class Push(NamedTuple):
         return size * self.wrench
 
 
-class Segments:
-    """Pushes that follow one another, asked at times that never go back."""
+class Segments(NamedTuple):
+    """Pushes that follow one another, in their order."""
 
-    def __init__(self, pushes: list[Push], in_link: bool = False) -> None:
-        self.pushes = sorted(pushes, key=lambda p: p.start)
-        self.in_link = in_link
-        self.next = 0
+    pushes: Sequence[Push]
+    in_link: bool = False  #: Whether their wrenches are in the link's axes.
 
     def current(self, t: float) -> Push | None:
         """The push going on at time `t` [s], or None between two."""
-        while self.next < len(self.pushes) and self.pushes[self.next].stop <= t:
-            self.next += 1
-        if self.next < len(self.pushes) and self.pushes[self.next].start < t:
-            return self.pushes[self.next]
-        return None
+        return next((push for push in self.pushes if push.start < t < push.stop), None)
 
     def active(self, t: float) -> bool:
         """Whether a push is going on at time `t` [s]."""
@@ -214,7 +208,8 @@ def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Segm
     else:
         wrench, axes = np.concatenate([spec.force, spec.torque]), spec.axes
         check_known(axes, ("base", "link"), f"no axes {axes!r}")
-    pushes = [Push(a, b, spec.rise, spec.fall, wrench) for a, b in spec.spans]
+    spans = sorted(spec.spans, key=lambda span: span[0])
+    pushes = [Push(a, b, spec.rise, spec.fall, wrench) for a, b in spans]
     return Segments(pushes, in_link=axes == "link")
 
 

@@ -1,6 +1,6 @@
 """One simulated experiment from scenario and seed to the log and its truth."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,6 +35,12 @@ AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 Progress = Callable[[int, int], None]  #: Called with the steps done and the steps in all.
 
 
+def flat(name: str, values: Array, axes: Sequence[str] = ()) -> dict[str, Array]:
+    """Columns of values (M, k), called by their axes or by numbers from 1. (M,) each"""
+    labels = axes or [str(k) for k in range(1, values.shape[1] + 1)]
+    return {f"{name}/{label}": c for label, c in zip(labels, values.T, strict=True)}
+
+
 @dataclass(frozen=True, kw_only=True)
 class Truth:
     """What really happened at each sample, on the log's clock."""
@@ -48,12 +54,11 @@ class Truth:
 
     def columns(self) -> dict[str, Array]:
         """The columns of the truth file, flat, in order, t from the first sample. (M,) each"""
-        table = {"t": self.t}
-        table |= {f"tau_ext/{j}": c for j, c in enumerate(self.tau_ext.T, start=1)}
-        table |= {f"wrench/{a}": c for a, c in zip(AXES, self.wrench.T, strict=True)}
-        for name, values in (self.contacts | self.walks).items():
-            labels = AXES if name in self.contacts else range(1, values.shape[1] + 1)
-            table |= {f"contact/{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+        table = {"t": self.t} | flat("tau_ext", self.tau_ext) | flat("wrench", self.wrench, AXES)
+        for name, values in self.contacts.items():
+            table |= flat(f"contact/{name}", values, AXES)
+        for name, values in self.walks.items():
+            table |= flat(f"contact/{name}", values)
         return table
 
 

@@ -68,7 +68,7 @@ class TrueFriction:
         return dry
 
     def creep(self, dq: Array, dry: Array) -> tuple[Array, Array, Array]:
-        """What fades of the dry friction where joints give, its slope, what sticks. (n,) each"""
+        """Fading dry friction of joints that give, its slope, what sticks. (n,) each"""
         gives = self.presliding > 0.0
         fading, sign = np.where(gives, dry, 0.0), np.tanh(dq / CREEP)
         return fading * sign, fading * (1.0 - sign**2) / CREEP, np.where(gives, 0.0, dry)
@@ -100,7 +100,7 @@ class TrueFriction:
         return frozenset(name for name in SHAPES if getattr(self, name).any())
 
     def times(self, dry: Array, wet: Array) -> "TrueFriction":
-        """The friction, its offset apart, with other dry and viscous levels. (n,) each [1]"""
+        """Friction of other dry and viscous levels; the offset stays. (n,) each [1]"""
         levels = {**dict.fromkeys(DRY, dry), **dict.fromkeys(WET, wet)}
         return replace(self, **{name: getattr(self, name) * k for name, k in levels.items()})
 
@@ -157,7 +157,7 @@ def stated_friction(robot: Robot, spec: FrictionSpec) -> dict[str, Array]:
 
 
 def bends_of(joints: Sequence[JointFriction]) -> tuple[Array, Array]:
-    """Speeds at which bent lines bend, the change of slope there, or nothing. (K, n) each"""
+    """Speeds at which lines bend, their change of slope, or nothing. (K, n) each"""
     most = max(max(len(joint.speeds) for joint in joints) - 1, 0)
     bends, changes = np.zeros((2, most, len(joints)))
     for j, joint in enumerate(joints):

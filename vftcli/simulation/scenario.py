@@ -337,7 +337,7 @@ def section_from(cls: type[Section], table: Mapping[str, Any], where: str) -> Se
 
 
 def convert(value: Any, hint: Any, where: str) -> Any:  # noqa: ANN401 - TOML values
-    """A TOML value as the type that a field declares, a table as the section its `kind` names."""
+    """A TOML value as its field declares; its `kind` names a table's section."""
     items = get_args(hint)
     if get_origin(hint) in {Union, types.UnionType}:
         if tagged := {o.kind: o for o in items if hasattr(o, "kind")}:

@@ -23,7 +23,7 @@ USUAL_RATE = {"current": 125.0, "link_torque": 1000.0, "joint_torque": 500.0}
 
 @dataclass(frozen=True, kw_only=True)
 class Samples(JointSignals):
-    """The true signals at sampling instants, drive torque as the scenario averages it."""
+    """The true signals at sampling instants; torque averaged or not."""
 
     time: Array  #: True time of each sample. (M,) [s]
     stamp: Array  #: The same on the log's clock, before jitter. (M,) [s]

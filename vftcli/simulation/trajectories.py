@@ -62,7 +62,7 @@ class Periodic:
 
 @dataclass(frozen=True)
 class Stretches:
-    """Rest-to-rest stretches, each a path q(s) with minimum jerk, with rests between them."""
+    """Rest-to-rest paths q(s) with minimum jerk, with rests between them."""
 
     times: Array  #: Start and end of each stretch, in order. (K, 2) [s]
     #: Chebyshev coefficients of q over s in [−1, 1], one a stretch. (D, n) [rad]

@@ -16,7 +16,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
-from vftcli.simulation.experiment import AXES, Simulation, Truth
+from vftcli.simulation.experiment import AXES, Simulation, Truth, flat
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
@@ -102,7 +102,7 @@ class VendorTable(NamedTuple):
     decimals: int | None = None  # to which it is rounded before
 
     def write(self, path: Path, simulation: Simulation) -> None:
-        """Write the columns of the scenario's recipe; a UR log also has a flange sensor's."""
+        """Write the recipe's columns; a UR log also has its flange sensor's."""
         recipe = simulation.scenario.columns
         if recipe not in {"full", "short"}:
             raise ParameterError(f"columns is {recipe!r}; there is full, short")
@@ -146,8 +146,7 @@ def write_parquet(path: Path, simulation: Simulation) -> None:
     start = simulation.scenario.sensing.start
     columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
     for name, values in joint_signals(simulation).items():
-        labels = AXES if name == "wrench" else tuple(map(str, range(1, values.shape[1] + 1)))
-        columns |= {f"{name}/{a}": c for a, c in zip(labels, values.T, strict=True)}
+        columns |= flat(name, values, AXES if name == "wrench" else ())
     write_columns(path, {name: values[rows] for name, values in columns.items()})
 
 

@@ -92,7 +92,7 @@ def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
 
 
 def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
-    """`/franka_robot_state_broadcaster/robot_state`, signs as libfranka's; what is left is 0."""
+    """Franka's state topic, signs as libfranka's; other fields are zero."""
     samples, seen, vendor = simulation.samples, simulation.measured, simulation.vendor
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
     measured, desired = "measured_joint_state", "desired_joint_state"

@@ -59,7 +59,10 @@ def joint_signals(simulation: Simulation) -> dict[str, Array]:
 
 
 def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
-    """Signals of vendors' tables by name, to be called; the TCP is the flange. (M, …) each"""
+    """Signals of vendors' tables by name, to be called. (M, …) each
+
+    With no tool set the TCP is the flange.
+    """
     import pinocchio as pin
 
     samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
