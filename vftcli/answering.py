@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from vftcli.admittance.closed_loop import ClosedLoop
-    from vftcli.admittance.driving_force import DrivingForce
-    from vftcli.admittance.replay import Replay
+    from vftcli.admittance.replay import DrivingForce, Replay
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.logged_jacobian import JacobianJudgement
@@ -275,19 +274,19 @@ def force_of(
     stored: str | None,
 ) -> "DrivingForce":
     """The wrench that drives a replay: the log's own, a file's, an estimate's or a new one."""
-    from vftcli.admittance import driving_force
+    from vftcli.admittance import replay
 
     assert choice.wrench is not None, "`replayed` asks for one"
     if source == "sensor":
-        return driving_force.sensor_force(recording, robot, choice.wrench)
+        return replay.sensor_force(recording, robot, choice.wrench)
     if source is not None:
         truth = Path(source.removeprefix(FILE))
-        return driving_force.truth_force(recording, robot, choice.wrench, truth)
+        return replay.truth_force(recording, robot, choice.wrench, truth)
     if stored is not None:
-        return driving_force.stored_force(recording, robot, choice.wrench, stored)
+        return replay.stored_force(recording, robot, choice.wrench, stored)
     reading = analyse(recording, robot, choice).virtual_sensor
     assert reading is not None, "a wrench was asked for"
-    return driving_force.observed_force(reading)
+    return replay.observed_force(reading)
 
 
 def looped(

@@ -6,7 +6,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.admittance.driving_force import sensor_force, stored_force, truth_force
+from vftcli.admittance.replay import sensor_force, stored_force, truth_force
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError

@@ -48,7 +48,7 @@ def test_what_does_not_go_together_is_refused(words: dict[str, object]) -> None:
 
 
 def test_a_worker_s_memory_is_in_gigabytes() -> None:
-    assert WorkersChoice.parsed(jobs=1, settings={"cluster.memory-gb": "0.6"}).memory == 600_000_000
+    assert WorkersChoice.parsed(jobs=1, settings={"cluster.memory-gb": "0.6"}).memory_gb == 0.6
 
 
 def test_a_cluster_that_asks_nobody_for_a_certificate_is_refused_unless_accepted() -> None:

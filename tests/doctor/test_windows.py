@@ -129,8 +129,8 @@ def test_what_must_be_positive_is_left_out_where_it_is_not() -> None:
     found = solve(target, terms(columns, positive=True))
     assert found.values[1] == 0.0
     assert found.values[0] > 0
-    both = terms(columns[:, :, :1], positive=True).beside(terms(columns[:, :, 1:]))
-    np.testing.assert_allclose(solve(target, both).values, [2.0, -1.0], atol=1e-9)
+    both = terms(columns[:, :, :1], positive=True), terms(columns[:, :, 1:])
+    np.testing.assert_allclose(solve(target, *both).values, [2.0, -1.0], atol=1e-9)
 
 
 def test_a_column_that_nothing_shows_stays_at_its_prior() -> None:

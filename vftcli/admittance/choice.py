@@ -102,11 +102,7 @@ class ControlChoice(Choice):
 
     @property
     def settings(self) -> Mapping[str, Mapping[str, Any]]:
-        """The parameters that the user sets, by axis.
-
-        Raises:
-            ParameterError: If there is no such parameter, or a value is malformed.
-        """
+        """The parameters that the user sets, by axis."""
         from vftcli.admittance.parameters import parse_settings
 
         # What is named comes later, and so goes before it.

@@ -131,11 +131,7 @@ class OnlineKalman:
 
 
 class Loop:
-    """The controller's side of the loop: sensors, observer, phases, law, inverse kinematics.
-
-    Attributes:
-        interval: Sampling interval. [s]
-    """
+    """The controller's side of the loop: sensors, observer, phases, law, kinematics."""
 
     def __init__(
         self, arm: Arm, controller: Controller, observer: KalmanObserver, *, averaged: bool

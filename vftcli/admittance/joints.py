@@ -22,12 +22,7 @@ LARGEST_STEP = 0.2  #: Longest joint step of one iteration. [rad]
 
 
 class FlangeSolver:
-    """Joint positions that bring the flange to a pose, inside the joint limits.
-
-    Attributes:
-        robot: The arm.
-        lower, upper: Joint limits, infinite where unknown. (n,) [rad]
-    """
+    """Joint positions that bring the flange to a pose, inside the joint limits."""
 
     def __init__(self, robot: Robot) -> None:
         pin = needed("pinocchio", "an admittance replay")

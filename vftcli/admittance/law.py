@@ -134,12 +134,7 @@ class Verdict(NamedTuple):
     escape: Array
 
     def complaints(self, size: Array | float = np.inf) -> tuple[Remark, ...]:
-        """What makes it unstable, with the number that breaks.
-
-        Args:
-            size: Deviations of a release from rest; an axis without a speed limit that starts
-                inside the escape bound is left out. (6,) [m, rad]
-        """
+        """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
         where, found = Where(self.controller.name), list[Remark]()
         limited = np.isfinite(self.controller.parameters.speed_limit)
         # Without a speed limit the number is infinite, and the escape says what that means.

@@ -19,7 +19,7 @@ from vftcli.batch.annotation import (
 )
 from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Outcome, begin, run_tasks
-from vftcli.batch.datasets import DataFile, Dataset, ForceColumn, Single, Statistics
+from vftcli.batch.datasets import DataFile, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.copying import (
     RECORD,
     WORK,
@@ -42,6 +42,7 @@ TOGETHER = 16  #: Episodes that go to a worker together, and into one file of ro
 #: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
+Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes that a copy is made of.
 
 
 class FileTask(NamedTuple):
@@ -123,11 +124,7 @@ def annotate(
 
 
 def open_dataset(path: Path, columns: str | None = None) -> Dataset:
-    """The dataset at a path, a folder or an HDF5 file; `columns` is what ``--columns`` says of it.
-
-    Raises:
-        LogError: If it is none that forces can be written into.
-    """
+    """The dataset in a folder or HDF5 file; `columns` is what ``--columns`` says of it."""
     file = open_log(path)
     if FORMATS["lerobot"].recognises(file):
         return LeRobotDataset(path)

@@ -13,6 +13,7 @@ from vftcli.batch.cluster import begin
 from vftcli.batch.datasets import DataFile, ForceColumn, Single
 from vftcli.batch.datasets.copying import put_rows, stored_rows
 from vftcli.doctor.examination import Examiner
+from vftcli.doctor.signals import efforts_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import settling_samples
 from vftcli.observers.table import OBSERVERS
@@ -23,7 +24,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.errors import LogError, MissingSignalError, ParameterError, VftError
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.version import VERSION
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.choice import WrenchChoice
@@ -93,12 +94,7 @@ class EpisodesTask(NamedTuple):
 
 
 def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]:
-    """Estimate the forces of some episodes and put them into a file, unless they are there.
-
-    Returns:
-        Their results: ``episodes``, a record each; ``robot`` and ``observer``, those of the
-        first that could be done, or None.
-    """
+    """Records of some episodes, with robot and observer of the first; forces into a file."""
     if task.rows.is_file():
         return dict(json.loads(str(stored_rows(task.rows)["told"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
@@ -150,13 +146,13 @@ def check_signals(recording: Recording, *, anyway: bool) -> None:
             f"{recording.name}: no joint velocities. --set log.derive=dq makes them of positions "
             "over the complete episode, so that the forces are not causal, and that is recorded"
         )
-    efforts = [value for name in EFFORTS if (value := getattr(recording, name)) is not None]
+    efforts = efforts_of(recording)
     if not efforts:
         raise MissingSignalError(
             f"{recording.name}: no joint torques or currents, so no forces can be estimated; "
             "ports of DROID and Open X-Embodiment leave them out, DROID's raw release has them"
         )
-    for value in efforts if not anyway else ():
+    for _, value in efforts if not anyway else ():
         same = np.flatnonzero((value == value[0]).all(axis=0)) + 1
         if 2 * len(same) >= recording.joints:
             joints = ", ".join(f"J{joint}" for joint in same)

@@ -56,39 +56,31 @@ class WorkersChoice(Choice):
     def __post_init__(self) -> None:
         if len(self.tls) in {1, 2}:
             raise ParameterError("cluster.ca, cluster.cert and cluster.key are given together")
-        if self.address is not None:
-            self._check_address(self.address)
-        elif self.tls:
+        if self.address is None and self.tls:
             raise ParameterError(
                 "cluster.ca, cert and key are for a cluster; add --set cluster.address=ADDRESS"
             )
+        if self.address is not None and not ADDRESS.fullmatch(self.address):
+            raise ParameterError(
+                f"cluster.address={self.address} is no address, as tcp://host:8786 or "
+                "tls://host:8786"
+            )
+        if self.address is not None and self.address.startswith("tls") != bool(self.tls):
+            raise ParameterError(
+                "tls:// and cluster.ca, cluster.cert, cluster.key (all three) belong together"
+            )
+        if self.address is not None and self.jobs is not None:
+            raise ParameterError("a cluster has its own workers; leave --jobs out")
         if not self.in_process and not is_installed():
             raise ParameterError(
                 f"--jobs and cluster.address need Dask and cryptography: {EXTRA}, or --jobs 0"
             )
-
-    def _check_address(self, address: str) -> None:
-        if not ADDRESS.fullmatch(address):
-            raise ParameterError(
-                f"cluster.address={address} is no address, as tcp://host:8786 or tls://host:8786"
-            )
-        if address.startswith("tls") != bool(self.tls):
-            raise ParameterError(
-                "tls:// and cluster.ca, cluster.cert, cluster.key (all three) belong together"
-            )
-        if self.jobs is not None:
-            raise ParameterError("a cluster has its own workers; leave --jobs out")
 
     @property
     def tls(self) -> tuple[Path, ...]:
         """The files of the authority's certificate, the own certificate and its key, or none."""
         given = (self.ca, self.cert, self.key)
         return tuple(path for path in given if path is not None)
-
-    @property
-    def memory(self) -> int | None:
-        """Bytes that a worker of this machine may take before it is ended, None for its share."""
-        return None if self.memory_gb is None else int(self.memory_gb * 1e9)
 
     def check_closed(self, *, anyway: bool) -> None:
         """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""

@@ -176,7 +176,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
     # As many as this machine has cores and memory for.
     most = max(1, min(int(CPU_COUNT), int(MEMORY_LIMIT / MEMORY), MOST_WORKERS))
     workers = choice.jobs or most
-    memory = choice.memory or int(MEMORY_LIMIT / workers)
+    memory = int(1e9 * (choice.memory_gb or 0.0)) or int(MEMORY_LIMIT / workers)
     try:
         security = Security.temporary()
     except ImportError as error:

@@ -20,14 +20,7 @@ class Worker(distributed.Worker):  # type: ignore[misc, unused-ignore]
 
 
 def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> Any:  # noqa: ANN401
-    """A cluster of processes on this machine that only holders of its certificate reach.
-
-    Args:
-        workers: How many processes, of one thread each.
-        memory: What each may take before it is ended. [B]
-        security: The run's certificate and its key.
-        silence: Level of Python's logging below which Dask says nothing.
-    """
+    """Workers with so much memory [B] each, reached with the run's certificate alone."""
     where = {"host": "127.0.0.1", "protocol": "tls://", "security": security}
     worker = {
         "cls": distributed.Nanny,

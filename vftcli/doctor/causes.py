@@ -196,7 +196,7 @@ def tilted(case: Case) -> Iterator[Cause]:
     if case.misfit < UPRIGHT:
         return
     # No load beside gravity: they trade.
-    fit = solve(case.given - windows.inertial, terms(windows.gravity).beside(windows.friction))
+    fit = solve(case.given - windows.inertial, terms(windows.gravity), windows.friction)
     up, weight = fit.values[:3], float(np.linalg.norm(fit.values[:3]))
     angle = float(np.arctan2(np.linalg.norm(up[:2]), up[2]))
     if angle <= TILTED or not WEIGHT[0] < weight < WEIGHT[1]:
@@ -242,11 +242,11 @@ def shifted(case: Case) -> Iterator[Cause]:
     # With little motion to and fro an offset may be stiction.
     moves = (ways.min(axis=0) >= FORTH_AND_BACK) & (ways.sum(axis=0) >= BOTH)
     tried = np.max(np.abs(rests), axis=0) / case.effort_sizes > OFFSET / 2
-    by = case.windows.load.beside(case.windows.friction)
+    load, friction = case.windows.load, case.windows.friction
     for j in np.flatnonzero(tried & moves).tolist():
         column = np.zeros((*case.given.shape, 1))
         column[:, j] = 1.0
-        fit = solve(case.given - case.needed, terms(column).beside(by))
+        fit = solve(case.given - case.needed, terms(column), load, friction)
         offset, sd = float(fit.values[0]), float(fit.sd[0])
         change = offset * column[:, :, 0]
         if abs(offset) >= max(OFFSET * case.effort_sizes[j], SURE * sd) and case.lasts(fit, change):
@@ -260,7 +260,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     A wrong drive constant scales gravity and inertia; friction has any size beside it.
     """
     n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
-    fit = solve(case.given, terms(needed).beside(friction))
+    fit = solve(case.given, terms(needed), friction)
     factor, sd = float(fit.values[0]), float(fit.sd[0])
     # No load lightens an arm; a heavy one explains a factor above 1 too.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
@@ -269,7 +269,7 @@ def scaled(case: Case) -> Iterator[Cause]:
         # The rest is relative to the effort as logged.
         healed = replace(case, given=case.given / factor, size=case.size / factor)
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
-    fit = solve(case.given, terms(needed * np.eye(n)).beside(friction))
+    fit = solve(case.given, terms(needed * np.eye(n)), friction)
     factors, sds = fit.values[:n], fit.sd[:n]
     off = np.abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))

@@ -123,13 +123,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
 
 
 def isolated(x: Array, away: Array, step: float) -> Mask:
-    """Samples far from the median of nine around, a few in a row. (T, n)
-
-    Args:
-        x: A signal. (T, n)
-        away: Least distance, joint by joint. (n,)
-        step: Sample time. [s]
-    """
+    """A few samples (T, n) in a row farther than `away` (n,) from the median of nine around."""
     found = np.zeros(x.shape, dtype=bool)
     for j, column in enumerate(x.T):
         change = np.abs(np.diff(column))

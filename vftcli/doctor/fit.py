@@ -16,12 +16,12 @@ import numpy as np
 from vftcli.doctor.causes import AMBIGUOUS, RANGE, Cause, Diagnosis, case_of, diagnose, is_modelled
 from vftcli.doctor.lateness import MISTIMED
 from vftcli.doctor.load import declared_payload, load_remarks
-from vftcli.doctor.signals import inverted_effort
+from vftcli.doctor.signals import efforts_of, inverted_effort
 from vftcli.doctor.windows import Case, Windows, size_of, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
 from vftcli.robots.pairing import paired
 from vftcli.signals.errors import RobotError
-from vftcli.signals.recording import EFFORTS, Recording
+from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 
 CLOSE = 1.3  #: Smaller ratios of misfits do not distinguish profiles.
@@ -127,19 +127,13 @@ def is_judgeable(recording: Recording) -> bool:
     """Whether a log is long enough, and its numbers are those of an arm."""
     if recording.dq is None or recording.samples < 10 or not 1e-2 < recording.duration < 1e9:
         return False
-    effort = [x for name in EFFORTS if (x := getattr(recording, name)) is not None]
+    sizes = [np.abs(x).max() for _, x in efforts_of(recording)]
     motion = max(np.abs(recording.q).max(), np.abs(recording.dq).max())
-    return bool(motion < 1e4 and all(1e-9 < np.abs(x).max() < 1e9 for x in effort))
+    return bool(motion < 1e4 and all(1e-9 < size < 1e9 for size in sizes))
 
 
 def match_of(recording: Recording, robot: Robot, ignored: Sequence[int] = ()) -> RobotMatch | None:
-    """Robot's fit to the log's best torque; None without any or of other joints.
-
-    Args:
-        recording: The log.
-        robot: The robot.
-        ignored: Joints, from zero, with an effort that is no evidence.
-    """
+    """Robot's fit to the log's best torque, some joints ignored; None of other joints."""
     if recording.joints != robot.joints:
         return None
     windows = windows_of(recording, robot)

@@ -100,11 +100,7 @@ class Lateness(NamedTuple):
     effort: Array  #: Mean effort in the window from each sample. (T', n)
 
     def rest(self, rate: float = 0.0) -> Array:
-        """Rest of each joint's effort at every lag; NaN at rest. (n, L)
-
-        Args:
-            rate: Growth of the lag, from these lags at the log's start. [s/s]
-        """
+        """Rest of each joint's effort at lags that grow by a rate [s/s]; NaN at rest. (n, L)"""
         tried = np.round(self.lags[:, None] / self.step + rate * self.when / self.step).astype(int)
         rows = np.clip(self.starts[:, None] + tried, 0, len(self.effort) - 1)
         change = self.effort[rows[1]] - self.effort[rows[0]]
@@ -199,12 +195,7 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
 
 
 def rest_of(model: Array, effort: Array) -> Array:
-    """Rest of an effort at every lag, rms over its better samples. (L,)
-
-    Args:
-        model: Parts of the effort. (W, 4)
-        effort: The effort at every lag. (W, L)
-    """
+    """Rest (L,) of an effort (W, L) at every lag by its parts (W, 4), of better samples."""
     size = np.sqrt(np.mean(model**2, axis=0))
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), dtype=bool)

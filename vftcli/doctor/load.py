@@ -105,7 +105,7 @@ def load_change(case: Case) -> Remark | None:
         """Fit by friction, a load before a window and another from it on."""
         late = (np.arange(count) >= split)[:, None, None]
         before, after = (load._replace(columns=load.columns * mask) for mask in (~late, late))
-        return solve(case.given - case.needed, before.beside(after).beside(case.windows.friction))
+        return solve(case.given - case.needed, before, after, case.windows.friction)
 
     if with_two_loads(count // 2).size > HALVES * case.loaded.size:
         return None
@@ -220,13 +220,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
 
 
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
-    """Joints far from their model's temperature, without a friction law there.
-
-    Args:
-        recording: The log.
-        robot: The arm.
-        temperature: Its joint temperatures, NaN where not measured. (T, n) [°C]
-    """
+    """Joints with a temperature (T, n) [°C], NaN unknown, far from the model's."""
     far: dict[str, list[tuple[int, float, float, float]]] = {}
     speeds = np.abs(recording.require("dq"))
     for j, joint in enumerate(robot.friction):

@@ -70,7 +70,7 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
     """Signals that are missing, of odd units or interpolated, each check independent."""
     if recording.dq is None:
         yield warning("no-velocity")
-    if all(getattr(recording, name) is None for name in EFFORTS):
+    if not efforts_of(recording):
         yield warning("no-effort")
     # Radians and ampere are never so large. The last joint of some arms turns without end.
     largest = float(np.max(np.abs(recording.q[:, : max(1, recording.joints - 1)])))
@@ -130,8 +130,8 @@ def work_shares(recording: Recording, effort: Array) -> Array:
 
 def effort_of(recording: Recording) -> tuple[str, Array] | None:
     """Name and values of the log's effort: torque before current."""
-    signals = ((name, getattr(recording, name)) for name in ("torque", "current"))
-    return next(((name, value) for name, value in signals if value is not None), None)
+    efforts = dict(efforts_of(recording))
+    return next(((name, efforts[name]) for name in ("torque", "current") if name in efforts), None)
 
 
 def inverted_effort(recording: Recording) -> Iterator[Remark]:
@@ -251,8 +251,8 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
     """Long repeats of one joint's signal while its others change, as above."""
     t, value = recording.t, getattr(recording, name)
     same = value[1:] == value[:-1]
-    names = [n for n in ("q", "dq", *EFFORTS) if n != name]
-    others = [x for n in names if (x := getattr(recording, n)) is not None]
+    signals = (getattr(recording, n) for n in ("q", "dq", *EFFORTS) if n != name)
+    others = [x for x in signals if x is not None]
     for j in range(value.shape[1]):
         # A run of steps that change nothing ends with the sample behind its last step.
         first, last = edges_of(same[:, j])
@@ -295,8 +295,11 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
         zeros[name] = zero & ~value.any(axis=0) if zero.any() else zero
     for name, value in efforts_of(recording):
         zero = zeros[name]
-        # Without noise a joint that never moves may need no torque at all.
-        measured = zero.all() or is_noisy(value[:, ~zero])
+        # Without noise a joint that never moves may need no torque at all: most columns of a
+        # sensor are rougher than motion. Steps of white noise differ by √3 times their own size.
+        steps = np.diff(value[:, ~zero], axis=0)
+        rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
+        measured = zero.all() or np.mean(rough) > 0.5
         odd = zero if measured else zero & (travel_of(recording) >= TRAVEL)
         if odd.any():
             yield warning("zero-effort", on_joints(odd), signal=name)
@@ -308,24 +311,8 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
             yield level(f"zero-{name.replace('_', '-')}{beside}")
 
 
-def is_noisy(value: Array) -> bool:
-    """Whether most columns of a signal are rougher than motion: they were measured.
-
-    Steps of white noise differ by √3 times their own size.
-    """
-    steps = np.diff(value, axis=0)
-    rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
-    return bool(np.mean(rough) > 0.5)
-
-
 def is_clipped(value: Array, position: Array, least: int) -> bool:
-    """Whether an effort stays exactly at its extreme while the joint moves.
-
-    Args:
-        value: An effort that may vary. (T,)
-        position: The joint's position: a joint that is held needs one effort. (T,) [rad]
-        least: Samples in a row.
-    """
+    """Whether an effort (T,) stays at its extreme for `least` samples of motion."""
     size = np.ptp(value)
     for up in (value, -value):
         extreme = up.max()

@@ -103,14 +103,7 @@ def velocity_fit(recording: Recording) -> VelocityFit | None:
 
 
 def joint_fit(v: Array, logged: Array, w: Array, logged_w: Array) -> Array:
-    """The first seven fields of `VelocityFit` for one joint. (7,)
-
-    Args:
-        v: Derivative of the position. (W,) [rad/s]
-        logged: Logged velocity. (W,) [rad/s]
-        w: −v̇ by the position. (W,) [rad/s²]
-        logged_w: −q̈ by the velocity. (W,) [rad/s²]
-    """
+    """The first seven fields of `VelocityFit`, from one joint's `weighed_means`. (7,)"""
     size, total = v @ v, logged @ logged
     rest, turn, tool = (x - v * (v @ x) / size for x in (logged, w, logged_w))
     # Positions' noise would hide a lag; velocities' noise is independent.
@@ -302,13 +295,7 @@ STALE = 0.003  #: Share of rows that repeat the one before, from which it is wor
 def clock_findings(
     recording: Recording, fit: VelocityFit | None, part: Recording | None = None
 ) -> Iterator[Remark]:
-    """Findings about the clock, each check independent of the others.
-
-    Args:
-        recording: The log.
-        fit: How its velocities fit its positions.
-        part: Stretches of it where all signals have no room; None for all of it.
-    """
+    """Findings about the clock, and on repeated rows in a part of the log or all of it."""
     common = common_cause(fit)
     if common is not None and common.code in {"time-unit", "clock-rate"}:
         yield common

@@ -43,14 +43,6 @@ class Terms(NamedTuple):
     positive: Mask  #: Coefficients that only make sense above zero, as friction's do. (k,)
     prior: Array  #: Standard deviation that a coefficient has before any data; inf for none. (k,)
 
-    def beside(self, other: "Terms") -> "Terms":
-        """These terms and others."""
-        return Terms(
-            np.concatenate([self.columns, other.columns], axis=2),
-            np.append(self.positive, other.positive),
-            np.append(self.prior, other.prior),
-        )
-
 
 def terms(columns: Array, *, positive: bool = False, prior: Array | float = np.inf) -> Terms:
     """Terms that are all alike."""
@@ -77,18 +69,15 @@ class RobustFit(NamedTuple):
         return np.asarray(np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0)))
 
 
-def solve(target: Array, by: Terms) -> RobustFit:
-    """Fit of a torque by some terms, the windows that fit worst left out.
-
-    Args:
-        target: The torque. (W, n) [N·m]
-        by: The terms; their priors weigh beside a scatter of 1 N·m.
-    """
-    columns = by.columns
+def solve(target: Array, *by: Terms) -> RobustFit:
+    """Fit of a torque (W, n) [N·m] by terms, priors beside 1 N·m, worst windows left out."""
+    columns = np.concatenate([part.columns for part in by], axis=2)
+    positive = np.concatenate([part.positive for part in by])
     across = columns.swapaxes(1, 2)
     gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
     used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
-    kept, prior = np.ones(len(target), dtype=bool), np.diag(by.prior**-2)
+    kept = np.ones(len(target), dtype=bool)
+    prior = np.diag(np.concatenate([part.prior for part in by]) ** -2)
 
     def inverse() -> Array:
         return inverse_of((gram[kept].sum(axis=0) + prior)[np.ix_(used, used)])
@@ -97,7 +86,7 @@ def solve(target: Array, by: Terms) -> RobustFit:
         values = np.zeros(len(used))
         values[used] = inverse() @ moment[kept].sum(axis=0)[used]
         # Friction that would drive the arm is another error in disguise: it is left out.
-        wrong = by.positive & (values < 0)
+        wrong = positive & (values < 0)
         used &= ~wrong
         values[wrong] = 0.0
         rest = target - columns @ values
@@ -273,7 +262,7 @@ class Case:
     @cached_property
     def loaded(self) -> RobustFit:
         """Fit by a load on the flange, its four coefficients first, and friction."""
-        return solve(self.given - self.needed, self.windows.load.beside(self.windows.friction))
+        return solve(self.given - self.needed, self.windows.load, self.windows.friction)
 
     @property
     def carries_load(self) -> bool:
@@ -311,12 +300,7 @@ class Case:
         return float(np.ptp(self.gravity, axis=0).max())
 
     def lasts(self, cause: RobustFit, change: Array) -> bool:
-        """Whether a cause is there all the time, as no push and no carried object is.
-
-        Args:
-            cause: The fit with it.
-            change: What it changes of the torque. (W, n) [N·m]
-        """
+        """Whether a cause's change (W, n) [N·m] is always there, as no push and no object is."""
         size = np.linalg.norm(change, axis=1)
         felt = size > FELT * cause.size * np.sqrt(change.shape[1])
         without = np.linalg.norm(cause.rest + change, axis=1)

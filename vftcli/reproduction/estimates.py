@@ -8,9 +8,8 @@ import numpy as np
 import polars as pl
 
 from vftcli.admittance.choice import ControlChoice
-from vftcli.admittance.driving_force import stored_force
 from vftcli.admittance.motion import SHARES, Drag, return_time
-from vftcli.admittance.replay import Replay, replay
+from vftcli.admittance.replay import Replay, replay, stored_force
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
 from vftcli.evaluation.published import facts

@@ -1,8 +1,8 @@
 """Datasets: episodes of LeRobot, DROID and other HDF5, written back with forces in them."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,27 +36,3 @@ class DataFile(NamedTuple):
 Forces = Mapping[int, Mapping[str, Single]]
 Statistics = Mapping[str, NDArray[Any]]  #: Key of a statistic, as mean → its values. (width,)
 OfEpisodes = Mapping[int, Mapping[str, Statistics]]  #: Episode → name of a column → its statistics.
-
-
-class Dataset(Protocol):
-    """A folder of episodes that a copy is made of."""
-
-    folder: Path
-    has_statistics: bool
-
-    def files(self) -> Iterator[DataFile]:
-        """The data files with their episodes."""
-
-    def frames(self, file: DataFile, number: int) -> int:
-        """Number of frames of an episode, even of one unreadable as a log."""
-
-    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
-        """Refuse a file that has such columns already."""
-
-    def write(
-        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
-    ) -> None:
-        """Write a data file with the columns added."""
-
-    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
-        """Write the descriptions of the copy, where everything else is, that name its columns."""

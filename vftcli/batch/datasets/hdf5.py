@@ -22,13 +22,7 @@ def files_below(folder: Path) -> list[Path]:
 
 
 class Hdf5Dataset:
-    """HDF5 files of one episode or many: DROID's, ALOHA's, any.
-
-    Args:
-        folder: The folder in which they are, at any depth.
-        only: The only one of them that is meant, or None for all.
-        columns: What ``--columns`` says of them, or None.
-    """
+    """HDF5 files of one episode or many: DROID's, ALOHA's, any; a folder's or one alone."""
 
     has_statistics = False
 

@@ -4,7 +4,7 @@ Statistics of a column are kept of each episode, and of all episodes together.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -33,12 +33,7 @@ KEYS = ("min", "max", "mean", "std", "count", *QUANTILES)  #: All keys.
 
 
 class LeRobotDataset:
-    """A dataset of version 2 (an episode a file) or 3 (many).
-
-    Attributes:
-        folder: Its folder.
-        has_statistics: Whether statistics of its columns are kept: they are.
-    """
+    """A dataset of version 2 (an episode a file) or 3 (many)."""
 
     has_statistics = True
 
@@ -120,26 +115,13 @@ class LeRobotDataset:
         write_json(copy / "meta" / "info.json", info)
         for path in sorted((self.folder / "meta" / "episodes").rglob("*.parquet")):
             self._finish_episodes(path, columns, statistics, copy)
-        described = {"stats.json": self._finish_stats, "episodes_stats.jsonl": self._finish_lines}
-        for name, write in described.items():
+        for name, write in (("stats.json", finish_stats), ("episodes_stats.jsonl", finish_lines)):
             path = self.folder / "meta" / name
             if path.is_file():
                 try:
-                    write(path, columns, statistics, copy)
+                    write(text_of(path), columns, statistics, copy / "meta" / name)
                 except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
                     raise LogError(f"{path}: holds no statistics; mend or remove it") from None
-
-    def _finish_stats(
-        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
-    ) -> None:
-        """Write stats.json, of the whole dataset."""
-        stats = json.loads(text_of(path))
-        # Older ones have no quantiles.
-        keys = tuple(next(iter(stats.values()))) if stats else KEYS
-        for column in columns:
-            whole = pooled([of_episode[column.name] for of_episode in statistics.values()])
-            stats[PREFIX + column.name] = plain(whole, keys)
-        write_json(copy / "meta" / path.name, stats)
 
     def _finish_episodes(
         self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
@@ -150,8 +132,7 @@ class LeRobotDataset:
         with guarded(path):
             source = pq.ParquetFile(path)
             table = source.read()
-        parts = [name.split("/") for name in table.column_names if name.startswith("stats/")]
-        kinds = {part[-1]: table.schema.field("/".join(part)).type for part in parts[::-1]}
+        kinds = {n.rpartition("/")[2] for n in table.column_names if n.startswith("stats/")}
         numbers = table.column(EPISODE).to_pylist()
         for column in columns:
             for key in (key for key in KEYS if key in kinds):
@@ -163,19 +144,32 @@ class LeRobotDataset:
         target.parent.mkdir(parents=True, exist_ok=True)
         pq.write_table(table, target, compression=codec_of(source))
 
-    def _finish_lines(
-        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
-    ) -> None:
-        """Write episodes_stats.jsonl, the statistics of version 2.1."""
-        lines = []
-        for line in filter(str.strip, text_of(path).splitlines()):
-            told = json.loads(line)
-            keys = tuple(next(iter(told["stats"].values()))) if told["stats"] else KEYS
-            for column in columns:
-                own = statistics[int(told[EPISODE])][column.name]
-                told["stats"][PREFIX + column.name] = plain(own, keys)
-            lines.append(json.dumps(told, ensure_ascii=False) + "\n")
-        (copy / "meta" / path.name).write_text("".join(lines), encoding="utf-8")
+
+def finish_stats(
+    text: str, columns: Sequence[ForceColumn], statistics: OfEpisodes, target: Path
+) -> None:
+    """Write stats.json, of the whole dataset."""
+    stats = json.loads(text)
+    known = next(iter(stats.values()), KEYS)  # older ones have no quantiles
+    for column in columns:
+        whole = pooled([of_episode[column.name] for of_episode in statistics.values()])
+        stats[PREFIX + column.name] = plain(whole, known)
+    write_json(target, stats)
+
+
+def finish_lines(
+    text: str, columns: Sequence[ForceColumn], statistics: OfEpisodes, target: Path
+) -> None:
+    """Write episodes_stats.jsonl, the statistics of version 2.1."""
+    lines = []
+    for line in filter(str.strip, text.splitlines()):
+        told = json.loads(line)
+        known = next(iter(told["stats"].values()), KEYS)
+        for column in columns:
+            own = statistics[int(told[EPISODE])][column.name]
+            told["stats"][PREFIX + column.name] = plain(own, known)
+        lines.append(json.dumps(told, ensure_ascii=False) + "\n")
+    target.write_text("".join(lines), encoding="utf-8")
 
 
 def episode_numbers(source: Any) -> Any:  # noqa: ANN401 - a ParquetFile → an array
@@ -191,9 +185,9 @@ def codec_of(source: Any) -> str:  # noqa: ANN401 - a ParquetFile
     return "none" if codec == "uncompressed" else codec
 
 
-def plain(statistics: Statistics, keys: Sequence[str]) -> dict[str, list[Any]]:
-    """Some statistics as JSON holds them."""
-    return {key: statistics[key].tolist() for key in keys if key in statistics}
+def plain(statistics: Statistics, known: Iterable[str]) -> dict[str, list[Any]]:
+    """The statistics of some keys as JSON holds them."""
+    return {key: statistics[key].tolist() for key in known if key in statistics}
 
 
 def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON holds
