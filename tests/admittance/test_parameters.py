@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.law import controllers
 from vftcli.admittance.parameters import (
     AXES,
     from_table,
-    is_admittance_setting,
     parse_settings,
     release_deviation,
 )
@@ -52,8 +52,8 @@ def test_assignments_reach_their_axes() -> None:
 def test_which_assignments_are_ours() -> None:
     ours = ["xi=1", "admittance.xi=1", "position.mass=3", "rz.threshold=4"]
     theirs = ["kfo.noise_convention=discrete", "gmo.gain=30"]
-    assert all(map(is_admittance_setting, ours))
-    assert not any(map(is_admittance_setting, theirs))
+    assert all(map(ControlChoice.takes, ours))
+    assert not any(map(ControlChoice.takes, theirs))
 
 
 @pytest.mark.parametrize(

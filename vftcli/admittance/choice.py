@@ -119,9 +119,10 @@ class ControlChoice(Choice):
     @classmethod
     def takes(cls, name: str) -> bool:
         """Whether a name is a setting of the replay, or a parameter as ``rz.threshold``."""
-        from vftcli.admittance.parameters import is_admittance_setting
+        from vftcli.admittance.parameters import GROUPS
 
-        return super().takes(name) or is_admittance_setting(name)
+        section, dot, _ = name.rpartition(".")
+        return super().takes(name) or not dot or section in GROUPS
 
     def start_pose(self, robot: "Robot") -> "Array":
         """Joint positions of a release's target pose: as set, else the robot file's. (n,) [rad]"""

@@ -73,9 +73,6 @@ class OnlineKalman:
     A mean torque over the sampling interval enters as it is: the trapezoid over two is half a
     sample late, which turns every jerk of the arm into a false force. An instantaneous one enters
     by the trapezoid, as the rest of μ: the numbers are those of `KalmanObserver.estimate`.
-
-    Attributes:
-        tau: The estimate now. (n,) [N·m]
     """
 
     def __init__(
@@ -228,19 +225,10 @@ def run_closed_loop(
     anyway: bool = False,
     progress: Progress | None = None,
 ) -> ClosedLoop:
-    """Run a scenario's contacts against an arm under admittance control.
+    """A scenario's contacts against an arm under admittance control, from the trajectory's start.
 
-    The arm starts where the trajectory does; where it goes is the controller's doing.
-
-    Args:
-        scenario: The experiment: arm, contacts, friction, mismatch, sensing.
-        controller: The controller; its period is the control period.
-        observer: The Kalman filter of the virtual sensor.
-        seed: Seed of everything drawn; the scenario's own if not given.
-        torque: "average" over the sampling interval, or the last "instant".
-        zero: Unloaded span, None for none: the arm holds still, its mean wrench is removed. [s]
-        anyway: Run unstable settings too.
-        progress: Told how far the run is.
+    The torque is the "average" over the sampling interval, or the last "instant". In the unloaded
+    span `zero` [s] the arm holds still, and its mean wrench is removed.
     """
     if torque not in {"average", "instant"}:
         raise ParameterError(f"torque is {torque!r}; it is average or instant")

@@ -200,16 +200,9 @@ def judge(controller: Controller) -> Verdict:
 def check_stable(
     controllers: Sequence[Controller], *, anyway: bool = False, release: Array | None = None
 ) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
-    """Judge controllers before they run, and refuse what would be unstable.
+    """Verdicts on controllers before they run and all that is wrong; what is unstable is refused.
 
-    Args:
-        controllers: The controllers.
-        anyway: Run them all the same, for study.
-        release: The deviation of a release from rest, if they run for that alone: an axis that
-            starts inside the escape bound needs no speed limit. (6,) [m, rad]
-
-    Returns:
-        Their verdicts, and all that is wrong with them.
+    An axis that starts a release (6,) [m, rad] inside the escape bound needs no speed limit.
     """
     verdicts = tuple(map(judge, controllers))
     # Under a hand any deviation can come about; only a release has a size.

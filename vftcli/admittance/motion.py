@@ -79,10 +79,7 @@ class AxisMotion:
 class Recursion:
     """The state of N controllers and one step of their motion, semi-implicit Euler (49)–(51).
 
-    Attributes:
-        x: Deviations. (N, 6) [m, rad]
-        v: Velocities. (N, 6) [m/s, rad/s]
-        clipped: Whether the speed limit acted in the last step. (N, 6)
+    Deviations x [m, rad], velocities v [m/s, rad/s] and where the speed limit acted are (N, 6).
     """
 
     def __init__(
@@ -139,14 +136,8 @@ def run(
 ) -> AxisMotion:
     """The motion under one force record, each axis in the phase the record puts it in.
 
+    Force (T, 6) [N, N·m] and phases (T, 6) are those of `Phases`, the start that of `Recursion`.
     A law that escapes in finite time ends in infinities, which `AxisMotion.escaped` tells.
-
-    Args:
-        controllers: The controllers, all with the same control period.
-        force: Force that enters the law. (T, 6) [N, N·m]
-        dragged: Phases. (T, 6)
-        x: Deviations at the start. (N, 6) or (6,) [m, rad]
-        v: Velocities at the start. (N, 6) or (6,) [m/s, rad/s]
     """
     state = Recursion(controllers, x, v)
     shape = (len(force) + 1, len(controllers), 6)

@@ -119,12 +119,9 @@ def from_table(
     robot: str,
     settings: Mapping[str, Mapping[str, Any]],
 ) -> Admittance:
-    """Build the parameters from a robot file's ``[admittance]`` and the user's assignments.
+    """The parameters of a robot file's ``[admittance]``, over which the user's settings win.
 
-    Args:
-        table: The section, empty if the file has none.
-        robot: The robot's name, for messages.
-        settings: Section (a key of `GROUPS`) → parameter → value; they win over the file.
+    Settings are section (a key of `GROUPS`) → parameter → value.
 
     Raises:
         ParameterError: If a parameter is missing for an axis, unknown or out of range.
@@ -185,12 +182,6 @@ def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
             given = set_value("inf" if endless else value, text)
         settings.setdefault(section, {})[name] = given
     return settings
-
-
-def is_admittance_setting(name: str) -> bool:
-    """Whether a setting is one of the admittance's parameters."""
-    section, dot, _ = name.rpartition(".")
-    return not dot or section in GROUPS
 
 
 def release_deviation(assignments: Sequence[str]) -> Array:

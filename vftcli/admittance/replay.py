@@ -92,17 +92,10 @@ def replay(
     source: Remark,
     anyway: bool = False,
 ) -> Replay:
-    """Run a log's wrench through controllers that hold the arm at the log's first pose.
+    """Motions of controllers that hold the arm at a log's first pose, by the log's wrench.
 
-    Args:
-        wrench: Force on the robot and moment about the flange point, in base axes; samples in which
-            it is not known count as no force.
-        q: Joint positions of the log's arm, on the wrench's clock. (T, n) [rad]
-        robot: The arm.
-        parameters: Thresholds and control period, shared by the controllers.
-        controllers: The controllers.
-        source: Where the wrench comes from.
-        anyway: Run unstable settings too.
+    The wrench is in base axes about the flange point, and counts as none where it is not known;
+    q are the log's joint positions on its clock. (T, n) [rad]
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))

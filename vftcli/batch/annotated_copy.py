@@ -67,10 +67,8 @@ def annotate(
     """Write a copy of a dataset with the forces of every frame.
 
     Frames without an estimate stop the run, or are filled with zeros and marked where the choice
-    goes on anyway; `force` is whether an earlier copy may be replaced.
-
-    Returns:
-        What ``meta/vftcli.json`` holds.
+    goes on anyway; `force` is whether an earlier copy may be replaced. What comes back is the
+    content of ``meta/vftcli.json``.
     """
     dataset = open_dataset(path, choice.read.columns)
     check_copy(path, copy, force=force)
@@ -139,17 +137,13 @@ def open_dataset(path: Path, columns: str | None = None) -> Dataset:
 
 
 class Plan:
-    """The work on a dataset, planned while workers already do the first of it.
-
-    Attributes:
-        rows: Data file → the files in which its episodes' columns are.
-        sources: Data file → its sha256.
-    """
+    """The work on a dataset, planned while workers already do the first of it."""
 
     def __init__(self, dataset: Dataset, work: Path, key: str) -> None:
         self._dataset, self._work, self._key = dataset, work, key
+        #: Data file → the files in which its episodes' columns are.
         self.rows: dict[DataFile, list[Path]] = {}
-        self.sources: dict[str, str] = {}
+        self.sources: dict[str, str] = {}  #: Data file → its sha256.
 
     def groups(self, columns: list[ForceColumn]) -> Iterator[list[EpisodesTask]]:
         """The episodes in groups that go to a worker together."""

@@ -112,12 +112,9 @@ class BatchRun:
             yield group
 
     def run(self, *, force: bool) -> "tuple[pl.DataFrame, BatchCount]":
-        """Do what is left of the batch, and gather all of it.
+        """Why logs failed (log, key, stage, error, line) and how many, once all is done.
 
         `force` is whether a batch with other options may be gone on with.
-
-        Returns:
-            Why logs failed (columns log, key, stage, error, line), and how many did.
         """
         record = {"command": self.command, "do": self.job.do, "versions": versions()}
         with self.folder.opened(self.options, record, force=force):
