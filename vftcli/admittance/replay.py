@@ -28,12 +28,13 @@ from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
 from vftcli.signals.pose import log_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
-from vftcli.signals.wrench import ExternalTorque, Wrench
+from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
 from vftcli.virtual_sensor.log_wrench import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
