@@ -61,9 +61,9 @@ FILES = (
     "readers/",
     "reproduction/paper.py",  # what a paper prints
     "robots/robot.py",
+    "robots/described.py",
     "robots/robot_file.py",
     "robots/writing.py",
-    "robots/xml_text.py",
     "signals/remarks.py",  # the catalogue of words
     "simulation/scenario.py",
     "simulation/writers/",

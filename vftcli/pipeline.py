@@ -20,9 +20,8 @@ from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs
 from vftcli.signals.errors import MissingSignalError, ParameterError, VftError
-from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.progress import no_stage
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis

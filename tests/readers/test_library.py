@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 import vftcli.readers.reading
 from vftcli.readers.library import Library, absolute, labelled
 from vftcli.readers.reader import ReadChoice
-from vftcli.signals.identity import same_run
+from vftcli.signals.recording import same_run
 
 NAMES = st.sampled_from(["log.csv", "a", "b", "run1"])
 PATHS = st.lists(NAMES, min_size=1, max_size=4).map(lambda parts: Path("/", *parts))

@@ -13,9 +13,9 @@ import pytest
 from made_urdfs import agrees_with_pinocchio
 
 from vftcli.robots import load_robot
-from vftcli.robots.arm import ArmSearch
+from vftcli.robots.arm import LumpedArm
+from vftcli.robots.described import xml_root
 from vftcli.robots.urdf import urdf_tree
-from vftcli.robots.xml_text import xml_root
 from vftcli.signals.errors import RobotError
 
 LOADED = {
@@ -133,7 +133,7 @@ def test_each_of_two_arms_is_taken_by_its_tip(name: str) -> None:
     with pytest.raises(RobotError, match=f"--tip {left} or --tip {right}$"):
         load_robot(path)
     tree = urdf_tree(path, xml_root(path.read_text(encoding="utf-8"), path))
-    one, other = (ArmSearch(tree, frozenset()).find(tip).joints for tip in (left, right))
+    one, other = (LumpedArm(tree, tip).joints for tip in (left, right))
     assert len(one) == len(other) >= 5
     assert one[-1].child == left
     assert other[-1].child == right

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from made_urdfs import arm, fixed, link, robot, written
 
-from vftcli.robots import load_robot, xml_text
+from vftcli.robots import described, load_robot
 from vftcli.signals.errors import RobotError
 
 HEAD = """<robot name="$(arg name)" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -112,7 +112,7 @@ def test_a_xacro_that_never_ends_is_ended(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """9^9^9 has 370 million digits: hours of a processor, in one step of the interpreter."""
-    monkeypatch.setattr(xml_text, "SECONDS", 1)
+    monkeypatch.setattr(described, "SECONDS", 1)
     path = written(tmp_path, xacro("${9**9**9}"), name)
     with pytest.raises(RobotError, match="cannot be expanded within 1 s of a processor"):
         load_robot(f"{path} name:=made")

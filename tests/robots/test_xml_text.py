@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.robots.xml_text import DEEPEST, xml_root
+from vftcli.robots.described import DEEPEST, xml_root
 from vftcli.signals.errors import RobotError
 
 BOMB = (

@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.identity import refuse_repeated_logs, refuse_repeated_runs, same_run
-from vftcli.signals.recording import Recording, Source
+from vftcli.signals.recording import (
+    Recording,
+    Source,
+    refuse_repeated_logs,
+    refuse_repeated_runs,
+    same_run,
+)
 
 
 def recording(sha256="", label="", rows=3, t0=0.0):

@@ -25,8 +25,7 @@ from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
 from vftcli.robots.robot import Robot
 from vftcli.robots.writing import robot_document
-from vftcli.signals.identity import refuse_repeated_logs
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 #: Name at the command line → method; without a name the first two are chosen between.
 FITS: dict[str | None, Callable[[Training], MethodResult]] = {

@@ -20,8 +20,13 @@ from vftcli.identification.processing import (
     prepare,
     rigid_torque,
 )
-from vftcli.robots.friction import SMOOTHING, bent_line, coulomb_logarithmic, friction_factor
-from vftcli.robots.profile import FRICTION_KEYS
+from vftcli.robots.friction import (
+    FRICTION_MODELS,
+    SMOOTHING,
+    bent_line,
+    coulomb_logarithmic,
+    friction_factor,
+)
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.robots.running_friction import measured_temperature, play
 from vftcli.robots.terms import uses_current
@@ -103,7 +108,7 @@ class Shape(NamedTuple):
         if "presliding" in self.terms:
             parameters["presliding_length"] = self.presliding_length
         # A dry torque that is all presliding's leaves none to what slides.
-        required, _ = FRICTION_KEYS[self.model]
+        required = FRICTION_MODELS[self.model].required
         parameters = {**dict.fromkeys(required, 0.0), **parameters}
         return JointFriction(
             model=self.model,

@@ -15,9 +15,8 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.references import stored_observers
 from vftcli.signals.errors import LogError, NoLogError, UnknownFormatError
-from vftcli.signals.identity import refuse_repeated_logs
 from vftcli.signals.parsing import printable
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 TRUTH = ".truth.parquet"  #: Ending of what a simulation writes beside its log.
 BATCH = "batch.json"  #: The file by which a folder of `vftcli batch` is known.

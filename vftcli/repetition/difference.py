@@ -264,8 +264,8 @@ def noise_below(
     slope: int = 0,
 ) -> Array:
     """Noise below a cutoff, as dense as in a band [Hz], differentiated by `slope`. (n,)"""
-    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits, "bandpass"))
-    return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, "lowpass", slope=slope)))
+    dense = rms(band_pass(t, x, *limits), moving) / np.sqrt(noise_passed(step, limits))
+    return np.asarray(dense * np.sqrt(noise_passed(step, cutoff, slope)))
 
 
 def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:

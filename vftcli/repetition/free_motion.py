@@ -10,9 +10,8 @@ from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.identity import refuse_repeated_runs
 from vftcli.signals.parsing import interval_text
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import Recording, refuse_repeated_runs
 from vftcli.signals.remarks import Remark, Where, fact
 from vftcli.signals.shown import Shown
 

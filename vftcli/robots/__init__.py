@@ -36,20 +36,13 @@ PROFILES: dict[str, Path] = {
 
 
 def plain_name(word: str) -> str:
-    """How a robot's name is written here: ``UR-5e``, ``ur_5e`` and ``UR 5e`` are ``ur5e``."""
+    """A robot's name as written here: ``UR-5e`` and ``UR 5e`` are ``ur5e``."""
     return "".join(letter for letter in word.lower() if letter not in "-_ ")
 
 
-def same_model(name: str) -> list[str]:
-    """The profiles that a misspelt name can mean: never another arm, as ur5e for ur5.
-
-    What tells arms of one maker apart are the digits and what follows them.
-    """
-
-    def model(text: str) -> str:
-        return plain_name(text).lstrip("abcdefghijklmnopqrstuvwxyz")
-
-    return [profile for profile in PROFILES if model(profile) == model(name)]
+def model_of(name: str) -> str:
+    """What tells arms of one maker apart: the digits of a name and what follows them."""
+    return plain_name(name).lstrip("abcdefghijklmnopqrstuvwxyz")
 
 
 @cache
@@ -65,7 +58,7 @@ ARGUMENT = re.compile(r"\s+(?=[^\s:=]+:=)")
 
 
 def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
-    """Load a robot by profile name, from a robot file (TOML) or a description (URDF, xacro, MJCF).
+    """Load a robot by profile name, robot file (TOML) or description.
 
     Args:
         robot: The name, or the file; arguments of a xacro follow it as ``NAME:=VALUE``. A robot is
@@ -81,6 +74,7 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
         if isinstance(robot, Robot):
             return robot
         raise RobotError(f"the robot is {robot!r}; expected a profile's name, as 'ur5', or a file")
+    from vftcli.robots.profile import load_profile
     from vftcli.robots.robot_file import DESCRIPTIONS
 
     name, *arguments = ARGUMENT.split(str(robot))
@@ -90,17 +84,15 @@ def load_robot(robot: "str | Path | Robot", *, tip: str = "") -> "Robot":
         if tip or arguments:
             given = arguments[0] if arguments else "--tip"
             raise RobotError(f"{given} is for a URDF, xacro or MJCF; {name} is a robot file")
-        if path in PROFILES.values():
-            return built_in(path)
-        from vftcli.robots.profile import load_profile
-
-        return load_profile(path)
+        return built_in(path) if path in PROFILES.values() else load_profile(path)
     if ending in DESCRIPTIONS:
         from vftcli.robots.described import load_described
 
         return load_described(path, tip, arguments)
+    # A misspelt name never means another arm, as ur5e for ur5.
+    alike = [profile for profile in PROFILES if model_of(profile) == model_of(str(robot))]
     raise RobotError(
-        f"no robot {str(robot)!r}.{did_you_mean(str(robot), same_model(str(robot)))} "
+        f"no robot {str(robot)!r}.{did_you_mean(str(robot), alike)} "
         f"Built in: {', '.join(PROFILES)}; or give a FILE.toml or FILE.urdf"
     )
 

@@ -86,11 +86,10 @@ class Chain(Shown):
         """Return the chain with a load fixed to its flange, merged into the last link."""
         if payload is None:
             return self
-        R, r = self.flange_rotation, self.flange_translation
-        masses = [float(self.mass[-1]), payload.mass]
-        coms = [self.com[-1], R @ payload.com + r]
-        inertias = [self.inertia[-1], R @ payload.inertia @ R.T]
-        mass, com, inertia = merge_bodies(masses, coms, inertias)
+        flange = Pose(self.flange_rotation, self.flange_translation)
+        load = Body(payload.mass, payload.com, payload.inertia).moved(flange)
+        last = Body(float(self.mass[-1]), self.com[-1], self.inertia[-1])
+        mass, com, inertia = merge_bodies([last, load])
         return replace(
             self,
             mass=np.append(self.mass[:-1], mass),
@@ -99,11 +98,7 @@ class Chain(Shown):
         )
 
     def to_pinocchio(self, name: str = "arm") -> Any:  # noqa: ANN401 - Pinocchio is untyped
-        """Build the Pinocchio model of this chain, with a frame ``flange``.
-
-        Reflected rotor inertia becomes the model's `armature`, which `rnea`, `crba` and `aba`
-        include.
-        """
+        """The Pinocchio model of this chain, with a frame ``flange``; rotors are `armature`."""
         pin = needed("pinocchio", "a Pinocchio model (simulation, replay, --as-printed)")
 
         model = pin.Model()
@@ -123,28 +118,35 @@ class Chain(Shown):
         return model
 
 
-def merge_bodies(
-    masses: list[float], coms: list[Array], inertias: list[Array]
-) -> tuple[float, Array, Array]:
-    """Merge rigidly joined bodies given in one frame into one mass, centre of mass and tensor.
+class Body(NamedTuple):
+    """The inertia of a rigid body in the axes of some frame."""
 
-    Args:
-        masses: Masses. [kg]
-        coms: Centres of mass, (3,) each. [m]
-        inertias: Tensors about each centre of mass, (3, 3) each. [kg·m²]
+    mass: float  #: [kg]
+    com: Array  #: Centre of mass. (3,) [m]
+    inertia: Array  #: Tensor about it. (3, 3) [kg·m²]
 
-    Returns:
-        Mass [kg], centre of mass (3,) [m] and tensor about it (3, 3) [kg·m²] (parallel axes).
-    """
-    mass = float(sum(masses))
+    def moved(self, pose: Pose) -> "Body":
+        """The body in the axes of another frame, by the pose of its own frame there."""
+        R, r = pose
+        return Body(self.mass, R @ self.com + r, R @ self.inertia @ R.T)
+
+
+def merge_bodies(bodies: Sequence[Body]) -> Body:
+    """One body of those that are joined rigidly, all in one frame (parallel axes)."""
+    mass = float(sum(body.mass for body in bodies))
     if mass == 0.0:
-        return 0.0, np.zeros(3), np.sum(inertias, axis=0)
-    com: Array = np.sum([m * c for m, c in zip(masses, coms, strict=True)], axis=0) / mass
+        return Body(0.0, np.zeros(3), np.sum([body.inertia for body in bodies], axis=0))
+    com: Array = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
     inertia = np.zeros((3, 3))
-    for m, c, tensor in zip(masses, coms, inertias, strict=True):
-        d = c - com
-        inertia += tensor + m * (np.dot(d, d) * np.eye(3) - np.outer(d, d))
-    return mass, com, inertia
+    for m, c, tensor in bodies:
+        inertia += tensor + m * point_tensor(c - com)
+    return Body(mass, com, inertia)
+
+
+def point_tensor(d: Array) -> Array:
+    """Tensor of a point of 1 kg at d (3,) [m]. (3, 3) [m²]"""
+    tensor: Array = np.dot(d, d) * np.eye(3) - np.outer(d, d)
+    return tensor
 
 
 def symmetric(entries: list[float]) -> Array:
@@ -154,7 +156,7 @@ def symmetric(entries: list[float]) -> Array:
 
 
 def unphysical(mass: float, inertia: Array) -> str:
-    """Say why no rigid body can have this mass and tensor about its centre of mass, or "".
+    """Why no body can have this mass and tensor about its centre, or "".
 
     A tensor of a real mass distribution has non-negative principal moments, none larger than the
     sum of the other two. Published tables are rounded, so 1e-6 of the largest moment is let pass.
@@ -171,7 +173,7 @@ def unphysical(mass: float, inertia: Array) -> str:
 
 
 def improper(mass: float, inertia: Array) -> str:
-    """Say why these are no mass and no tensor at all: not finite, or below zero; or ""."""
+    """Why these are no mass and no tensor at all, or ""."""
     if not np.isfinite(mass) or mass < 0:
         return f"mass is {mass:g} kg; it must be zero or positive"
     if not np.all(np.isfinite(inertia)):
@@ -188,7 +190,7 @@ def slack_of(inertia: Array) -> float:
 
 
 def nearest_tensor(inertia: Array) -> Array:
-    """The tensor itself if a body can have it, else the nearest that one can. (3, 3) [kg·m²]
+    """The nearest tensor that a body can have, itself if it can. [kg·m²]
 
     The second moments Σ = ½ tr(I) 1 − I of a body's mass have no negative eigenvalue; those that
     are negative become zero.
@@ -199,15 +201,6 @@ def nearest_tensor(inertia: Array) -> Array:
     second: Array = (axes * np.maximum(moments, 0.0)) @ axes.T
     nearest: Array = np.trace(second) * np.eye(3) - second
     return nearest
-
-
-class Kinematics(NamedTuple):
-    """What a convention yields."""
-
-    placements: list[Pose]  #: Pose of chain frame j in chain frame j−1 at q = 0, one a joint.
-    #: Pose of the table's inertial frame in chain frame j, one a joint.
-    inertial_frames: list[Pose]
-    tip: Pose  #: Pose of the tip in chain frame n.
 
 
 DH = ("a", "d", "alpha", "theta")
@@ -221,8 +214,8 @@ CONVENTIONS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 
 def kinematics(
     convention: str, joints: Sequence[Mapping[str, Any]], document: Mapping[str, Any]
-) -> Kinematics:
-    """Chain frames of a table; the tip is `flange_d` along z, then `ee_xyz` and `ee_rpy`."""
+) -> tuple[list[Pose], list[Pose], Pose]:
+    """Chain frames of a table, the poses of its inertial frames in them, and its tip's."""
     out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
     tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
@@ -241,7 +234,7 @@ def kinematics(
             inertial_frames[k] = Pose(R, np.array([joint["a"], 0.0, joint["d"]]))
     if convention == "standard-dh":
         tip = inertial_frames[-1] @ tip
-    return Kinematics(placements, inertial_frames, tip)
+    return placements, inertial_frames, tip
 
 
 class LinkPoses(NamedTuple):
@@ -252,15 +245,7 @@ class LinkPoses(NamedTuple):
 
 
 def link_poses(chain: Chain, q: Array) -> LinkPoses:
-    """Poses of every joint's frame, and of the flange, in the base frame.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (T, n) [rad]
-
-    Raises:
-        ShapeError: If q is not one column a joint of the arm.
-    """
+    """Poses of joints and flange in the base frame for q (T, n). [rad]"""
     check_kind(chain, Chain, "the chain", "robot.chain")
     check_series(q, chain.joints, "q", "the poses")
     samples, n = np.shape(q)
@@ -281,15 +266,10 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
 
 
 def flange_jacobian(chain: Chain, q: Array) -> Array:
-    """Jacobian of the flange point in base axes (Pinocchio's LOCAL_WORLD_ALIGNED). (T, 6, n)
+    """Jacobian of the flange point in base axes. (T, 6, n)
 
-    Its first three rows give the flange's velocity [m], the last three its angular velocity; its
-    transpose takes a force and moment ON the robot, in base axes at the flange point, to joint
-    torques.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (T, n) [rad]
+    Velocity [m], then angular velocity; the transpose takes a force and moment ON the robot to
+    joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
     """
     poses = link_poses(chain, q)
     axes = poses.rotation[:, :-1, :, 2]

@@ -20,11 +20,7 @@ DECLARED = "log"  #: Value of ``--payload``: what the log says that the controll
 
 @dataclass(frozen=True, kw_only=True)
 class RobotChoice(Choice):
-    """Which arm made a log, and how it is modelled.
-
-    Raises:
-        ParameterError: If friction is none of these.
-    """
+    """Which arm made a log, and how it is modelled."""
 
     GROUP = LOG
 
@@ -56,15 +52,7 @@ class RobotChoice(Choice):
         check_known(self.friction, FRICTION, f"--set model.friction={self.friction}")
 
     def load(self, recording: "Recording", otherwise: str | None = None) -> "Robot":
-        """Load the robot that is chosen, or the one that the log says.
-
-        Args:
-            recording: The log.
-            otherwise: The robot's name where neither is so.
-
-        Raises:
-            RobotError: If none of these names one, or there is no such robot.
-        """
+        """Load the robot chosen, or that the log says, or `otherwise`."""
         name = self.name or recording.robot_hint or otherwise
         if name is None:
             raise RobotError(
@@ -80,20 +68,12 @@ class RobotChoice(Choice):
         return robot.without_friction() if self.friction == "none" else robot
 
     def check(self) -> None:
-        """Load the robot that is named, if one is, with its payload.
-
-        Raises:
-            RobotError: If there is no such robot, or it has no such payload.
-        """
+        """Load the robot that is named, if one is, with its payload."""
         if self.name is not None:
             self.named().with_payload(None if self.payload == DECLARED else self.payload)
 
     def named(self) -> "Robot":
-        """The robot of the name, as it is described; it must have one.
-
-        Raises:
-            RobotError: If there is no such robot.
-        """
+        """The robot of the name, as it is described; it must have one."""
         return load_robot(self.name or "", tip=self.tip)
 
 

@@ -2,9 +2,18 @@
 
 The TOML has the description's name with the ending ``.toml``. Its `tip` and `lock` say which arm
 it is and at which angles the rest is held; its ``[[joints]]`` are matched by name.
+
+A xacro is a program that writes a URDF: the package xacro expands it, which needs no ROS. Packages
+that it names with $(find NAME) are looked for beside the file and above it, by their `package.xml`.
+A process of its own expands it, since a program need not end.
 """
 
+import json
+import re
+import subprocess
+import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +21,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.arm import BASE, ArmSearch, LumpedArm, shortened
+from vftcli.robots.arm import BASE, LumpedArm, shortened
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import momentum_terms
 from vftcli.robots.mjcf import mjcf_tree
@@ -20,8 +29,8 @@ from vftcli.robots.profile import assemble, column
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import (
+    BOUNDS,
     DESCRIPTIONS,
-    TRAVEL,
     RobotFile,
     Section,
     robot_text,
@@ -29,9 +38,8 @@ from vftcli.robots.robot_file import (
 )
 from vftcli.robots.tree import BodyTree
 from vftcli.robots.urdf import urdf_tree
-from vftcli.robots.xml_text import NAMESPACE, urdf_of_xacro, xml_root
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
+from vftcli.signals.packages import needed
 from vftcli.signals.parsing import did_you_mean, is_finite, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
@@ -74,38 +82,52 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     file = RobotFile(beside).root if beside.is_file() else None
     angles = locked_angles(file, tree) if file is not None else {}
     wanted = tip or (file.text("tip") if file is not None else "")
-    lumped = LumpedArm(tree, ArmSearch(tree, angles.keys()).find(wanted), angles)
+    lumped = LumpedArm(tree, wanted, angles)
     robot = robot_of(lumped, file, beside)
-    remarks = (*remarks, *arm_remarks(lumped, robot.chain), *simulator_remarks(lumped))
-    endless = [joint.name for joint in lumped.arm.joints if joint.kind == "continuous"]
-    endless += [name for name in robot.endless if name not in endless]
+    remarks = (*remarks, *arm_remarks(lumped, robot.chain), *inertia_remarks(lumped, robot.chain))
+    rotors = [joint.rotor_inertia for joint in lumped.joints]
+    if any(rotors):
+        remarks += (caution("armature-taken", armature_kg_m2=rotors),)
+    damping = [joint.damping for joint in lumped.joints]
+    dry = [joint.dry_friction for joint in lumped.joints]
+    friction: tuple[JointFriction, ...] = ()
+    if any(damping) or any(dry):
+        left = caution("simulator-friction-left", damping_Nms_rad=damping, dry_friction_Nm=dry)
+        remarks += (left,)
+        friction = tuple(
+            JointFriction(
+                model="coulomb-viscous",
+                parameters={"coulomb": coulomb, "viscous": viscous},
+                confidence="a simulator's",
+            )
+            for coulomb, viscous in zip(dry, damping, strict=True)
+        )
+    endless = [joint.name for joint in lumped.joints if joint.kind == "continuous"]
     return replace(
         robot,
         path=path,
-        endless=tuple(endless),
-        simulated_friction=simulated_friction(lumped),
+        endless=tuple(dict.fromkeys([*endless, *robot.endless])),
+        simulated_friction=friction,
         remarks=(*remarks, *robot.remarks),
     )
 
 
 def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
     """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
-    chain, name = lumped.chain(), lumped.tree.name
+    chain, name = lumped.chain, lumped.tree.name
     if why := weightless(float(np.sum(chain.mass))):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
-    limits = Limits(
-        **{
-            key: np.array([joint.limits.get(key, np.nan) for joint in lumped.arm.joints])
-            for key in Limits.__dataclass_fields__
-        }
-    )
+    limits = {
+        key: np.array([joint.limits.get(key, np.nan) for joint in lumped.joints])
+        for key in Limits.__dataclass_fields__
+    }
     if file is None:
         nothing = np.full(chain.joints, np.nan)
         return Robot(
             name=name,
             title=name,
             chain=chain,
-            limits=limits,
+            limits=Limits(**limits),
             noise=SensorNoise(current=nothing, tau=nothing, q=nothing, qd=nothing),
             remarks=(caution("urdf-alone", file=beside.name),),
         )
@@ -115,8 +137,8 @@ def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
     gravity = file.vector("gravity", 3, chain.gravity.tolist())
     robot = assemble(file, joints, replace(chain, rotor_inertia=rotor, gravity=gravity))
     known = {
-        name: np.where(np.isnan(mine := getattr(robot.limits, name)), getattr(limits, name), mine)
-        for name in Limits.__dataclass_fields__
+        name: np.where(np.isnan(mine := getattr(robot.limits, name)), described, mine)
+        for name, described in limits.items()
     }
     return replace(robot, limits=Limits(**known))
 
@@ -129,14 +151,14 @@ def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:
         if name not in names:
             meant = did_you_mean(name, names)
             file.refuse(f"lock: no joint {name!r}.{meant} There is {shortened(names)}", "lock")
-        if not is_finite(value) or (why := TRAVEL.broken(name, [float(value)])):
+        if not is_finite(value) or (why := BOUNDS["q_min"].broken(name, [float(value)])):
             why = f"{name} is {shown(value)}; it must be a finite number"
             file.refuse(f"lock: {why}", "lock")
     return {name: float(value) for name, value in table.values.items()}
 
 
 def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]:
-    """The ``[[joints]]`` of the TOML in the chain's order; those of locked joints are left out."""
+    """The ``[[joints]]`` of the TOML in the chain's order."""
     tables = {str(table.get("name")): (j, table) for j, table in enumerate(file.tables("joints"))}
     known = {joint.name for joint in tree.joints}
     if unknown := [name for name in tables if name not in known]:
@@ -150,23 +172,8 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
     ]
 
 
-def simulated_friction(lumped: LumpedArm) -> tuple[JointFriction, ...]:
-    """The friction that a simulator gives the joints; empty where it gives none."""
-    joints = lumped.arm.joints
-    if not any(joint.damping or joint.dry_friction for joint in joints):
-        return ()
-    return tuple(
-        JointFriction(
-            model="coulomb-viscous",
-            parameters={"coulomb": joint.dry_friction, "viscous": joint.damping},
-            confidence="a simulator's",
-        )
-        for joint in joints
-    )
-
-
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """Which joints, flange and locked parts were taken, and what is odd about their inertia."""
+    """Which joints, flange and locked parts were taken."""
     locked = {joint.name: lumped.position(joint) for joint in lumped.locked}
     taken: dict[str, Any] = {
         "robot": lumped.tree.name,
@@ -189,35 +196,29 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         )
         yield fact("arm-and-locked-taken", **taken)
     last = chain.joints - 1
-    beside = [joint.name for joint in lumped.locked if BASE < lumped.group_of(joint) < last]
+    beside = [joint.name for joint, group in lumped.locked.items() if BASE < group < last]
     if beside:
         yield caution("side-branch-locked", locked=beside, locked_shown=shortened(beside))
-    yield from inertia_remarks(lumped, chain)
 
 
 def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """Links without mass, tensors that no body has, and a mass matrix that cannot be inverted."""
+    """What is odd about the links' inertia."""
     if bare := tuple(j + 1 for j, mass in enumerate(chain.mass) if mass == 0.0):
         yield caution("links-without-mass", Where(joints=bare))
-    changes = lumped.tensor_changes()
+    # What the nearest tensors that a body can have differ by, zero where the tensor was right.
+    changes = chain.inertia - np.array([body.inertia for _, body in lumped.turned])
     if changed := tuple(j + 1 for j, change in enumerate(changes) if np.any(change)):
-        links = [lumped.arm.joints[j - 1].child for j in changed]
-        worst = largest_effect(chain, changes)
+        links = [lumped.joints[j - 1].child for j in changed]
+        parameters = np.zeros((chain.joints, LINK))
+        parameters[:, 4:] = np.stack([changes[:, row, col] for row, col in TENSOR], axis=1)
+        rng = np.random.default_rng(0)
+        q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
+        sign = rng.choice([-1.0, 1.0], (2, *q.shape))
+        regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
+        worst = float(np.max(np.abs(regressor @ parameters.ravel())))
         yield caution("tensors-changed", Where(joints=changed), links=links, worst_Nm=worst)
     if bare and singular(chain):
         yield caution("mass-matrix-singular")
-
-
-def largest_effect(chain: Chain, changes: Array) -> float:
-    """Largest joint torque of changed tensors at 1 rad/s and 2 rad/s², over random poses. [N·m]"""
-    rng = np.random.default_rng(0)
-    q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
-    sign = rng.choice([-1.0, 1.0], (2, *q.shape))
-    regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
-    parameters = np.zeros((chain.joints, LINK))
-    for k, (row, col) in enumerate(TENSOR, start=4):
-        parameters[:, k] = changes[:, row, col]
-    return float(np.max(np.abs(regressor @ parameters.ravel())))
 
 
 def singular(chain: Chain) -> bool:
@@ -231,14 +232,111 @@ def singular(chain: Chain) -> bool:
     return False
 
 
-def simulator_remarks(lumped: LumpedArm) -> Iterator[Remark]:
-    """What a simulator's description says of drives, which is tuned for the simulation."""
-    joints = lumped.arm.joints
-    if any(joint.rotor_inertia for joint in joints):
-        yield caution("armature-taken", armature_kg_m2=[joint.rotor_inertia for joint in joints])
-    if any(joint.damping or joint.dry_friction for joint in joints):
-        yield caution(
-            "simulator-friction-left",
-            damping_Nms_rad=[joint.damping for joint in joints],
-            dry_friction_Nm=[joint.dry_friction for joint in joints],
+#: Elements within one another: a URDF has four, an MJCF one more than its arm has links.
+DEEPEST = 500
+#: How the tag of an element of xacro begins: a description with one still has to be expanded.
+NAMESPACE = re.compile(r"\{[^}]*xacro[^}]*\}")
+#: A declaration of an argument, which has a default.
+DECLARED = re.compile(r"<xacro:arg\s[^>]*?name\s*=\s*[\"']([^\"']+)[\"']")
+#: A use of an argument; one that is not declared has to be given.
+USED = re.compile(r"\$\(arg\s+([^)\s]+)\s*\)")
+NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")  #: The name of a package in its manifest.
+
+ABOVE = 5  #: Folders above the file in which packages are looked for.
+#: Time of a processor in which a xacro must be expanded; large ones take below one. [s]
+SECONDS = 10
+WAITED = 6  #: How many times as long it may take where others keep the processors busy.
+MEMORY = 1 << 30  #: Memory in which it must be expanded; large ones take a tenth. [B]
+
+
+class GuardedBuilder(ET.TreeBuilder):
+    """A tree builder that takes no document type and no deep nesting."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+        self._depth = 0
+
+    def doctype(self, name: str, public: str | None, system: str | None) -> None:
+        """Refuse the document type, before what it defines is used."""
+        del public, system
+        raise RobotError(
+            f"{self._path}: has a document type {name!r}, which defines XML entities; "
+            "a robot description needs none: remove it"
         )
+
+    def start(self, tag: str, attrs: dict[Any, Any], /) -> ET.Element:
+        """Begin an element."""
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise RobotError(f"{self._path}: more than {DEEPEST} elements within one another")
+        return super().start(tag, attrs)
+
+    def end(self, tag: str, /) -> ET.Element:
+        """End an element."""
+        self._depth -= 1
+        return super().end(tag)
+
+
+def xml_root(text: str, path: Path) -> ET.Element:
+    """The first element of an XML text."""
+    parser = ET.XMLParser(target=GuardedBuilder(path))
+    try:
+        parser.feed(text)
+        root: ET.Element = parser.close()
+    except (ET.ParseError, ValueError) as error:
+        raise RobotError(f"{path}: not a URDF, xacro or MJCF, which is XML: {error}") from None
+    return root
+
+
+def urdf_of_xacro(path: Path, arguments: Sequence[str]) -> str:
+    """The URDF that `vftcli.robots.xacro_child` makes of a xacro, within its limits."""
+    given = dict(word.split(":=", 1) for word in arguments)
+    line = " ".join(["xacro", path.name, *(f"{k}:={v}" for k, v in given.items())])
+    otherwise = f"; or give the URDF that it writes: {line} > {path.name.split('.')[0]}.urdf"
+    for module in ("xacro", "xacrodoc"):
+        needed(module, f"{path}: a xacro", otherwise, RobotError)
+    limits = {"seconds": SECONDS, "memory": MEMORY, "packages": dict(packages_near(path))}
+    try:
+        ended = subprocess.run(
+            # By its path and without the current folder, in which anything may be called xacro.
+            [sys.executable, "-P", str(Path(__file__).with_name("xacro_child.py"))],
+            input=json.dumps({"path": str(path), "arguments": given, **limits}),
+            capture_output=True,
+            encoding="utf-8",
+            timeout=WAITED * SECONDS,
+            check=True,
+        )
+    except (subprocess.CalledProcessError, subprocess.TimeoutExpired):
+        raise RobotError(
+            f"{path}: the xacro cannot be expanded within {SECONDS} s of a processor and "
+            f"{MEMORY / 2**30:.0f} GiB of memory; give the URDF that it writes"
+        ) from None
+    made = json.loads(ended.stdout)
+    why, sources = made["why"], [robot_text(Path(file)) for file in (path, *made["files"])]
+    declared = [name for source in sources for name in DECLARED.findall(source)]
+    used = [name for source in sources for name in USED.findall(source)]
+    known = dict.fromkeys([*used, *declared])
+    takes = f"it takes {', '.join(known) or 'none'}"
+    if unknown := next((name for name in given if name not in known), None):
+        meant = did_you_mean(unknown, known)
+        raise RobotError(
+            f"{path}: the xacro takes no argument {unknown!r}.{meant} Behind its name {takes}"
+        )
+    if why and (missing := [k for k in dict.fromkeys(used) if k not in (*declared, *given)]):
+        raise RobotError(
+            f"{path}: the xacro needs {', '.join(missing)}: give --robot '{path} "
+            f"{missing[0]}:=VALUE'; {takes}"
+        )
+    if why:
+        raise RobotError(f"{path}: the xacro cannot be expanded: {why}; {takes}")
+    return str(made["text"])
+
+
+def packages_near(path: Path) -> Iterator[tuple[str, str]]:
+    """Name and folder of the packages above a file and beside these, the nearest last."""
+    for folder in reversed(path.resolve().parents[:ABOVE]):
+        for manifest in (*sorted(folder.glob("*/package.xml")), *folder.glob("package.xml")):
+            with suppress(RobotError):  # a neighbour's that is no text
+                if name := NAME.search(robot_text(manifest)):
+                    yield name[1], str(manifest.parent)

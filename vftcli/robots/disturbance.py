@@ -27,7 +27,7 @@ def raw_disturbance(terms: DynamicsTerms) -> Array:
 
 
 def disturbance_impulse(terms: DynamicsTerms) -> Array:
-    """The raw disturbance integrated from the first sample on, pᵗ − p⁰ − ∫μ. (T, n) [N·m·s]
+    """The raw disturbance's integral, pᵗ − p⁰ − ∫μ. (T, n) [N·m·s]
 
     A difference of two of its values over the time between them is the mean of d there.
     """
@@ -53,26 +53,17 @@ class Blocks(NamedTuple):
 
     def part(self, chosen: slice) -> "Blocks":
         """Some of the blocks."""
-        t, length, d, q, velocity, known = self
-        return Blocks(
-            t[chosen], length[chosen], d[chosen], q[chosen], velocity[chosen], known[chosen]
-        )
+        return self._replace(**{name: x[chosen] for name, x in self._asdict().items()})
 
 
 def disturbance_blocks(
     terms: DynamicsTerms, q: Array, seconds: float, inside: Mask | None = None
 ) -> Blocks:
-    """Block averages d = (s(e′) − s(e))/(e′ − e) with s = p − ∫μ, without lag and without gain.
+    """Block averages d = (s(e′) − s(e))/(e′ − e) with s = p − ∫μ.
 
-    A block holds whole samples, on an uneven clock too, so that its edges are samples; what is
-    left at the end of a stretch joins the last block where it is less than half of one. A gap of
-    the clock is a block of its own, its disturbance unknown. A log of one sample is such a block.
-
-    Args:
-        terms: p and μ along a log.
-        q: Joint positions. (T, n) [rad]
-        seconds: Length of a block, rounded to whole samples. [s]
-        inside: The samples to take, as if gaps lay between them; None for all. (T,)
+    A block of some seconds holds whole samples; what is left at the end of a stretch joins the
+    last block where it is less than half of one. A gap of the clock is a block of its own, its
+    disturbance unknown, and so is what lies between samples `inside` (T,).
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
@@ -109,14 +100,9 @@ def disturbance_blocks(
 
 
 def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> list[Array]:
-    """The raw disturbance in unbroken stretches of chosen samples, on a uniform clock. (N, n) each
+    """The raw disturbance in unbroken stretches of an even clock. (N, n) each
 
-    On an uneven clock the integral of d is interpolated, which averages d over each new step.
-
-    Args:
-        terms: p and μ along a log.
-        inside: The samples to take. (T,)
-        step: Sample time of the uniform clock. [s]
+    On an uneven clock the integral of d is interpolated, which averages d over each new step [s].
     """
     t, d = terms.t, raw_disturbance(terms)
     whole = inside[1:] & inside[:-1]

@@ -20,7 +20,7 @@ F_c that are allowed for it are at the end of this file.
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -53,17 +53,8 @@ def coulomb_viscous(
 
     f = offset + (f_c + f_l |load| + f_s exp(−(q̇/v_s)²)) tanh(q̇/smoothing) + f_v q̇ + f_2 q̇|q̇|
 
-    Args:
-        dq: Joint velocities. (T,) or (T, n) [rad/s]
-        coulomb: Coulomb torque f_c. [N·m]
-        viscous: Viscous coefficient f_v. [N·m·s/rad]
-        quadratic: Signed quadratic coefficient f_2. [N·m·s²/rad²]
-        offset: Torque at rest. [N·m]
-        smoothing: Velocity over which the sign is smoothed. [rad/s]
-        load_coulomb: Growth f_l of the Coulomb torque with the torque the gear carries. [1]
-        stribeck: Extra dry torque f_s at breakaway, above the Coulomb torque. [N·m]
-        stribeck_velocity: Velocity v_s over which it fades. [rad/s]
-        load: Torque the gear carries: the joint's gravity torque; None for none. Like `dq` [N·m]
+    with f_l the growth with the torque that the gear carries [1] (`load`, the joint's gravity
+    torque [N·m], like `dq`), f_s dry torque at breakaway above f_c [N·m], which fades over v_s.
     """
     torque: Array = dq * (1.0 / smoothing)
     np.tanh(torque, out=torque)
@@ -97,12 +88,6 @@ def coulomb_logarithmic(
     The logarithm is zero at rest, so its sign needs no smoothing. With three numbers (Coulomb
     torque, a, b) it follows the joint tests of UR arms to .01–.3 N·m, where a signed quadratic
     falls from 1.1–1.6 rad/s on.
-
-    Args:
-        dq: Joint velocities. (T,) or (T, n) [rad/s]
-        logarithmic: Rise a. [N·m]
-        logarithmic_velocity: Velocity b from which the rise flattens. [rad/s]
-        others: Parameters of `coulomb_viscous`.
     """
     rise = np.abs(dq)
     rise /= logarithmic_velocity
@@ -116,13 +101,7 @@ def coulomb_logarithmic(
 def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
     """Sigmoid friction, zero at rest. Like `dq` [N·m]
 
-    f = A/(1 + exp(−s(q̇ + v₀))) − A/(1 + exp(−s v₀))
-
-    Args:
-        dq: Joint velocities. (T,) or (T, n) [rad/s]
-        amplitude: A. [N·m]
-        slope: s. [s/rad]
-        shift: v₀. [rad/s]
+    f = A/(1 + exp(−s(q̇ + v₀))) − A/(1 + exp(−s v₀)) with A in N·m, s in s/rad, v₀ in rad/s
 
     Reference:
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
@@ -144,19 +123,13 @@ def bent_line(
     torques: Sequence[float],
     **others: Any,  # noqa: ANN401
 ) -> Array:
-    """A line through points (v_k, f_k), as UR controllers feed friction forward. Like `dq` [N·m]
+    """A line through points (v_k, f_k), as in UR controllers. Like `dq` [N·m]
 
     f = f_1 tanh(q̇/smoothing) + sign(q̇) Σ_k (m_k − m_{k−1}) max(|q̇| − v_k, 0) + what
     `coulomb_viscous` makes of the other parameters,
 
     with m_k the slope from point k to the next, m_0 = 0: constant up to the first speed, linear
-    between the points, the last stretch continued beyond.
-
-    Args:
-        dq: Joint velocities. (T,) or (T, n) [rad/s]
-        speeds: Speeds v_k, rising, at least two. (K,) [rad/s]
-        torques: Friction f_k there. (K,) [N·m]
-        others: Parameters of `coulomb_viscous`.
+    between the points, the last stretch continued beyond. Speeds rise; there are at least two.
     """
     slopes = [
         (f - before) / (v - slower)
@@ -173,26 +146,47 @@ def bent_line(
     return torque
 
 
-#: Name in a robot file → function of velocity and the file's parameters.
-MODELS: dict[str, Callable[..., Array]] = {
-    "coulomb-viscous": coulomb_viscous,
-    "coulomb-viscous-offset": coulomb_viscous,
-    "coulomb-viscous-quadratic": coulomb_viscous,
-    "coulomb-viscous-load": coulomb_viscous,
-    "coulomb-viscous-stribeck": coulomb_viscous,
-    "coulomb-logarithmic": coulomb_logarithmic,
-    "points": bent_line,
-    "sigmoid": sigmoid,
+class FrictionModel(NamedTuple):
+    """A law of friction, and its keys in ``[joints.friction]``.
+
+    Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
+    """
+
+    torque: Callable[..., Array]  #: Friction of velocities and the keys' numbers.
+    required: tuple[str, ...]  #: Keys that it must have.
+    optional: tuple[str, ...]  #: Keys that it may have.
+
+
+PLAIN = ("coulomb", "viscous")
+#: Name in a robot file → friction model.
+FRICTION_MODELS = {
+    "coulomb-viscous": FrictionModel(coulomb_viscous, PLAIN, ("smoothing",)),
+    "coulomb-viscous-offset": FrictionModel(coulomb_viscous, PLAIN, ("offset", "smoothing")),
+    "coulomb-viscous-quadratic": FrictionModel(
+        coulomb_viscous, PLAIN, ("quadratic", "offset", "smoothing")
+    ),
+    "coulomb-viscous-load": FrictionModel(
+        coulomb_viscous, (*PLAIN, "load_coulomb"), ("quadratic", "offset", "smoothing")
+    ),
+    "coulomb-viscous-stribeck": FrictionModel(
+        coulomb_viscous,
+        (*PLAIN, "stribeck", "stribeck_velocity"),
+        ("load_coulomb", "quadratic", "offset", "smoothing"),
+    ),
+    "coulomb-logarithmic": FrictionModel(
+        coulomb_logarithmic,
+        ("coulomb", "logarithmic", "logarithmic_velocity"),
+        ("viscous", "load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing"),
+    ),
+    "points": FrictionModel(
+        bent_line, (), ("load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing")
+    ),
+    "sigmoid": FrictionModel(sigmoid, ("amplitude", "slope", "shift"), ()),
 }
 
 
 def warmth(law: Sequence[float], temperature: Array | float) -> Array:
-    """s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T). Like `temperature` [1]
-
-    Args:
-        law: p₁, p₂, p₃, p₄; p₂ and p₄ in 1/K.
-        temperature: Joint temperatures T. [°C]
-    """
+    """s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T), T in °C. Like `temperature` [1]"""
     p1, p2, p3, p4 = law
     T = np.asarray(temperature, dtype=np.float64)
     share: Array = p1 * np.exp(p2 * T) + p3 * np.exp(p4 * T)
@@ -215,12 +209,9 @@ def lawless(law: Sequence[float]) -> str:
 
 
 def friction_factor(friction: Sequence[JointFriction], temperature: Array) -> Array | None:
-    """What each joint's friction is multiplied with, None where no joint has a law. (T, n) [1]
+    """Factor of each joint's friction, None where none has a law. (T, n) [1]
 
-    Args:
-        friction: One model a joint.
-        temperature: Joint temperatures, NaN where they were not measured: there the factor is 1,
-            friction as at its reference temperature. (T, n) [°C]
+    Where a joint's temperature [°C] is NaN, not measured, it is 1, as at the reference temperature.
     """
     joints = [j for j, joint in enumerate(friction) if joint.temperature]
     if not joints:
@@ -242,7 +233,7 @@ def friction_torque(
     deflection: Array | None = None,
     temperature: Array | None = None,
 ) -> Array:
-    """Friction torque of every joint at every sample, opposing motion when subtracted. (T, n) [N·m]
+    """Friction torque, opposing motion when subtracted. (T, n) [N·m]
 
     Joint by joint, so that a chunk of one stays in the cache. Along a motion, `RunningFriction`
     follows the presliding state.
@@ -250,12 +241,9 @@ def friction_torque(
     Args:
         friction: One model a joint; empty for a frictionless arm.
         dq: Joint velocities. (T, n) [rad/s]
-        load: Gravity torques of the loaded arm, for models whose Coulomb torque grows with the
-            load; None for unloaded joints. (T, n) [N·m]
-        deflection: State s of the play operator, for presliding friction; None for undeflected
-            joints. (T, n)
-        temperature: Joint temperatures, NaN where not measured; None for those at which the models
-            were taken. (T, n) [°C]
+        load: Gravity torques, None for unloaded joints. (T, n) [N·m]
+        deflection: State s of the play operator; None for undeflected joints. (T, n)
+        temperature: NaN where not measured; None for that of the models. (T, n) [°C]
     """
     torque = empty_series(*dq.shape)
     if not friction:
@@ -276,40 +264,30 @@ def joint_friction(joint: JointFriction, dq: Array, load: Array | None) -> Array
     """What one joint's model makes of its velocities and its load. (T,) [N·m]"""
     if joint.model == "none":
         return 0.0
-    check_known(joint.model, MODELS, f"no friction model {joint.model!r}")
+    check_known(joint.model, FRICTION_MODELS, f"no friction model {joint.model!r}")
     values: dict[str, Any] = {k: v for k, v in joint.parameters.items() if k not in PRESLIDING}
     if joint.speeds:
         values |= {"speeds": joint.speeds, "torques": joint.torques}
     if load is not None and "load_coulomb" in values:
         values["load"] = load
-    return MODELS[joint.model](dq, **values)
+    return FRICTION_MODELS[joint.model].torque(dq, **values)
 
 
 def steady_torque(friction: JointFriction, dq: Array) -> Array:
-    """One joint's friction in steady sliding, without offset and the dry torque that fades. [N·m]
+    """One joint's friction in steady sliding, without what fades. [N·m]
 
     Presliding friction is fully deflected, and what the numbers hold for is the temperature.
-
-    Args:
-        friction: The joint's model.
-        dq: Its velocities. (T,) [rad/s]
     """
-    absent = {"offset": 0.0, "stribeck": 0.0}
-    values = {key: absent.get(key, value) for key, value in friction.parameters.items()}
-    steady, v = (replace(friction, parameters=values),), dq[:, None]
+    absent = dict.fromkeys({"offset", "stribeck"} & friction.parameters.keys(), 0.0)
+    steady, v = (replace(friction, parameters={**friction.parameters, **absent}),), dq[:, None]
     return friction_torque(steady, v, deflection=np.sign(v))[:, 0]
 
 
 def falling_speed(friction: JointFriction, limit: float) -> float:
-    """Lowest speed up to `limit` where a friction falls or pushes, NaN where none does. [rad/s]
+    """Lowest speed up to `limit` where a friction falls, or NaN. [rad/s]
 
     Dry friction that fades (Stribeck) falls by nature and an offset is no friction: both are left
-    out. What then rises everywhere with the velocity passes through zero at rest, so that it also
-    opposes every motion.
-
-    Args:
-        friction: One joint's model.
-        limit: Speed up to which the joint moves. [rad/s]
+    out. What then rises with the velocity also opposes every motion.
     """
     if not np.isfinite(limit):
         return float("nan")
@@ -323,12 +301,7 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
 
 
 def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[Remark]:
-    """A warning on the joints whose friction falls or pushes within their speed range, if any.
-
-    Args:
-        friction: One model a joint; empty for a frictionless arm.
-        limits: Speed limits, NaN where unknown. (n,) [rad/s]
-    """
+    """A warning on friction that falls below the speed limits [rad/s]."""
     speeds = [falling_speed(joint, limit) for joint, limit in zip(friction, limits, strict=False)]
     falls = np.flatnonzero(np.isfinite(speeds))
     if not falls.size:
@@ -339,36 +312,28 @@ def falling_friction(friction: Sequence[JointFriction], limits: Array) -> list[R
 
 
 def dry_friction(friction: Sequence[JointFriction], joints: int) -> Array:
-    """Torque of each joint's dry friction, unloaded: what can hold it at rest. (n,) [N·m]"""
-    if not friction:
-        return np.zeros(joints)
-    return np.array([float(dry_torque(joint)) for joint in friction])
+    """Torque of each joint's unloaded dry friction. (n,) [N·m]"""
+    return np.array([float(dry_torque(joint)) for joint in friction] or [0.0] * joints)
 
 
 def dry_torques(robot: Robot) -> Array:
-    """Dry friction of every joint, of a sigmoid its whole amplitude; 0 where none is known. (n,)"""
+    """Dry friction of every joint, of a sigmoid its whole amplitude. (n,)"""
     dry = dry_friction(robot.friction, robot.joints)
     whole = [abs(joint.parameters.get("amplitude", 0.0)) for joint in robot.friction]
     return np.maximum(dry, whole) if whole else dry
 
 
 def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
-    """Half the step that one joint's friction makes where its velocity changes sign. Like `load`
+    """Half the step of a joint's friction where its velocity turns. Like `load`
 
-    It is taken from the parameters rather than from the friction at some low speed: the smoothing
-    of the sign, the viscous part and the fading of the breakaway torque would then count in it, in
-    each robot another share.
-
-    Args:
-        joint: Its model.
-        load: Torque the gear carries. [N·m]
+    It is taken from the parameters: at some low speed smoothing, viscous part and fading would
+    count in it. Presliding friction is held at rest, in full or in part.
     """
-    parameters = joint.parameters
-    coulomb = parameters.get("coulomb", 0.0) + parameters.get("stribeck", 0.0)
-    coulomb += parameters.get("presliding", 0.0)  # which a joint at rest holds, in full or in part
+    known = joint.parameters
+    coulomb = known.get("coulomb", 0.0) + known.get("stribeck", 0.0) + known.get("presliding", 0.0)
     # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
-    coulomb += 0.5 * abs(parameters.get("amplitude", 0.0)) + sum(joint.torques[:1])
-    return np.asarray(coulomb + parameters.get("load_coulomb", 0.0) * np.abs(load))
+    coulomb += 0.5 * abs(known.get("amplitude", 0.0)) + sum(joint.torques[:1])
+    return np.asarray(coulomb + known.get("load_coulomb", 0.0) * np.abs(load))
 
 
 #: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and of the

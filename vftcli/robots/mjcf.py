@@ -7,15 +7,16 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, NoReturn
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from vftcli.robots.chain import Body
 from vftcli.robots.robot_file import BOUNDS
-from vftcli.robots.tree import Body, BodyTree, TreeJoint
-from vftcli.signals.arrays import Array
+from vftcli.robots.tree import BodyTree, TreeJoint
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.pose import Pose
@@ -48,10 +49,17 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
         # Behind where in its source it stands.
         reason = " ".join([*words, *str(error).split()]).rpartition("message: ")[2]
         raise RobotError(f"{path}: not an MJCF that Pinocchio can read: {reason}") from None
-    names = link_names(model)
+    # A joint's link is the body whose frame is the joint's, else it has the joint's own name.
+    names = [str(name) for name in model.names]
+    for frame in model.frames:
+        k = frame.parentJoint
+        same = frame.placement == pin.SE3.Identity()
+        if frame.type == pin.FrameType.BODY and same and k and names[k] == model.names[k]:
+            names[k] = str(frame.name)
+    each = [MjcfJoint(path, pin, model, k) for k in range(1, model.njoints)]
     bodies: dict[str, Body | None] = {names[0]: None}
-    bodies |= {names[k]: checked_body(model, k, path) for k in range(1, model.njoints)}
-    joints = [moving_joint(model, k, names, path) for k in range(1, model.njoints)]
+    bodies |= {names[one.number]: one.body() for one in each}
+    joints = [one.joint(names) for one in each]
     for frame in model.frames:
         # Bodies without a joint, and sites, are frames of the joint that moves them.
         if frame.name not in bodies and frame.type != pin.FrameType.JOINT:
@@ -74,96 +82,77 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
     )
 
 
-def link_names(model: Any) -> list[str]:  # noqa: ANN401 - Pinocchio is untyped
-    """For each joint the body whose frame is the joint's, the joint's own name where there is none.
-
-    The first is the world's.
-    """
-    pin = needed("pinocchio", "an MJCF")
-
-    names = [str(name) for name in model.names]
-    for frame in model.frames:
-        k = frame.parentJoint
-        same = frame.placement == pin.SE3.Identity()
-        if frame.type == pin.FrameType.BODY and same and k and names[k] == model.names[k]:
-            names[k] = str(frame.name)
-    return names
-
-
 def pose_of(placement: Any) -> Pose:  # noqa: ANN401
     """Pinocchio's pose as ours."""
     return Pose(np.array(placement.rotation), np.array(placement.translation))
 
 
-def checked_body(model: Any, index: int, path: Path) -> Body:  # noqa: ANN401
-    """What a joint moves, what is fixed to it included."""
-    found = model.inertias[index]
-    R = model.jointPlacements[index].rotation
-    if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
-        raise RobotError(f"{path}: joint {model.names[index]!r}: its orientation is no rotation")
-    body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
-    place = model.jointPlacements[index].translation
-    for key, values in {"mass": [body.mass], "com": body.com, "inertia": body.inertia.ravel(),
-                        "xyz": place}.items():  # fmt: skip
-        if why := BOUNDS[key].broken(key, [float(value) for value in values]):
-            raise RobotError(f"{path}: joint {model.names[index]!r}: {why}")
-    return body
+class MjcfJoint(NamedTuple):
+    """A joint of a model that Pinocchio read, and what it moves."""
 
+    path: Path  #: The MJCF.
+    pin: Any  #: Pinocchio.
+    model: Any  #: Its model.
+    number: int  #: Number of the joint, the world's is 0.
 
-def moving_joint(
-    model: Any,  # noqa: ANN401
-    index: int,
-    names: list[str],
-    path: Path,
-) -> TreeJoint:
-    """A joint of Pinocchio's model as one of a tree whose links have these names."""
-    joint, name = model.joints[index], str(model.names[index])
-    kind = next((kind for form, kind in KINDS.items() if re.fullmatch(form, joint.shortname())), "")
-    plain: dict[str, Any] = {
-        "name": name,
-        "kind": kind or joint.shortname(),
-        "parent": names[model.parents[index]],
-        "child": names[index],
-        "placement": pose_of(model.jointPlacements[index]),
-    }
-    if not kind:
-        return TreeJoint(**plain)
-    v, q = joint.idx_v, joint.idx_q
-    limits = {"qd_max": model.velocityLimit[v], "tau_max": model.effortLimit[v]}
-    limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
-    if kind != "continuous":
-        limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
-    axis, rotor = joint_axis(model, index), float(model.armature[v])
-    if not np.isclose(np.linalg.norm(axis), 1.0):
-        raise RobotError(f"{path}: joint {name!r}: its axis points nowhere")
-    if why := BOUNDS["rotor_inertia"].broken("armature", [rotor]):
-        raise RobotError(f"{path}: joint {name!r}: {why}")
-    return TreeJoint(
-        **plain,
-        axis=axis,
-        limits={key: float(value) for key, value in limits.items() if math.isfinite(value)},
-        rotor_inertia=rotor,
-        damping=float(model.damping[v]),
-        dry_friction=float(model.upperDryFrictionLimit[v]),
-    )
+    def refuse(self, message: str) -> NoReturn:
+        """Raise a RobotError that names the file and the joint."""
+        raise RobotError(f"{self.path}: joint {self.model.names[self.number]!r}: {message}")
 
+    def body(self) -> Body:
+        """What it moves, what is fixed to that included."""
+        found, place = self.model.inertias[self.number], self.model.jointPlacements[self.number]
+        if not np.allclose(place.rotation @ place.rotation.T, np.eye(3), atol=1e-6):
+            self.refuse("its orientation is no rotation")
+        body = Body(float(found.mass), np.array(found.lever), np.array(found.inertia))
+        each = {**body._asdict(), "xyz": place.translation}
+        for key, values in each.items():
+            if why := BOUNDS[key].broken(key, np.ravel(values).tolist()):
+                self.refuse(why)
+        return body
 
-def joint_axis(model: Any, index: int) -> Array:  # noqa: ANN401
-    """The unit axis of a joint that turns or slides, in its own frame. (3,)"""
-    pin = needed("pinocchio", "an MJCF")
-
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    local = pin.getJointJacobian(model, data, index, pin.ReferenceFrame.LOCAL)
-    # The Jacobian of a single joint comes without its second axis.
-    column = np.array(local).reshape(6, model.nv)[:, model.joints[index].idx_v]
-    axis: Array = column[3:] if np.any(column[3:]) else column[:3]
-    return axis
+    def joint(self, names: list[str]) -> TreeJoint:
+        """The joint in a tree whose links have these names."""
+        model, k = self.model, self.number
+        joint, form = model.joints[k], model.joints[k].shortname()
+        kind = next((kind for name, kind in KINDS.items() if re.fullmatch(name, form)), "")
+        plain = TreeJoint(
+            name=str(model.names[k]),
+            kind=kind or form,
+            parent=names[model.parents[k]],
+            child=names[k],
+            placement=pose_of(model.jointPlacements[k]),
+        )
+        if not kind:
+            return plain
+        v, q = joint.idx_v, joint.idx_q
+        limits = {"qd_max": model.velocityLimit[v], "tau_max": model.effortLimit[v]}
+        limits = {key: value for key, value in limits.items() if 0 < value < 1e300}
+        if kind != "continuous":
+            limits |= {"q_min": model.lowerPositionLimit[q], "q_max": model.upperPositionLimit[q]}
+        # The unit axis in its own frame; the Jacobian of a single joint comes without second axis.
+        data = model.createData()
+        self.pin.computeJointJacobians(model, data, self.pin.neutral(model))
+        local = self.pin.getJointJacobian(model, data, k, self.pin.ReferenceFrame.LOCAL)
+        column, rotor = np.array(local).reshape(6, model.nv)[:, v], float(model.armature[v])
+        axis = column[3:] if np.any(column[3:]) else column[:3]
+        if not np.isclose(np.linalg.norm(axis), 1.0):
+            self.refuse("its axis points nowhere")
+        if why := BOUNDS["rotor_inertia"].broken("armature", [rotor]):
+            self.refuse(why)
+        return replace(
+            plain,
+            axis=axis,
+            limits={key: float(value) for key, value in limits.items() if math.isfinite(value)},
+            rotor_inertia=rotor,
+            damping=float(model.damping[v]),
+            dry_friction=float(model.upperDryFrictionLimit[v]),
+        )
 
 
 @contextmanager
 def parser_words() -> Iterator[list[str]]:
-    """Catch what C++ code writes to stderr by itself; the list holds its lines afterwards."""
+    """Catch what C++ code writes to stderr; the list holds its lines then."""
     lines: list[str] = []
     with suppress(OSError, ValueError, AttributeError):  # a stderr that is closed, or not a file
         sys.stderr.flush()

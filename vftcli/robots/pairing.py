@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,7 @@ NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
 
 
 def paired(recording: Recording, robot: Robot) -> Recording:
-    """Lay a log on its robot: joints in the robot's order, positions and torques of the link.
+    """A log in the robot's order of joints, positions and torques of the links.
 
     Where both have joint names these alone decide, and joints that the robot has not are left out.
     """
@@ -43,10 +42,9 @@ def paired(recording: Recording, robot: Robot) -> Recording:
 
 
 def unwound(recording: Recording, robot: Robot) -> Recording:
-    """The recording without the jumps of a turn in the positions of endless joints.
+    """The recording without jumps of a turn in the positions of endless joints.
 
-    A position that changes by more than half a turn between two samples has been taken back into
-    one turn by who logged it. The log itself is returned where none does.
+    A position that changes by more than half a turn between two samples was taken back into one.
     """
     columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
     if recording.joints != robot.joints:
@@ -64,8 +62,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     if not changed:
         return recording
     said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
-    source = replace(recording.source, remarks=(*recording.source.remarks, said))
-    return replace(recording, source=source, **changed)
+    return recording.changed(said, **changed)
 
 
 def listed(names: Sequence[str]) -> str:
@@ -74,17 +71,14 @@ def listed(names: Sequence[str]) -> str:
 
 
 def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
-    """Where each of a robot's joints stands among a log's, None where their names do not tell.
+    """Places of a robot's joints among a log's, None where names do not tell.
 
-    Names are compared as they are; then without a prefix that all share and without a trailing
-    `_joint`; then by number, where those of one of the two are numbered and nothing else, or by the
-    order that is known of a maker's names.
+    Names are compared as they are; then without a shared prefix and a trailing `_joint`; then by
+    number, or by the order that is known of a maker's names.
     """
     if all(logged.count(name) == 1 for name in joints):
         return tuple(logged.index(name) for name in joints)
-    if (found := prefixed(logged, joints)) is not None:
-        return found
-    return numbered(logged, joints)
+    return prefixed(logged, joints) or numbered(logged, joints)
 
 
 def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
@@ -94,7 +88,9 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
     """
     there, wanted = [plain(name) for name in logged], [plain(name) for name in joints]
     # What all of the robot's names share up to a separator says nothing of a joint.
-    own = shared_prefix(wanted)
+    first = wanted[0].split("_")
+    heads = ("".join(f"{part}_" for part in first[:k]) for k in range(len(first) - 1, 0, -1))
+    own = next((head for head in heads if all(name.startswith(head) for name in wanted)), "")
     bare = [name.removeprefix(own) for name in wanted]
     if all(name.isdigit() for name in bare):
         return None
@@ -109,19 +105,10 @@ def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | 
     return tuple(there.index(fits[0] + name) for name in bare)
 
 
-def shared_prefix(names: Sequence[str]) -> str:
-    """What all names begin with, up to and with a `_`."""
-    parts = [name.split("_")[:-1] for name in names]
-    count = 0
-    while all(len(p) > count and p[: count + 1] == parts[0][: count + 1] for p in parts):
-        count += 1
-    return "".join(f"{part}_" for part in parts[0][:count])
-
-
 def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
     """The places of joints by their numbers, or by an order known of a maker's names."""
     count = len(joints)
-    if (found := by_number(logged, count)) is not None:
+    if found := by_number(logged, count):
         return found
     known = kinematic_order(logged)
     names = [plain(logged[k]) for k in known]
@@ -153,5 +140,5 @@ def by_number(names: Sequence[str], count: int) -> tuple[int, ...] | None:
 
 
 def plain(name: str) -> str:
-    """A joint's name in lower case, its parts joined by `_`, without a trailing `_joint`."""
+    """A joint's name in lower case, joined by `_`, without `_joint`."""
     return re.sub(r"[\s/.:\-]+", "_", name.strip().lower()).removesuffix("_joint")

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.chain import CONVENTIONS, Chain, Payload, kinematics, symmetric, unphysical
-from vftcli.robots.friction import PRESLIDING, falling_friction, lawless
+from vftcli.robots.chain import CONVENTIONS, Body, Chain, Payload, kinematics, symmetric, unphysical
+from vftcli.robots.friction import FRICTION_MODELS, PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import RobotFile, Section, weightless
 from vftcli.signals.arrays import Array
@@ -32,49 +32,30 @@ SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
 ORIGIN = (0.0, 0.0, 0.0)
 
-#: Friction model → its required and its optional keys in ``[joints.friction]``.
-#:
-#: Beside these every model may have `PRESLIDING` and a temperature law; "points" has lists.
-FRICTION_KEYS: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "coulomb-viscous": (("coulomb", "viscous"), ("smoothing",)),
-    "coulomb-viscous-offset": (("coulomb", "viscous"), ("offset", "smoothing")),
-    "coulomb-viscous-quadratic": (("coulomb", "viscous"), ("quadratic", "offset", "smoothing")),
-    "coulomb-viscous-load": (
-        ("coulomb", "viscous", "load_coulomb"),
-        ("quadratic", "offset", "smoothing"),
-    ),
-    "coulomb-viscous-stribeck": (
-        ("coulomb", "viscous", "stribeck", "stribeck_velocity"),
-        ("load_coulomb", "quadratic", "offset", "smoothing"),
-    ),
-    "coulomb-logarithmic": (
-        ("coulomb", "logarithmic", "logarithmic_velocity"),
-        ("viscous", "load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing"),
-    ),
-    "points": ((), ("load_coulomb", "stribeck", "stribeck_velocity", "offset", "smoothing")),
-    "sigmoid": (("amplitude", "slope", "shift"), ()),
-}
-
 
 def load_profile(path: Path) -> Robot:
     """Read a robot file."""
     root = RobotFile(path).root
     schema = root.values.get("schema", SCHEMA)
-    if isinstance(schema, bool) or schema != SCHEMA:
-        root.refuse(f"schema is {shown(schema)}; this version reads schema {SCHEMA}", "schema")
-    joints = checked_joints(root)
+    check_count(root, "schema", schema, SCHEMA, f"; this version reads schema {SCHEMA}")
+    joints = joint_sections(root)
     return assemble(root, joints, build_chain(root, joints))
 
 
 def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
-    """Put a Robot together from its chain and the rest of its file (drives, friction, gains)."""
+    """The Robot of a chain and the rest of its file (drives, friction, gains)."""
     source = root.choice("torque_source", TORQUE_SOURCES, "joint_torque")
     payloads = {
         name: checked_payload(section)
         for name, section in root.section("payload").named_sections("mass").items()
     }
-    noise = {name: column(joints, f"noise_{name}") for name in SensorNoise.__dataclass_fields__}
-    friction, limits = checked_friction(joints), checked_limits(joints)
+    friction = tuple(friction_of(joint) for joint in joints)
+    if all(joint.model == "none" for joint in friction):
+        friction = ()
+    limits = Limits(**columns(joints, Limits))
+    for joint, low, high in zip(joints, limits.q_min, limits.q_max, strict=True):
+        if low >= high:
+            joint.refuse(f"q_min is {low:g} rad, not below q_max {high:g} rad", "q_min")
     endless = [joint.value("endless", SWITCH, False) for joint in joints]
     notes = root.value("notes", TEXTS, ())
     notes = [notes] if isinstance(notes, str) else notes
@@ -83,20 +64,20 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
         title=root.text("title", name),
         chain=chain,
         torque_source=source,
-        torque_constant=checked_torque_constant(joints, source),
-        gear=checked_gear(joints, "gear"),
-        efficiency=checked_gear(joints, "gear_efficiency"),
+        torque_constant=torque_constants(joints, source),
+        gear=gear_numbers(joints, "gear"),
+        efficiency=gear_numbers(joints, "gear_efficiency"),
         endless=tuple(itertools.compress(chain.names, endless)),
         friction=friction,
         limits=limits,
-        noise=SensorNoise(**noise),
+        noise=SensorNoise(**columns(joints, SensorNoise, "noise_")),
         sample_rate_hz=root.number("sample_rate_hz", math.nan),
         ros_state=root.text("ros_state"),
         payload=payloads.pop("", None),
         payloads=payloads,
         gains=checked_gains(root.section("observers")),
-        tools=checked_poses(root.section("tool")),
-        sensors=checked_poses(root.section("sensor")),
+        tools=poses(root.section("tool")),
+        sensors=poses(root.section("sensor")),
         admittance=checked_admittance(root.section("admittance")),
         sources=root.tables("sources"),
         published=root.section("published").values,
@@ -109,14 +90,19 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     )
 
 
-def checked_joints(root: Section) -> list[Section]:
-    """Return the ``[[joints]]`` tables, as many as `dof` says, each with a name of its own."""
+def check_count(root: Section, key: str, stated: object, count: int, message: str) -> None:
+    """Refuse a whole number that a key states unless it is this one."""
+    if isinstance(stated, bool) or stated != count:
+        root.refuse(f"{key} is {shown(stated)}{message}", key)
+
+
+def joint_sections(root: Section) -> list[Section]:
+    """The ``[[joints]]`` tables, as many as `dof` says, each with a name of its own."""
     tables = root.tables("joints")
     if not tables:
         root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
-    dof = root.values.get("dof", len(tables))
-    if isinstance(dof, bool) or dof != len(tables):
-        root.refuse(f"dof is {shown(dof)} but the file has {len(tables)} [[joints]] tables", "dof")
+    count, dof = len(tables), root.values.get("dof", len(tables))
+    check_count(root, "dof", dof, count, f" but the file has {count} [[joints]] tables")
     joints = [Section(root.file, table, "joints", j) for j, table in enumerate(tables)]
     names = joint_names(joints)
     for j, (joint, name) in enumerate(zip(joints, names, strict=True)):
@@ -131,7 +117,7 @@ def joint_names(joints: Sequence[Section]) -> tuple[str, ...]:
 
 
 def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
-    """The chain, each joint with the keys of the file's convention and a body that can be."""
+    """The chain that a file's convention, frames and bodies state."""
     convention = root.choice("convention", CONVENTIONS)
     numbers, vectors = CONVENTIONS[convention]
     frames: list[dict[str, Any]] = [
@@ -141,21 +127,21 @@ def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     end: dict[str, Any] = {"flange_d": root.number("flange_d", 0.0)}
     end |= {key: root.vector(key, 3, ORIGIN) for key in ("ee_xyz", "ee_rpy")}
     placements, inertial_frames, tip = kinematics(convention, frames, end)
-    masses, coms, inertias = [], [], []
-    for joint, frame in zip(joints, inertial_frames, strict=True):
-        mass, com, tensor = checked_body(joint)
-        masses.append(mass)
-        coms.append(frame.rotation @ com + frame.translation)
-        inertias.append(frame.rotation @ tensor @ frame.rotation.T)
-    if why := weightless(sum(masses)):
+    bodies = [
+        checked_body(joint).moved(frame)
+        for joint, frame in zip(joints, inertial_frames, strict=True)
+    ]
+    mass, com, inertia = map(np.array, zip(*bodies, strict=True))
+    if why := weightless(float(sum(mass))):
         root.refuse(why)
+    rotation, translation = map(np.array, zip(*placements, strict=True))
     return Chain(
         names=joint_names(joints),
-        rotation=np.array([p.rotation for p in placements]),
-        translation=np.array([p.translation for p in placements]),
-        mass=np.array(masses),
-        com=np.array(coms),
-        inertia=np.array(inertias),
+        rotation=rotation,
+        translation=translation,
+        mass=mass,
+        com=com,
+        inertia=inertia,
         rotor_inertia=column(joints, "rotor_inertia", default=0.0),
         gravity=root.vector("gravity", 3, UPRIGHT),
         flange_rotation=tip.rotation,
@@ -163,19 +149,17 @@ def build_chain(root: Section, joints: Sequence[Section]) -> Chain:
     )
 
 
-def checked_body(
-    table: Section, default: Sequence[float] | None = None
-) -> tuple[float, Array, Array]:
-    """Return mass [kg], centre of mass (3,) [m] and tensor (3, 3) [kg·m²] that a body can have."""
+def checked_body(table: Section, default: Sequence[float] | None = None) -> Body:
+    """The body of a table, with a mass and a tensor that a body can have."""
     mass, com = table.number("mass"), table.vector("com", 3, default and default[:3])
     tensor = symmetric(table.vector("inertia", 6, default).tolist())
     if why := unphysical(mass, tensor):
         table.refuse(why, "mass" if why.startswith("mass") else "inertia")
-    return mass, com, tensor
+    return Body(mass, com, tensor)
 
 
-def checked_torque_constant(joints: Sequence[Section], source: str) -> Array | None:
-    """Return the drive constants, or None where no joint has one and none is needed."""
+def torque_constants(joints: Sequence[Section], source: str) -> Array | None:
+    """The drive constants, or None where no joint has one and none is needed."""
     missing = [joint for joint in joints if "torque_constant" not in joint.values]
     if len(missing) == len(joints) and source != "current":
         return None
@@ -186,8 +170,8 @@ def checked_torque_constant(joints: Sequence[Section], source: str) -> Array | N
     return column(joints, "torque_constant")
 
 
-def checked_gear(joints: Sequence[Section], key: str) -> Array | None:
-    """Return the numbers of a gear between log and joint, 1 where a joint has none, else None."""
+def gear_numbers(joints: Sequence[Section], key: str) -> Array | None:
+    """The numbers of a gear, 1 where a joint has none; None of none."""
     if not any(key in joint.values for joint in joints):
         return None
     found = column(joints, key, default=1.0)
@@ -198,44 +182,34 @@ def checked_gear(joints: Sequence[Section], key: str) -> Array | None:
     return found
 
 
-def checked_friction(joints: Sequence[Section]) -> tuple[JointFriction, ...]:
-    """Return one friction model a joint; a joint without one has the model "none"."""
-    models = [
-        checked_joint_friction(joint.section("friction"))
-        if "friction" in joint.values
-        else JointFriction()
-        for joint in joints
-    ]
-    return tuple(models) if any(m.model != "none" for m in models) else ()
-
-
-def checked_joint_friction(section: Section) -> JointFriction:
-    """Return one joint's ``[joints.friction]``, its keys checked."""
-    name = section.choice("model", (*FRICTION_KEYS, "none"))
+def friction_of(joint: Section) -> JointFriction:
+    """One joint's ``[joints.friction]``, its keys checked."""
+    section = joint.section("friction")
+    there = section.values
+    default = None if "friction" in joint.values else "none"
+    name = section.choice("model", (*FRICTION_MODELS, "none"), default)
     if name == "none":
         return JointFriction()
     for key, other in (PRESLIDING, PRESLIDING[::-1], ("temperature", "temperature_at")):
-        if key in section.values and other not in section.values:
+        if key in there and other not in there:
             section.refuse(f"{other} is missing; {key} needs it beside it", key)
-    required, optional = FRICTION_KEYS[name]
-    keys = (*required, *(key for key in (*optional, *PRESLIDING) if key in section.values))
-    law = section.vector("temperature", 4).tolist() if "temperature" in section.values else ()
+    model = FRICTION_MODELS[name]
+    keys = (*model.required, *(key for key in (*model.optional, *PRESLIDING) if key in there))
+    law = section.vector("temperature", 4).tolist() if "temperature" in there else ()
     if why := lawless(law):
         section.refuse(why, "temperature")
     return JointFriction(
         model=name,
         parameters={key: section.number(key) for key in keys},
-        **(checked_points(section) if name == "points" else {}),
+        **(points(section) if name == "points" else {}),
         temperature=tuple(law),
-        temperature_at=section.number("temperature_at")
-        if "temperature_at" in section.values
-        else None,
+        temperature_at=section.number("temperature_at") if "temperature_at" in there else None,
         confidence=section.text("confidence"),
     )
 
 
-def checked_points(section: Section) -> dict[str, tuple[float, ...]]:
-    """Return the points of a bent line: rising speeds [rad/s] and a torque [N·m] at each."""
+def points(section: Section) -> dict[str, tuple[float, ...]]:
+    """The points of a bent line: rising speeds [rad/s] and a torque [N·m] at each."""
     speeds, torques = (tuple(section.bounded(key, several(2))) for key in ("speeds", "torques"))
     if len(torques) != len(speeds):
         section.refuse(f"there are {len(torques)} torques for {len(speeds)} speeds", "torques")
@@ -244,19 +218,9 @@ def checked_points(section: Section) -> dict[str, tuple[float, ...]]:
     return {"speeds": speeds, "torques": torques}
 
 
-def checked_limits(joints: Sequence[Section]) -> Limits:
-    """Return the joint limits, NaN where the file gives none; a lower one is below its upper."""
-    limits = Limits(**{name: column(joints, name) for name in Limits.__dataclass_fields__})
-    for joint, low, high in zip(joints, limits.q_min, limits.q_max, strict=True):
-        if low >= high:
-            joint.refuse(f"q_min is {low:g} rad, not below q_max {high:g} rad", "q_min")
-    return limits
-
-
 def checked_gains(section: Section) -> dict[str, Mapping[str, Any]]:
-    """Return the ``[observers.*]`` tables: each value is a number, a list of them, or a word."""
-    for name in section.values:
-        own = section.section(name)
+    """The ``[observers.*]`` tables: each value is a number, a list of them, or a word."""
+    for own in map(section.section, section.values):
         for key, value in own.values.items():
             own.value(key, TEXT if isinstance(value, str) else PER_JOINT)
     return dict(section.values)
@@ -275,7 +239,7 @@ ADMITTANCE = {
 
 
 def checked_admittance(section: Section) -> Mapping[str, Any]:
-    """Return ``[admittance]``, the kinds of its keys checked; their range the admittance knows."""
+    """The ``[admittance]`` table, the kinds of its keys checked."""
     for key in section.values:
         if key not in ADMITTANCE:
             section.refuse(f"no key {key!r}; it has {', '.join(ADMITTANCE)}", key)
@@ -288,17 +252,14 @@ def checked_admittance(section: Section) -> Mapping[str, Any]:
 
 
 def checked_payload(section: Section) -> Payload:
-    """Return one payload section as a Payload; `rpy` turns its axes into the flange's."""
-    mass, com, tensor = checked_body(section, default=np.zeros(6).tolist())
-    turn = rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist())
-    return Payload(mass=mass, com=turn @ com, inertia=turn @ tensor @ turn.T)
+    """The load of a payload section; `rpy` turns its axes into the flange's."""
+    body = checked_body(section, default=np.zeros(6).tolist())
+    turn = Pose(rpy_matrix(section.vector("rpy", 3, ORIGIN).tolist()), np.zeros(3))
+    return Payload(**body.moved(turn)._asdict())
 
 
-def checked_poses(section: Section) -> dict[str, Pose]:
-    """Return the poses on the flange that ``[name]``, under "", and each ``[name.NAME]`` state.
-
-    Keys are xyz [m] and rpy [rad]; what is left out is zero.
-    """
+def poses(section: Section) -> dict[str, Pose]:
+    """The poses that ``[name]``, under "", and each ``[name.NAME]`` state."""
     found = {}
     for name, table in section.named_sections("xyz", "rpy").items():
         turn = rpy_matrix(table.vector("rpy", 3, ORIGIN).tolist())
@@ -307,5 +268,12 @@ def checked_poses(section: Section) -> dict[str, Pose]:
 
 
 def column(joints: Sequence[Section], key: str, default: float = math.nan) -> Array:
-    """Return one number a joint, `default` where a joint has none. (n,)"""
+    """One number a joint, `default` where a joint has none. (n,)"""
     return np.array([joint.number(key, default) for joint in joints])
+
+
+def columns(
+    joints: Sequence[Section], kind: type[Limits | SensorNoise], prefix: str = ""
+) -> dict[str, Array]:
+    """The fields of a record, each a number a joint, by keys that begin with a prefix."""
+    return {name: column(joints, prefix + name) for name in kind.__dataclass_fields__}

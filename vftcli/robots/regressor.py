@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vftcli.robots.chain import Chain, flange_jacobian, link_poses
+from vftcli.robots.chain import Chain, flange_jacobian, link_poses, point_tensor
 from vftcli.signals.arrays import Array
 from vftcli.signals.pose import cross, skew
 
@@ -20,27 +20,14 @@ INERTIAL_NAMES = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz
 TENSOR = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))
 
 
-def rotate_z(vectors: Array, cosine: Array, sine: Array) -> Array:
-    """Coordinates of vectors (3, ..., N) in a frame turned about z by the angle. (N,)"""
-    x, y, z = vectors
-    return np.stack([cosine * x + sine * y, cosine * y - sine * x, z])
-
-
 def link_columns(
     axis: Array, lever: Array, omega: Array, alpha: Array, acceleration: Array, out: Array
 ) -> None:
-    """Fill the ten columns of one link for the joints up to its own.
+    """Fill the ten columns of one link for the joints up to its own. (j+1, 10, N)
 
-    The link's force is f = m a + (α̂ + ω̂²) h, its moment about the frame's origin
-    n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the link's axes.
-
-    Args:
-        axis: Joint axes. (3, j+1, N)
-        lever: axis × (origin of the link − origin of the joint). (3, j+1, N) [m]
-        omega: Angular velocity ω. (3, N) [rad/s]
-        alpha: Angular acceleration α. (3, N) [rad/s²]
-        acceleration: Acceleration a of the origin, less gravity. (3, N) [m/s²]
-        out: The columns. (j+1, 10, N)
+    The link's force is f = m a + (α̂ + ω̂²) h with a less gravity, its moment about the frame's
+    origin n = I α + ω × I ω + h × a; a joint feels axis·n + lever·f, all in the link's axes. A
+    lever is axis × (origin of the link − origin of the joint). (3, j+1, N)
     """
     out[:, 0] = np.sum(lever * acceleration[:, None], axis=0)
     first_moment = cross(lever, alpha) + cross(omega, cross(omega, lever))
@@ -57,52 +44,38 @@ def torque_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
 
     Only the chain's geometry and gravity are used. Memory is 80 n² bytes a sample: call it on a
     chunk of a long log.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (N, n) [rad]
-        dq: Joint velocities. (N, n) [rad/s]
-        ddq: Joint accelerations. (N, n) [rad/s²]
     """
     samples, n = q.shape
     out = np.zeros((n, n, LINK, samples))
     cosine, sine = np.cos(q.T), np.sin(q.T)
     omega, alpha = np.zeros((3, samples)), np.zeros((3, samples))
-    acceleration = np.repeat(-chain.gravity[:, None], samples, axis=1)
+    acceleration, axis = -chain.gravity[:, None], np.zeros((3, 1, samples))
+    axis[2] = 1.0
     axes, levers = np.zeros((3, 0, samples)), np.zeros((3, 0, samples))
     for j in range(n):
-        shift = np.repeat(chain.translation[j][:, None], samples, axis=1)
+        shift = chain.translation[j][:, None]
         acceleration = acceleration + cross(alpha, shift) + cross(omega, cross(omega, shift))
         levers = levers + cross(axes, shift)
-        turn = chain.rotation[j].T
-        omega, alpha, acceleration, axes, levers = (
-            rotate_z(np.tensordot(turn, v, axes=1), cosine[j], sine[j])
+        turned = (
+            np.tensordot(chain.rotation[j].T, v, axes=1)
             for v in (omega, alpha, acceleration, axes, levers)
         )
-        spin = np.zeros((3, samples))
-        spin[2] = dq[:, j]
-        alpha = alpha + cross(omega, spin)
-        alpha[2] += ddq[:, j]
-        omega = omega + spin
-        own = np.zeros((3, 1, samples))
-        own[2] = 1.0
-        axes = np.concatenate([axes, own], axis=1)
-        levers = np.concatenate([levers, np.zeros((3, 1, samples))], axis=1)
+        c, s = cosine[j], sine[j]
+        omega, alpha, acceleration, axes, levers = (
+            np.stack([c * x + s * y, c * y - s * x, z]) for x, y, z in turned
+        )
+        alpha = alpha + np.stack([omega[1] * dq[:, j], -omega[0] * dq[:, j], ddq[:, j]])
+        omega[2] += dq[:, j]
+        axes = np.concatenate([axes, axis], axis=1)
+        levers = np.concatenate([levers, np.zeros_like(axis)], axis=1)
         link_columns(axes, levers, omega, alpha, acceleration, out[: j + 1, j])
     return np.ascontiguousarray(out.transpose(3, 0, 1, 2)).reshape(samples, n, n * LINK)
 
 
 def load_wrench(chain: Chain, q: Array) -> Array:
-    """Wrench of a load's weight, by its mass and its first moment m·c. (N, 6, 4)
+    """Wrench of a load's weight, by its mass and moment m·c. (N, 6, 4)
 
-    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange.
-
-    Args:
-        chain: The arm.
-        q: Joint positions. (N, n) [rad]
-
-    Returns:
-        In base axes, the moment about the flange point.
+    A mass m at c in flange axes pulls with m g₀, and turns by R m c × g₀ about the flange point.
     """
     gravity = np.asarray(chain.gravity)
     wrench = np.zeros((len(q), 6, 4))
@@ -123,27 +96,21 @@ def chain_parameters(chain: Chain) -> Array:
     phi = np.empty((chain.joints, LINK))
     for j in range(chain.joints):
         m, c = chain.mass[j], chain.com[j]
-        about_origin = chain.inertia[j] + m * (np.dot(c, c) * np.eye(3) - np.outer(c, c))
+        about_origin = chain.inertia[j] + m * point_tensor(c)
         phi[j] = [m, *(m * c), *(about_origin[r, s] for r, s in TENSOR)]
     return phi.ravel()
 
 
 def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
-    """The chain with other inertial parameters φ (10n,) and, if given, rotor inertias. (n,)"""
-    masses, coms, inertias = [], [], []
+    """The chain with other parameters φ (10n,) and rotor inertias. (n,)"""
+    bodies = []
     for row in phi.reshape(chain.joints, LINK):
         mass = float(row[0])
         com = row[1:4] / mass if mass > 0 else np.zeros(3)
         tensor = np.empty((3, 3))
         for value, (r, c) in zip(row[4:], TENSOR, strict=True):
             tensor[r, c] = tensor[c, r] = value
-        masses.append(mass)
-        coms.append(com)
-        inertias.append(tensor - mass * (np.dot(com, com) * np.eye(3) - np.outer(com, com)))
-    return replace(
-        chain,
-        mass=np.array(masses),
-        com=np.array(coms),
-        inertia=np.array(inertias),
-        rotor_inertia=chain.rotor_inertia if rotor_inertia is None else rotor_inertia,
-    )
+        bodies.append((mass, com, tensor - mass * point_tensor(com)))
+    masses, coms, inertias = map(np.array, zip(*bodies, strict=True))
+    rotors = chain.rotor_inertia if rotor_inertia is None else rotor_inertia
+    return replace(chain, mass=masses, com=coms, inertia=inertias, rotor_inertia=rotors)

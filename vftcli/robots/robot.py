@@ -22,9 +22,9 @@ TORQUE_SOURCES = ("current", "link_torque", "joint_torque")
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class JointFriction(Shown):
-    """Friction of one joint: a model's name and its parameters (the keys of the robot file)."""
+    """Friction of one joint: a model's name and its parameters."""
 
-    model: str = "none"  #: A name in `vftcli.robots.friction.MODELS`, or "none".
+    model: str = "none"  #: A name in `vftcli.robots.friction.FRICTION_MODELS`, or "none".
     #: The model's numbers by key, in SI units of torque, rad and rad/s; beside those of the model
     #: `presliding` [N·m] and `presliding_length` [rad], both or neither.
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -57,8 +57,15 @@ class JointFriction(Shown):
         return table
 
 
+class PerJoint(Shown):
+    """A record whose fields all have a number a joint."""
+
+    def __post_init__(self) -> None:
+        seal(self, *vars(self))
+
+
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Limits(Shown):
+class Limits(PerJoint):
     """Joint limits; NaN where the description gives none."""
 
     q_min: Array  #: Lower position limits. (n,) [rad]
@@ -67,21 +74,15 @@ class Limits(Shown):
     tau_max: Array  #: Torque limits. (n,) [N·m]
     qdd_max: Array  #: Acceleration limits. (n,) [rad/s²]
 
-    def __post_init__(self) -> None:
-        seal(self, *vars(self))
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class SensorNoise(Shown):
+class SensorNoise(PerJoint):
     """Standard deviations of the joint measurements; NaN where unknown."""
 
     current: Array  #: Motor current. (n,) [A]
     tau: Array  #: Joint torque. (n,) [N·m]
     q: Array  #: Position. (n,) [rad]
     qd: Array  #: Velocity. (n,) [rad/s]
-
-    def __post_init__(self) -> None:
-        seal(self, *vars(self))
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -191,11 +192,7 @@ class Robot(Shown):
         write(Path(file), import_module("vftcli.robots.writing").robot_toml(self), force)
 
     def with_payload(self, payload: str | Payload | None) -> "Robot":
-        """Return the robot with a load on its flange: a name from the file, a Payload, or None.
-
-        Raises:
-            RobotError: If the file names no such payload.
-        """
+        """The robot with a load on its flange: a name from the file, a Payload, or None."""
         if isinstance(payload, str):
             if payload not in self.payloads:
                 there = ", ".join(self.payloads) or "none"
@@ -211,11 +208,7 @@ class Robot(Shown):
         return replace(self, friction=())
 
     def with_simulated_friction(self) -> "Robot":
-        """Return the robot with the friction of a simulator, for ``model.friction=model``.
-
-        Raises:
-            RobotError: If its description gives none.
-        """
+        """The robot with the friction of a simulator, for ``model.friction=model``."""
         if not self.simulated_friction:
             raise RobotError(
                 f"{self.name}: model.friction=model is what an MJCF gives its joints (damping, "

@@ -52,59 +52,42 @@ def either_way(size: float, unit: str) -> Bound:
     return Bound(-size, size, unit)
 
 
-LENGTH = either_way(100.0, "m")
-ANGLE = either_way(4.0 * math.pi, "rad")  # two turns; degrees written for radians are beyond them
-TRAVEL = either_way(1e4, "rad")  # a joint may turn on and on, as a winch does
-TORQUE = either_way(1e6, "N·m")
-TENSOR = either_way(1e6, "kg·m²")  # the heaviest body at a tenth of the longest lever
 #: Smallest value of what is divided by: no drive constant, velocity or rate is smaller.
 TINY = 1e-9
 #: Key of a robot file → its bound; in a list every number is held to it.
 BOUNDS: dict[str, Bound] = {
-    "a": LENGTH,
-    "d": LENGTH,
-    "alpha": ANGLE,
-    "theta": ANGLE,
-    "xyz": LENGTH,
-    "rpy": ANGLE,
-    "flange_d": LENGTH,
-    "ee_xyz": LENGTH,
-    "ee_rpy": ANGLE,
-    "com": LENGTH,
-    "mass": Bound(0.0, 1e4, "kg"),
-    "inertia": TENSOR,
-    "rotor_inertia": Bound(0.0, 1e4, "kg·m²"),  # a 1 kg·m² rotor behind a gear of 100
-    "torque_constant": Bound(TINY, 1e5, "N·m/A"),  # 100 N·m/A behind a gear of 1000
-    "gravity": either_way(100.0, "m/s²"),  # four times Jupiter's
-    "sample_rate_hz": Bound(TINY, 1e6, "Hz"),
-    "q_min": TRAVEL,
-    "q_max": TRAVEL,
-    "qd_max": Bound(TINY, 1e4, "rad/s"),
-    "qdd_max": Bound(TINY, 1e6, "rad/s²"),
-    "tau_max": Bound(TINY, 1e6, "N·m"),
-    "noise_current": Bound(0.0, 1e4, "A"),
-    "noise_tau": Bound(0.0, 1e4, "N·m"),
-    "noise_q": Bound(0.0, 10.0, "rad"),
-    "noise_qd": Bound(0.0, 1e3, "rad/s"),
-    "coulomb": TORQUE,
-    "viscous": either_way(1e6, "N·m·s/rad"),
-    "quadratic": either_way(1e6, "N·m·s²/rad²"),
-    "offset": TORQUE,
-    "amplitude": TORQUE,
-    "stribeck": TORQUE,
-    "logarithmic": TORQUE,
-    "load_coulomb": either_way(10.0, ""),  # a share of the torque that the gear carries
-    "smoothing": Bound(TINY, 1e3, "rad/s"),
-    "stribeck_velocity": Bound(TINY, 1e3, "rad/s"),
-    "logarithmic_velocity": Bound(TINY, 1e3, "rad/s"),
-    "presliding": Bound(0.0, 1e6, "N·m"),
-    "presliding_length": Bound(1e-7, 0.1, "rad"),  # a gear yields .1 to 10 mrad before it slides
-    "speeds": Bound(TINY, 1e3, "rad/s"),
-    "torques": TORQUE,
-    "temperature": either_way(1e3, ""),
-    "temperature_at": Bound(1.0, 100.0, "°C"),
-    "slope": either_way(1e6, "s/rad"),
-    "shift": either_way(1e3, "rad/s"),
+    key: bound
+    for keys, bound in {
+        "a d xyz com flange_d ee_xyz": either_way(100.0, "m"),
+        # two turns; degrees written for radians are beyond them
+        "alpha theta rpy ee_rpy": either_way(4.0 * math.pi, "rad"),
+        "q_min q_max": either_way(1e4, "rad"),  # a joint may turn on and on, as a winch does
+        "mass": Bound(0.0, 1e4, "kg"),
+        "inertia": either_way(1e6, "kg·m²"),  # the heaviest body at a tenth of the longest lever
+        "rotor_inertia": Bound(0.0, 1e4, "kg·m²"),  # a 1 kg·m² rotor behind a gear of 100
+        "torque_constant": Bound(TINY, 1e5, "N·m/A"),  # 100 N·m/A behind a gear of 1000
+        "gravity": either_way(100.0, "m/s²"),  # four times Jupiter's
+        "sample_rate_hz": Bound(TINY, 1e6, "Hz"),
+        "qd_max": Bound(TINY, 1e4, "rad/s"),
+        "qdd_max": Bound(TINY, 1e6, "rad/s²"),
+        "tau_max": Bound(TINY, 1e6, "N·m"),
+        "noise_current": Bound(0.0, 1e4, "A"),
+        "noise_tau": Bound(0.0, 1e4, "N·m"),
+        "noise_q": Bound(0.0, 10.0, "rad"),
+        "noise_qd": Bound(0.0, 1e3, "rad/s"),
+        "coulomb offset amplitude stribeck logarithmic torques": either_way(1e6, "N·m"),
+        "viscous": either_way(1e6, "N·m·s/rad"),
+        "quadratic": either_way(1e6, "N·m·s²/rad²"),
+        "load_coulomb": either_way(10.0, ""),  # a share of the torque that the gear carries
+        "smoothing stribeck_velocity logarithmic_velocity speeds": Bound(TINY, 1e3, "rad/s"),
+        "presliding": Bound(0.0, 1e6, "N·m"),
+        "presliding_length": Bound(1e-7, 0.1, "rad"),  # a gear yields .1 to 10 mrad, then slides
+        "temperature": either_way(1e3, ""),
+        "temperature_at": Bound(1.0, 100.0, "°C"),
+        "slope": either_way(1e6, "s/rad"),
+        "shift": either_way(1e3, "rad/s"),
+    }.items()
+    for key in keys.split()
 }
 UNNAMED = either_way(1e6, "")  #: The bound of a number whose key is not listed.
 #: Least mass of all moving bodies together: the lightest arms have servos of a few grams. [kg]
@@ -145,10 +128,8 @@ class RobotFile:
     def line(self, table: str, index: int | None, key: str) -> int | None:
         """Line of `key` in `table`, from 1, or of the table's header.
 
-        Args:
-            table: Dotted name, "" for the keys before any table.
-            index: Which ``[[joints]]`` the table belongs to, from 0, or None outside of them.
-            key: The key to look for.
+        The keys before any table have the name ""; `index` is the ``[[joints]]`` that a table
+        belongs to, from 0, None outside of them.
         """
         header = 1 if table == "" else None
         assigns = re.compile(rf"[\"']?{re.escape(key)}[\"']?\s*=")
@@ -187,8 +168,8 @@ class Section(NamedTuple):
         where = f"{self.file.path}" + (f", line {line}" if line else "")
         whose = ""
         if self.joint is not None:
-            label = joint_label(self.file.document, self.joint)
-            whose = f"joint {self.joint + 1}{f' ({label})' if label else ''}: "
+            name = self.file.document["joints"][self.joint].get("name", "")
+            whose = f"joint {self.joint + 1}{f' ({name})' if name else ''}: "
         raise RobotError(f"{where}: {whose}{message}")
 
     def value(self, key: str, kind: ValueKind, default: Any = None) -> Any:  # noqa: ANN401 - TOML's
@@ -249,16 +230,8 @@ class Section(NamedTuple):
         return {**found, "": self} if any(key in self.values for key in keys) else found
 
 
-def joint_label(document: Mapping[str, Any], index: int) -> str:
-    """The name that a file gives to its joint of an index, "" where it gives none."""
-    tables = document.get("joints")
-    if not isinstance(tables, list) or index >= len(tables) or not isinstance(tables[index], dict):
-        return ""
-    return str(tables[index].get("name", ""))
-
-
 def robot_text(path: Path, what: str = "robot file") -> str:
-    """The text of a robot file, whatever its format, or of what is kept in a part of one."""
+    """The text of a robot file, whatever its format."""
     try:
         # The pipe of a shell's <(…) has no ending; a robot's file has one, and is read twice.
         if not (path.is_file() or (path.is_fifo() and not path.suffix)):

@@ -137,7 +137,7 @@ class Run(Shown):
         return self.holding(terms=replace(self.terms, mu=mu))
 
     def holding(self, **values: object) -> "Run":
-        """The same recording with other values of what the model says, by their names here."""
+        """The same recording with other values of what the model says."""
         made = replace(self)
         vars(made).update(values)
         return made
@@ -151,11 +151,7 @@ class Run(Shown):
         return replace(self, recording=motion).holding(**values)
 
     def spare(self) -> None:
-        """Of a long recording give back what can be made anew, should anyone ask for it.
-
-        That takes less time than a pass of the observers, and all of a log's results have no room
-        beside it.
-        """
+        """Of a long recording give back what can be made anew in less than an observer's pass."""
         self.recording.release()
         if self.recording.samples > LONG and "terms" in vars(self):
             _ = self.noise

@@ -42,14 +42,9 @@ def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
 
     A sample is the map x → clip(x, q − s₀, q + s₀). Two such maps make one of the same kind,
     clip(clip(x, a, b), a′, b′) = clip(x, clip(a, a′, b′), clip(b, a′, b′)), so blocks of samples
-    run side by side and the maps of whole blocks one after another. Only comparisons are made: the
-    result is that of a loop to the last bit.
-
-    Args:
-        q: Joint angles. (T, n) [rad]
-        length: Presliding length s₀ > 0, one number or one a joint. [rad]
-        centre: c before the first sample; None for one that starts undeflected, c = q⁰, which is
-            wrong by at most the whole deflection until the joint has moved 2 s₀. (n,) [rad]
+    run side by side and their maps one after another, equal to a loop to the last bit. Without the
+    centre c before the first sample it starts undeflected, c = q⁰, wrong by at most the whole
+    deflection until the joint has moved 2 s₀.
     """
     reach = np.asarray(length, dtype=np.float64)
     if not len(q):
@@ -61,13 +56,7 @@ def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
 
 
 def follow(low: Array, high: Array, start: Array) -> Array:
-    """What clipping to [low, high] sample after sample makes of `start`. (T, n)
-
-    Args:
-        low: Lower limits. (T, n)
-        high: Upper limits, none below the lower one. (T, n)
-        start: The value before the first sample. (n,)
-    """
+    """What clipping to [low, high] sample after sample makes of `start` (n,). (T, n)"""
     samples = len(low)
     if samples <= BLOCK:
         out, value = np.empty_like(low), start
@@ -92,22 +81,17 @@ def clipped(value: Array, low: Array, high: Array) -> Array:
 
 
 def in_blocks(limits: Array, blocks: int) -> Array:
-    """Samples as position in block × block × joint, the last block filled with its last sample."""
+    """Samples as position in block × block × joint, the last one filled up."""
     padded = np.concatenate([limits, np.repeat(limits[-1:], blocks * BLOCK - len(limits), axis=0)])
     shaped = padded.reshape(blocks, BLOCK, -1)
     return np.ascontiguousarray(shaped.swapaxes(0, 1))
 
 
 class RunningFriction:
-    """The friction of an arm's joints, stretch after stretch of a motion, or sample by sample.
+    """The friction of an arm's joints, stretch after stretch of a motion.
 
-    Presliding friction depends on where the joint came from. Stretches that follow each other give
-    the torque of the whole in one piece, to the last bit.
-
-    Attributes:
-        friction: One model a joint; empty for a frictionless arm.
-        centre: c of the play operator after the last sample, of the joints that have presliding
-            friction; None before the first. (m,) [rad]
+    Presliding friction depends on where a joint came from: `centre` is c after the last sample of
+    the joints that have it, None before the first (m,) [rad].
     """
 
     def __init__(self, friction: Sequence[JointFriction]) -> None:
@@ -125,15 +109,7 @@ class RunningFriction:
         load: Array | None = None,
         temperature: Array | None = None,
     ) -> Array:
-        """Friction torque of the next samples, opposing motion when subtracted. (T, n) [N·m]
-
-        Args:
-            q: Joint angles. (T, n) [rad]
-            dq: Joint velocities. (T, n) [rad/s]
-            load: Gravity torques of the loaded arm. (T, n) [N·m]
-            temperature: Joint temperatures, NaN where not measured; None for those at which the
-                models were taken. (T, n) [°C]
-        """
+        """Friction torque of the next samples, as `friction_torque` has it. (T, n) [N·m]"""
         return friction_torque(
             self.friction, dq, load, deflection=self.deflection(q), temperature=temperature
         )
@@ -144,11 +120,7 @@ class RunningFriction:
         return any(joint.parameters.get("load_coulomb", 0.0) for joint in self.friction)
 
     def deflection(self, q: Array) -> Array | None:
-        """State s of the play operator along the next samples; None without one. (T, n)
-
-        Args:
-            q: Angles of the joints. (T, n) [rad]
-        """
+        """State s of the play operator along the next angles; None without one."""
         if not self._joints:
             return None
         found = play(q[:, self._joints], self._length, self.centre)
@@ -159,7 +131,7 @@ class RunningFriction:
 
 
 def measured_temperature(recording: Recording) -> Array | None:
-    """A log's joint temperatures, NaN where they are none; None where none are. (T, n) [°C]
+    """A log's joint temperatures, NaN where they are none. (T, n) [°C]
 
     Controllers that do not measure them write zeros.
     """

@@ -1,6 +1,6 @@
 """From what the drives measure to the dynamics terms: all an observer sees of robot and log."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -36,70 +36,56 @@ def check_joints(recording: Recording, robot: Robot) -> None:
         )
 
 
-def uses_current(recording: Recording, robot: Robot) -> bool:
-    """Whether the drive torque comes from motor current rather than from a torque signal."""
-    if robot.torque_source == "current":
-        return recording.current is not None or not has_torque(recording)
-    return not has_torque(recording) and recording.current is not None
-
-
 def effort_name(recording: Recording, robot: Robot) -> str:
-    """The signal that the drive torque comes from, one of `vftcli.signals.recording.EFFORTS`."""
-    if uses_current(recording, robot):
-        return "current"
-    return "torque" if recording.torque is not None else "torque_without_gravity"
+    """The signal of `EFFORTS` that the drive torque comes from.
+
+    A robot described by currents whose log has only torques uses the torques, and the other way
+    round if its file has torque constants.
+    """
+    ranked = EFFORTS if robot.torque_source == "current" else (*EFFORTS[1:], EFFORTS[0])
+    return next((name for name in ranked if getattr(recording, name) is not None), ranked[0])
+
+
+def uses_current(recording: Recording, robot: Robot) -> bool:
+    """Whether the drive torque comes from motor current."""
+    return effort_name(recording, robot) == "current"
 
 
 def gain_sd(recording: Recording, robot: Robot) -> float:
-    """How well a log's torques are known as a whole: a standard deviation over the value. [1]"""
+    """How well a log's torques are known, relative to them. [1]"""
     return CONSTANT_SD if uses_current(recording, robot) else SENSOR_SD
-
-
-def has_torque(recording: Recording) -> bool:
-    """Whether the log has a torque signal, with gravity in it or without."""
-    return recording.torque is not None or recording.torque_without_gravity is not None
 
 
 def drive_torque(recording: Recording, robot: Robot) -> Array:
     """Torque of the drives at the joints, friction not yet taken off. (T, n) [N·m]
 
-    τ = K i where the robot's torque source is current, else the measured torque. A robot described
-    by currents whose log has only torques uses the torques, and the other way round if its file
-    has torque constants. Torques without gravity get the gravity torque g(q) of the arm with its
-    payload: τ = e + g(q).
+    τ = K i where `effort_name` is current, else the measured torque. Torques without gravity get
+    the gravity torque g(q) of the arm with its payload: τ = e + g(q).
     """
     check_joints(recording, robot)
-    if all(getattr(recording, name) is None for name in EFFORTS):
+    name = effort_name(recording, robot)
+    if getattr(recording, name) is None:
         raise MissingSignalError(
             f"{recording.name}: the log has no joint torques and no motor currents, and "
             f"positions alone carry no force; it has {', '.join(recording.signals)}. Record "
             "them, or name their columns with --columns"
         )
-    name = effort_name(recording, robot)
-    if name == "torque_without_gravity" and recording.torque_without_gravity is not None:
+    effort = recording.require(name)
+    if name == "torque_without_gravity":
         still = np.zeros_like(recording.q)
-        gravity = momentum_terms(robot.loaded_chain, recording.q, still).gravity
-        return np.asarray(recording.torque_without_gravity + gravity)
-    if name != "current":
-        return recording.require("torque")
-    current = recording.require("current")
+        return effort + momentum_terms(robot.loaded_chain, recording.q, still).gravity
+    if name == "torque":
+        return effort
     if robot.torque_constant is None:
         raise MissingSignalError(
             f"{recording.name}: the log has motor currents but robot {robot.name!r} has no "
             "torque_constant; give one per joint in its TOML file, or record torques"
         )
-    return current * robot.torque_constant
+    return effort * robot.torque_constant
 
 
 class RunningTerms:
-    """The terms of a log's blocks, one after another: together they are those of the whole log.
-
-    Attributes:
-        robot: The arm, its payload mounted.
-        clock: The clock of the whole log; None where it comes as one block.
-        literal: Whether to use the paper's numeric method (7)–(16) instead of the batched kernels.
-        before: The last sample so far, None before the first.
-    """
+    """The terms of a log's blocks in turn, together those of the whole log."""
 
     def __init__(self, robot: Robot, clock: Clock | None = None, *, literal: bool = False) -> None:
         self.robot, self.clock, self.literal = robot, clock, literal
@@ -137,41 +123,34 @@ class RunningTerms:
         self.before = terms.last
         return terms
 
-    def _chunks(self, q: Array, dq: Array) -> Iterator[tuple[slice, Array, list[Array]]]:
-        """P, Cᵀq̇ − g and, if friction asks for it, g: by chunks, the paper's method all at once."""
-        if not self.literal:
-            wanted = ("p", "bias", *(("gravity",) if self._friction.takes_load else ()))
-            yield from momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
-            return
-        p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
-        yield slice(0, len(q)), dq, [p, coriolis - gravity, gravity]
+    def _chunks(self, q: Array, dq: Array) -> Iterable[tuple[slice, Array, list[Array]]]:
+        """P, Cᵀq̇ − g and, if friction asks for it, g, by chunks."""
+        if self.literal:
+            p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
+            return [(slice(0, len(q)), dq, [p, coriolis - gravity, gravity])]
+        wanted = ("p", "bias", *["gravity"] * self._friction.takes_load)
+        return momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
 
 
 def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
-    """Evaluate p and μ along a whole recording.
-
-    Args:
-        recording: The log.
-        robot: The arm, its payload mounted.
-        literal: Use the paper's numeric method (7)–(16) instead of the batched kernels.
+    """P and μ along a recording, `literal` by the paper's (7)–(16).
 
     Raises:
         MissingSignalError: If velocities, or both currents and torques, are missing.
         RobotError: If the number of joints differs.
     """
-    check_joints(recording, robot)
     return RunningTerms(robot, literal=literal).next(recording)
 
 
 def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
-    """The measured effort (T, n) and what turns it into torque: K [N·m/A], or 1 for torques."""
+    """The measured effort (T, n) and its factor: K [N·m/A], or 1."""
     if uses_current(recording, robot) and robot.torque_constant is not None:
         return recording.require("current"), robot.torque_constant
     return drive_torque(recording, robot), 1.0
 
 
 def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  # noqa: ANN401
-    r"""Evaluate p, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
+    r"""P, Cᵀq̇ and g as the paper prints them, (7)–(16), from inverse dynamics alone.
 
     It is slow (n + 3 calls of RNEA a sample) and good to about 5e-6 N·m, because (11)
     differentiates numerically. It stays for three purposes: an oracle that shares no code with
@@ -179,11 +158,6 @@ def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  #
 
     p = rnea(q, 0, q̇, 0) (8); Ṁq̇ ≈ Σᵢ [rnea(q+Δqᵢ, 0, q̇, 0) − p]/Δq · q̇ᵢ (11);
     Cq̇ = rnea(q, q̇, 0, 0) (12); Cᵀq̇ = Ṁq̇ − Cq̇ (14); G = rnea(q, 0, 0, g₀) (16).
-
-    Args:
-        model: Pinocchio model; its rotor inertia (`armature`) counts in M.
-        q: Joint positions. (T, n) [rad]
-        dq: Joint velocities. (T, n) [rad/s]
     """
     pin = needed("pinocchio", "the paper's numeric method")
 

@@ -5,24 +5,16 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.robots.chain import Body
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import IDENTITY, Pose, exp_matrix
 
 MOST = 1000  #: Links and joints of a description: a humanoid with two hands has a fifth of it.
 TURNING = ("revolute", "continuous")  #: Kinds of joints that an arm is made of.
-
-
-class Body(NamedTuple):
-    """The inertia of a link: mass [kg], centre [m] and tensor about it [kg·m²], in its own axes."""
-
-    mass: float
-    com: Array
-    inertia: Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,12 +107,17 @@ class BodyTree:
 
     @cached_property
     def links(self) -> tuple[str, ...]:
-        """The links below the root and it, each behind its parent, one branch after the other."""
+        """The root and the links below it, each behind its parent."""
         order, waiting = [], [self.root]
         while waiting:
             order.append(link := waiting.pop())
             waiting += [joint.child for joint in reversed(self.below[link])]
         return tuple(order)
+
+    @cached_property
+    def inner(self) -> tuple[TreeJoint, ...]:
+        """The joints above these links, each behind those above its parent."""
+        return tuple(self.above[link] for link in self.links[1:])
 
     def path_to(self, link: str) -> list[TreeJoint]:
         """The joints from the root to a link."""

@@ -2,15 +2,15 @@
 
 import re
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.chain import symmetric
+from vftcli.robots.chain import Body, symmetric
 from vftcli.robots.profile import UPRIGHT
 from vftcli.robots.robot_file import BOUNDS
-from vftcli.robots.tree import MOST, Body, BodyTree, TreeJoint
+from vftcli.robots.tree import MOST, BodyTree, TreeJoint
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import shown
@@ -48,17 +48,11 @@ def urdf_tree(path: Path, root: ET.Element) -> BodyTree:
     )
 
 
-class UrdfPart:
-    """A link or a joint of a URDF, read number by number.
+class UrdfPart(NamedTuple):
+    """A link or a joint of a URDF, read number by number."""
 
-    Attributes:
-        path: The file.
-        element: The link or the joint.
-    """
-
-    def __init__(self, path: Path, element: ET.Element) -> None:
-        self.path = path
-        self.element = element
+    path: Path  #: The file.
+    element: ET.Element  #: The link or the joint.
 
     @property
     def name(self) -> str:
@@ -128,7 +122,7 @@ class UrdfPart:
         return unit
 
     def limits(self, *, endless: bool) -> dict[str, float]:
-        """What <limit> gives: positions where the joint has an end, speed and torque above zero."""
+        """What <limit> gives; of an endless joint no positions."""
         found = self.element.find("limit")
         if found is None:
             return {}

@@ -1,5 +1,6 @@
 """Robot files as text: schema 1, written so that `load_robot` reads the same robot back."""
 
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,17 +21,13 @@ AGREES = 1e-12  #: Relative difference below which a number of the file is taken
 
 
 def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:
-    """The robot as the text of a robot file.
-
-    Sections and keys of the file the robot came from that are not physical numbers of the arm
-    (gains, sources, words) are kept as they are.
-    """
+    """The robot as the text of a robot file, its words kept."""
     comments = "".join(f"# {line}\n" for line in heading)
     return comments + "".join(lines_of(robot_document(robot)))
 
 
 def robot_document(robot: Robot) -> Table:
-    """The tables of a robot's file, its numbers brought up to date with the robot. Schema 1."""
+    """The tables of a robot's file, brought up to date. Schema 1."""
     old = dict(robot.document)
     if old.get("convention") not in CONVENTIONS:
         old = xyz_rpy_document(robot)
@@ -50,8 +47,8 @@ def robot_document(robot: Robot) -> Table:
 
 
 def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Chain) -> None:
-    """Put the chain's inertials into the joint tables, in the frames of the file's convention."""
-    frames = kinematics(document["convention"], tables, document).inertial_frames
+    """Put the chain's inertials into the joint tables, in their frames."""
+    _, frames, _ = kinematics(document["convention"], tables, document)
     for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
         R = frame.rotation
         tensor = R.T @ chain.inertia[j] @ R
@@ -107,7 +104,7 @@ def xyz_rpy_document(robot: Robot) -> Table:
 
 
 def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:
-    """The lines of a table: its values first, then its tables, then its arrays of tables."""
+    """The lines of a table: values, then tables, then arrays of tables."""
     for key, value in document.items():
         if not is_table(value) and not is_tables(value):
             yield f"{bare(key)} = {value_text(value, '.'.join((*path, key)))}\n"
@@ -141,20 +138,17 @@ def bare(key: str) -> str:
 
 def quoted(text: str) -> str:
     """A string in TOML's double quotes, with the escapes that these need."""
-    escapes = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\r": "\\r", "\t": "\\t"}
-    out = "".join(escapes.get(c, c) for c in text)
-    return '"' + "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in out) + '"'
+    out = json.dumps(text, ensure_ascii=False)
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in out)
 
 
 def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
     """A value as TOML; floats with as many digits as tell them apart."""
     match value:
-        case bool():
-            return "true" if value else "false"
         case str():
             return quoted(value)
-        case int():
-            return str(value)
+        case int():  # true and false too
+            return json.dumps(value)
         case float():
             return repr(value) if math.isfinite(value) else str(value)
         case list() | tuple():

@@ -13,7 +13,7 @@ from typing import Any
 
 
 def limit(seconds: int, memory: int) -> None:
-    """Have the system end this process after so much of a processor's time [s] or memory [B]."""
+    """Let the system end this process after some time [s] or memory [B]."""
     with suppress(ImportError):  # Windows has no such limits
         import resource
 
@@ -49,7 +49,7 @@ def guarded(load: Callable[[str], Any], xacro: Any, folders: list[Path]) -> Call
 
 
 def expand(asked: Mapping[str, Any]) -> dict[str, Any]:
-    """Text of the URDF, the files that were read, and why it failed, "" where it did not."""
+    """Text of the URDF, the files that were read, and why it failed."""
     import xacro
     from xacro import substitution_args
     from xacrodoc import packages

@@ -17,11 +17,9 @@ Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
 def frozen(value: ArrayLike) -> Array:
-    """Return a read-only float64 array that nobody else can write to.
+    """A read-only float64 array that nobody else can write to.
 
-    An array that already is float64 and read-only, down to the memory it is a view of, is returned
-    as it is, so that a large log is not copied each time it passes from one type to the next. A
-    copy keeps the order in memory.
+    One that is so already, down to the memory it is a view of, is not copied.
     """
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
         return value
@@ -42,7 +40,7 @@ def is_sealed(value: NDArray[Any]) -> bool:
 
 
 def release(memory: object) -> None:
-    """Let go of the pages of a mapped file that were touched so far; they can be read again."""
+    """Let go of a mapped file's pages; they can be read again."""
     while isinstance(memory, np.ndarray):
         memory = memory.base
     mapped = memory.obj if isinstance(memory, memoryview) else None
@@ -58,10 +56,7 @@ def pieces(values: NDArray[Any], size: int = 1 << 16) -> Iterator[NDArray[Any]]:
 
 
 def handed_over(value: Array) -> Array:
-    """Make a freshly computed array read-only in place and return it: `frozen` without the copy.
-
-    Only for arrays that the caller made itself and will not write to again.
-    """
+    """Make the caller's own new array read-only in place and return it."""
     value.setflags(write=False)
     if isinstance(value.base, np.ndarray):
         value.base.setflags(write=False)
@@ -79,7 +74,7 @@ def number_array(value: ArrayLike, name: str, owner: str) -> Array:
 
 
 def seal(owner: object, *names: str) -> None:
-    """Make the named arrays of a frozen dataclass read-only float64 ones; None stays None."""
+    """Make the named arrays of a frozen dataclass read-only; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
@@ -94,17 +89,12 @@ def frozen_mask(value: ArrayLike) -> Mask:
 
 
 def empty_series(samples: int, columns: int) -> Array:
-    """An uninitialised (T, n) array whose columns are contiguous: series are read along time."""
+    """An uninitialised (T, n) array whose columns are contiguous."""
     return np.empty((columns, samples)).T
 
 
 def at(chosen: Mask, x: Array) -> Array:
-    """The chosen samples of a series, its columns contiguous. (S, n)
-
-    Args:
-        chosen: Which samples. (T,)
-        x: The series. (T, n)
-    """
+    """The chosen samples (T,) of a series (T, n), its columns contiguous. (S, n)"""
     out = empty_series(int(np.count_nonzero(chosen)), x.shape[1])
     for column, values in zip(out.T, x.T, strict=True):
         np.compress(chosen, values, out=column)
@@ -112,33 +102,33 @@ def at(chosen: Mask, x: Array) -> Array:
 
 
 def check_clock(t: Array, what: str) -> None:
-    """Raise unless `t` is one-dimensional, finite and strictly increasing.
-
-    Args:
-        t: Time. (T,) [s]
-        what: Whose clock it is, for the message.
-    """
+    """Raise unless a clock `t` [s] is one-dimensional, finite and strictly increasing."""
     if np.ndim(t) != 1:
         raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
     # Between two finite ends a clock that always increases is finite.
-    if len(t) and np.isfinite(t[0]) and np.isfinite(t[-1]) and np.all(t[1:] > t[:-1]):
+    if not len(t) or (np.all(np.isfinite(t[[0, -1]])) and np.all(t[1:] > t[:-1])):
         return
     if not np.all(np.isfinite(t)):
         k = int(np.argmin(np.isfinite(t)))
         raise ClockError(f"the clock of {what} is not finite at sample {k}")
-    steps = np.diff(t)
-    if np.any(steps <= 0):
-        k = int(np.argmax(steps <= 0))
-        raise ClockError(
-            f"the clock of {what} stops increasing at sample {k + 1} "
-            f"({t[k]:.6f} s, then {t[k + 1]:.6f} s)"
-        )
+    k = int(np.argmax(np.diff(t) <= 0))
+    raise ClockError(
+        f"the clock of {what} stops increasing at sample {k + 1} "
+        f"({t[k]:.6f} s, then {t[k + 1]:.6f} s)"
+    )
 
 
 def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: str) -> None:
     """Raise a ShapeError unless `value` has `shape`."""
     if np.shape(value) != shape:
         raise ShapeError(f"{name} of {owner} has shape {np.shape(value)}; expected {shape}")
+
+
+def check_fields(owner: object, called: str, shape: tuple[int, ...], *names: str) -> None:
+    """Raise a ShapeError unless the named fields are None or have `shape`."""
+    for name in names:
+        if (value := getattr(owner, name)) is not None:
+            check_shape(value, shape, name, called)
 
 
 def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) -> None:
@@ -150,10 +140,7 @@ def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) ->
 
 
 def median(values: Array) -> float:
-    """Median of a non-empty one-dimensional array.
-
-    NumPy's own imports its masked arrays, which cost more than the rest of a short command.
-    """
+    """Median of a (T,) array; NumPy's own imports its masked arrays."""
     middle = len(values) // 2
     if len(values) % 2:
         return float(np.partition(values, middle)[middle])
@@ -167,8 +154,7 @@ EVEN = 1e-6  #: How far the steps of an even clock are from their median at most
 def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
     """Whether all steps of a clock are equal to within `tolerance` of their median.
 
-    The tolerance covers the rounding of stamps printed with nine digits; a clock that jitters more
-    than that is treated step by step, because a fixed mean step would be wrong.
+    That covers the rounding of stamps of nine digits.
     """
     steps = np.diff(t)
     if steps.size == 0:

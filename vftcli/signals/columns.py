@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.signals.packages import installed, needed
-from vftcli.signals.recording import MEANINGS
+from vftcli.signals.recording import COLUMN_NAMES, SIGNALS
 from vftcli.signals.wrench import AXES, unit_of
 
 if TYPE_CHECKING:
@@ -20,16 +20,7 @@ TORQUE, FORCE = "N·m", "N and N·m"
 COLUMNS: dict[str, tuple[str, str]] = {
     "t": ("s", "time"),
     "t_src_ns": ("ns", "time on the log's own clock"),
-    "q": ("rad", MEANINGS["q"]),
-    "dq": ("rad/s", MEANINGS["dq"]),
-    "current": ("A", MEANINGS["current"]),
-    "tau": (TORQUE, MEANINGS["torque"]),
-    "torque_without_gravity": (TORQUE, MEANINGS["torque_without_gravity"]),
-    "target_q": ("rad", MEANINGS["target_q"]),
-    "target_dq": ("rad/s", MEANINGS["target_dq"]),
-    "target_current": ("A", MEANINGS["target_current"]),
-    "target_torque": (TORQUE, MEANINGS["target_torque"]),
-    "temperature": ("°C", MEANINGS["temperature"]),
+    **{COLUMN_NAMES.get(name, name): facts for name, facts in SIGNALS.items()},
     "tau_ext": (TORQUE, "external joint torque"),
     "sd": (TORQUE, "standard deviation of the external torque by the estimator's own account"),
     "band": (TORQUE, "standard deviation of the external torque, what the model errs by included"),
@@ -55,7 +46,7 @@ class StatedFrame(NamedTuple):
 
 
 def column_facts(name: str, frames: Mapping[str, StatedFrame]) -> dict[str, str]:
-    """Unit, meaning, and where they matter sign and frame of a column; {} of an unknown one."""
+    """Unit, meaning, sign and frame of a column; {} of an unknown one."""
     kind, group, last = name.partition("/")[0], *name.rpartition("/")[::2]
     if kind not in COLUMNS:
         return {}

@@ -64,7 +64,7 @@ class OutputError(VftError):
 
 
 class IdentificationError(VftError):
-    """A log does not determine what shall be identified from it, or contradicts the robot."""
+    """A log does not determine what shall be identified, or contradicts the robot."""
 
 
 class PackageError(VftError):

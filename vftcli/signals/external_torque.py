@@ -23,8 +23,6 @@ from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
 from vftcli.signals.shown import Shown, frame_of, joined, per_joint
 
-if TYPE_CHECKING:
-    import polars as pl
 
 ALL = slice(None)  #: All rows.
 COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
@@ -56,13 +54,21 @@ class DynamicsTerms(Shown):
 
     def __post_init__(self, room: Array | None) -> None:
         seal(self, "t", "p", "mu")
-        if self.p.ndim != 2:
-            raise ShapeError(f"p has shape {self.p.shape}; expected (T, n)")
+        check_series(self.p, None, "p", "the dynamics terms")
         check_clock(self.t, "the dynamics terms")
-        check_shape(self.p, (len(self.t), self.p.shape[1]), "p", "the dynamics terms")
-        check_shape(self.mu, self.p.shape, "mu", "the dynamics terms")
-        d = momentum_change(self, empty_series(*self.p.shape) if room is None else room)
-        object.__setattr__(self, "d", handed_over(d))
+        check_fields(self, "the dynamics terms", (self.samples, self.joints), "p", "mu")
+        change = empty_series(*self.p.shape) if room is None else room
+        half, before, explained = 0.5 * self.dt[:, 0], self.before, np.zeros(self.samples)
+        # Joint by joint, so that the passes stay in the cache.
+        for p, mu, d in zip(self.p.T, self.mu.T, change.T, strict=True):
+            np.subtract(p[1:], p[:-1], out=d[1:])
+            np.add(mu[1:], mu[:-1], out=explained[1:])
+            explained *= half
+            d[1:] -= explained[1:]
+        change[:1] = 0.0
+        if before is not None:
+            change[0] = self.p[0] - before.p - half[0] * (self.mu[0] + before.mu)
+        object.__setattr__(self, "d", handed_over(change))
 
     @cached_property
     def clock(self) -> Clock:
@@ -102,30 +108,15 @@ class HasTerms(Protocol):
         ...
 
 
-def momentum_change(terms: DynamicsTerms, out: Array) -> Array:
-    """Fill `out` with `DynamicsTerms.d`, joint by joint, so that the passes stay in the cache."""
-    half, before = 0.5 * terms.dt[:, 0], terms.before
-    explained = np.zeros(terms.samples)
-    for p, mu, d in zip(terms.p.T, terms.mu.T, out.T, strict=True):
-        np.subtract(p[1:], p[:-1], out=d[1:])
-        np.add(mu[1:], mu[:-1], out=explained[1:])
-        explained *= half
-        d[1:] -= explained[1:]
-    out[:1] = 0.0
-    if before is not None:
-        out[0] = terms.p[0] - before.p - half[0] * (terms.mu[0] + before.mu)
-    return out
-
-
 def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
-    """Series "p" or "mu" of each sample's predecessor; a log's first sample is its own. (T, n)"""
+    """Series "p" or "mu" a sample earlier; the first is its own. (T, n)"""
     series: Array = getattr(terms, name)
     first = series[:1] if terms.before is None else getattr(terms.before, name)[None]
     return np.concatenate([first, series[:-1]])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class ExternalTorque(Shown):
+class ExternalTorque(TimeSeries):
     """Torque the environment exerts on the robot, positive along each joint axis."""
 
     #: Short name of the observer or of the reference, as used in tables and column names.
@@ -151,11 +142,8 @@ class ExternalTorque(Shown):
         check_series(self.tau, None, "tau", self.name)
         check_clock(self.t, self.name)
         check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
-        for name in ("sd", "error_sd", "moving"):
-            if (value := getattr(self, name)) is not None:
-                check_shape(value, self.tau.shape, name, self.name)
-        if self.floor is not None:
-            check_shape(self.floor, self.tau.shape[1:], "floor", self.name)
+        check_fields(self, self.name, self.tau.shape, "sd", "error_sd", "moving")
+        check_fields(self, self.name, self.tau.shape[1:], "floor")
 
     def _headline(self) -> str:
         rms = np.sqrt(np.nanmean(np.where(self.known.any(axis=0), self.tau, 0.0) ** 2, axis=0))
@@ -174,15 +162,10 @@ class ExternalTorque(Shown):
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:
         """Name and values of every joint, as ``tau_ext/gmo/1``, and of its deviations."""
-        yield from per_joint(f"tau_ext/{self.name}", self.tau[rows])
-        if self.sd is not None:
-            yield from per_joint(f"sd/{self.name}", self.sd[rows])
-        if self.error_sd is not None:
-            yield from per_joint(f"band/{self.name}", self.error_sd[rows])
-
-    def to_polars(self) -> "pl.DataFrame":
-        """Time ``t`` and every joint, named as in ``estimates.parquet``; unknown is null."""
-        return frame_of([("t", self.t), *self.columns()])
+        each = {"tau_ext": self.tau, "sd": self.sd, "band": self.error_sd}
+        for kind, values in each.items():
+            if values is not None:
+                yield from per_joint(f"{kind}/{self.name}", values[rows])
 
     @property
     def joints(self) -> int:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask, is_uniform
+from vftcli.signals.arrays import Array, Indices, Mask, is_uniform
 from vftcli.signals.series import bridge_unknown, median_step, resample_columns
 
 LONGEST = 1.0  #: Longest delay looked for. [s]
@@ -20,15 +19,10 @@ BLOCK = 8192  #: Samples that one Fourier transform takes, unless the lags looke
 
 
 def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
-    """Delay of each column of several series at which it fits best, NaN where nothing fits. (m, n)
+    """Delay of each column at which it fits best, NaN where nothing fits. (m, n)
 
-    Maximises the correlation over the samples that overlap, for delays from −`LEAD` to `LONGEST`,
-    refined between samples by a parabola.
-
-    Args:
-        late: m estimates, NaN where unknown. Each (T, n)
-        early: Their reference, likewise. (T, n)
-        step: Sample time; an uneven clock's delay is in median steps. [s]
+    Maximises the correlation with `early` over the known samples that overlap, for delays from
+    −`LEAD` to `LONGEST`, refined by a parabola. An uneven clock's is in median steps [s].
     """
     samples = len(early)
     first = -min(round(LEAD / step), samples // 4)
@@ -48,14 +42,10 @@ def lags_of_each(late: Sequence[Array], early: Array, step: float) -> Array:
     return found
 
 
-def fits(late: Array, early: Array, known: Mask, at: NDArray[np.int64]) -> Array:
-    """Correlation of series with one that they lag, over the samples that overlap. (m, len(at))
+def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
+    """Correlation of m series with one that they lag, where they overlap. (m, L)
 
-    Args:
-        late: Series without mean, zero where unknown. (m, T)
-        early: Another, likewise. (1, T)
-        known: Where all of them are known. (T,)
-        at: Successive lags. [samples]
+    All are without mean, and zero where unknown; `at` are successive lags [samples].
     """
     # Each is normalised by the samples that overlap at that lag, unknown ones left out.
     if known.all():
@@ -68,20 +58,16 @@ def fits(late: Array, early: Array, known: Mask, at: NDArray[np.int64]) -> Array
     return np.asarray(sliding(late, early, at) / np.sqrt(np.where(power > 0, power, np.inf)))
 
 
-def sliding(later: Array, earlier: Array, at: NDArray[np.int64]) -> Array:
-    """Sum over time of `later`, so many samples on, times `earlier`. (m, len(at))
+def sliding(later: Array, earlier: Array, at: Indices) -> Array:
+    """Sum over time of `later` (m, T), so many samples on, times `earlier`. (m, L)
 
-    By blocks: each block of `earlier` meets the part of `later` that its lags reach, and their
+    Each block of `earlier` meets the part of `later` that its successive lags reach, and their
     cross-spectra are added up before one transform back (overlap-save).
-
-    Args:
-        later: Series. (m, T)
-        earlier: As many, or one for all of them. (m, T) or (1, T)
-        at: Successive lags. [samples]
     """
     samples, first, reach = earlier.shape[1], int(at[0]), len(at) - 1
     # A block no longer than the log, and no shorter than what its lags reach besides.
-    size = min(max(BLOCK, power_of_two(2 * reach)), power_of_two(samples + reach))
+    size, whole = (1 << max(count - 1, 1).bit_length() for count in (2 * reach, samples + reach))
+    size = min(max(BLOCK, size), whole)
     hop = size - reach
     total = np.zeros((len(later), size // 2 + 1), dtype=np.complex128)
     for start in range(0, samples, hop):
@@ -94,11 +80,6 @@ def sliding(later: Array, earlier: Array, at: NDArray[np.int64]) -> Array:
     return np.asarray(np.fft.irfft(total, size)[:, : reach + 1])
 
 
-def power_of_two(count: int) -> int:
-    """The first power of two that is not below a count."""
-    return 1 << max(count - 1, 1).bit_length()
-
-
 def centred(signals: Array, known: Mask) -> Array:
     """Signals without their mean over the known samples, zero elsewhere. (m, T)"""
     centre: Array = np.where(known, signals, 0.0)
@@ -108,7 +89,7 @@ def centred(signals: Array, known: Mask) -> Array:
 
 
 def peak(fit: Array) -> float:
-    """Position of the largest value between the ends, between samples; NaN if none stands out."""
+    """Position of the largest inner value, between samples; NaN if none stands out."""
     k = 1 + int(np.argmax(fit[1:-1]))
     before, here, after = fit[k - 1], fit[k], fit[k + 1]
     if not here >= LEAST_FIT or here < max(before, after):
@@ -117,7 +98,7 @@ def peak(fit: Array) -> float:
 
 
 def parabola(before: float, here: float, after: float) -> float:
-    """Where the parabola through three neighbours peaks, counted in samples from the middle one."""
+    """Peak of the parabola through three neighbours, from the middle one."""
     bend = before - 2.0 * here + after
     return 0.5 * (before - after) / bend if bend < 0 else 0.0
 
@@ -130,22 +111,15 @@ class Offset(NamedTuple):
 
 
 def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
-    """The lag of `late` behind `early` at which they correlate best, all columns together.
+    """The lag of `late` behind `early` at which they correlate best.
 
-    The columns count by their size: those of a wrench are to be in one unit. The peak is refined by
-    a parabola through its neighbours. Unknown samples are bridged.
-
-    Args:
-        t: Common clock. (T,) [s]
-        late: A series. (T, k)
-        early: Another. (T, k)
-        limit: Largest lag considered, either way. [s]
+    All columns (T, k) count by their size: those of a wrench are to be in one unit. Unknown
+    samples are bridged.
     """
     step = median_step(t)
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
     x, y = (resample_columns(even, t, bridge_unknown(t, series)) for series in (late, early))
-    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
-    count = len(even)
+    x, y, count = x - x.mean(axis=0), y - y.mean(axis=0), len(even)
     reach = min(int(limit / step), count - 2)
     at = np.arange(-reach, reach + 1)
     cross = sliding(x.T, y.T, at).sum(axis=0)
@@ -160,11 +134,11 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
 class LagFit(NamedTuple):
     """How well two series fit at every lag of the first behind the second."""
 
-    lag: NDArray[np.int64]  #: (L,) [samples]
+    lag: Indices  #: (L,) [samples]
     #: Mean squared difference of what overlaps, all columns together; infinite where too little
     #: does. (L,)
     difference: Array
-    overlap: NDArray[np.int64]  #: Samples that overlap. (L,)
+    overlap: Indices  #: Samples that overlap. (L,)
 
     @property
     def closest(self) -> float:
@@ -172,7 +146,7 @@ class LagFit(NamedTuple):
         return float(self.lag[int(np.argmin(self.difference))])
 
     def rivals(self, most: float) -> list[float]:
-        """Lags of other valleys with a longer overlap than at the closest lag, longest first."""
+        """Lags of valleys with a longer overlap than the closest, longest first."""
         inner, best = self.difference[1:-1], int(np.argmin(self.difference))
         valley = (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
         found = 1 + np.flatnonzero(valley & (self.overlap[1:-1] > self.overlap[best]))
@@ -180,12 +154,9 @@ class LagFit(NamedTuple):
 
 
 def lag_fit(late: Array, early: Array, least: float) -> LagFit:
-    """How well two series fit at every lag of `late` behind `early`.
+    """How well two series (M, k), (N, k) of one step fit at every lag.
 
-    Args:
-        late: A series. (M, k)
-        early: Another, on a clock of the same step. (N, k)
-        least: Share of the shorter series that must overlap.
+    At least the share `least` of the shorter one must overlap.
     """
     # A common offset changes no difference, and without it the sums of squares keep their digits.
     middle = late.mean(axis=0)
@@ -199,8 +170,8 @@ def lag_fit(late: Array, early: Array, least: float) -> LagFit:
     return LagFit(at, mean, overlap)
 
 
-def overlap_energy(series: Array, lags: NDArray[np.int64], other: int) -> Array:
-    """Sum of squares of what a series shares with one of `other` samples that it lags. (L,)
+def overlap_energy(series: Array, lags: Indices, other: int) -> Array:
+    """Sum of squares of what a series shares with one that it lags. (L,)
 
     Without it a fit would favour small lags, which overlap longer.
     """

@@ -30,13 +30,7 @@ class ColumnFit(NamedTuple):
 
 
 def fit_column(A: Array, y: Array, weights: Array) -> ColumnFit:
-    """Fit y ≈ A x, down-weighting outliers.
-
-    Args:
-        A: Columns. (M, k)
-        y: What they shall explain. (M,)
-        weights: Weights to start from, 0 for samples that tell nothing. (M,)
-    """
+    """Fit y (M,) ≈ A x, down-weighting outliers."""
     if np.count_nonzero(weights) <= 2 * A.shape[1]:
         raise IdentificationError(
             f"{np.count_nonzero(weights)} samples in motion for {A.shape[1]} unknowns; "
@@ -62,7 +56,7 @@ class NormalEquations(NamedTuple):
     square: float  #: yᵀWy.
 
     def minus(self, other: "NormalEquations") -> "NormalEquations":
-        """The normal equations without some of the rows: least squares of all stretches but one."""
+        """The normal equations without some of the rows."""
         square = self.square - other.square
         return NormalEquations(self.gram - other.gram, self.right - other.right, square)
 
@@ -86,12 +80,8 @@ def normal_equations(A: Array, y: Array, weights: Array) -> NormalEquations:
 def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
     """Eigenvalues and vectors of a scaled AᵀWA that the data shows. (s,), (k, s)
 
-    The columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in size;
-    the scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
-
-    Args:
-        gram: AᵀWA. (k, k)
-        null: Share of the largest eigenvalue down to which they are kept.
+    Columns are scaled to a unit diagonal, since kilograms and N·m·s need not be alike in size; the
+    scale is in the vectors V, so that V diag(1/values) Vᵀ is the inverse of AᵀWA itself.
     """
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0.0] = 1.0
@@ -113,13 +103,13 @@ def solve(A: Array, y: Array) -> Array:
 
 
 def huber(z: Array, limit: float = HUBER) -> Array:
-    """Weights of residuals in standard deviations: 1 within the limit, limit/|z| beyond."""
+    """Weights of residuals in standard deviations: 1 up to the limit."""
     weights: Array = limit / np.maximum(np.abs(z), limit)
     return weights
 
 
 def robust_sd(residual: Array) -> Array:
-    """Standard deviation of each column by the median of its size; 0 of no rows. (n,) of (M, n)"""
+    """Standard deviation of each column by the median of its size. (n,)"""
     if not len(residual):
         return np.zeros(residual.shape[1:])
     return np.asarray(SD_PER_MEDIAN * np.median(np.abs(residual), axis=0))
@@ -139,7 +129,7 @@ def correlation_time(residual: Array) -> float:
 
 
 def deviations(A: Array, residual: Array, weights: Array) -> Array:
-    """Standard deviations of weighted least squares, for residuals correlated along time. (k,)"""
+    """Standard deviations of a fit, the residual correlated along time. (k,)"""
     used = weights > 0
     freedom = max(1, np.count_nonzero(used) - A.shape[1])
     variance = float(np.sum(weights * residual**2)) / freedom
@@ -155,7 +145,7 @@ def folds(samples: int, count: int = FOLDS) -> list[slice]:
 
 
 def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
-    """The rows that cross-validation leaves out in turn, of logs that stand one after the other.
+    """The rows that cross-validation leaves out in turn.
 
     Of several logs that tell something each is left out whole: another log is what a model is for.
     A single one is cut into fifths. Rows of logs that tell nothing are never left out.
@@ -170,14 +160,7 @@ def left_out(lengths: Sequence[int], told: Sequence[bool]) -> list[Array]:
 
 
 def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) -> float:
-    """RMS of what fits on all rows but one part's miss on that part, weighted.
-
-    Args:
-        A: Columns. (M, k)
-        y: What they shall explain. (M,)
-        weights: Of the rows. (M,)
-        parts: Rows of each part.
-    """
+    """RMS of what fits on all rows but one part's miss on that part, weighted."""
     whole = normal_equations(A, y, weights)
     total, count = 0.0, 0.0
     for rows in parts:

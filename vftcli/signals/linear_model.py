@@ -28,7 +28,7 @@ STRETCH = 512  #: Blocks whose innovations and gains back are worked on at once.
 
 
 class LinearModel(NamedTuple):
-    """Models side by side along K blocks; arrays but `decay` may have axes of length 1 for all."""
+    """Models side by side along K blocks; axes may have length 1, but of `decay`."""
 
     d: Array  #: What is measured. (K, …, n)
     observation: Array  #: H. (K, …, N, n)
@@ -48,18 +48,13 @@ class FilteredBlock(NamedTuple):
 
 
 def beside_errors(H: Array) -> Array:
-    """H of a model whose n numbers each have an error of their own too: [H; I]. (…, N + n, n)"""
+    """H of a model whose n numbers have errors of their own: [H; I]. (…, N + n, n)"""
     own = np.broadcast_to(np.eye(H.shape[-1]), (*H.shape[:-2], H.shape[-1], H.shape[-1]))
     return np.concatenate([H, own], axis=-2)
 
 
 def filtered(model: LinearModel, limit: Array | None = None) -> Iterator[FilteredBlock]:
-    """The filter, block by block.
-
-    Args:
-        model: The models.
-        limit: νᵀS⁻¹ν beyond which an innovation ν counts as a spike; None for no spikes. (K, …)
-    """
+    """The filter, block by block; νᵀS⁻¹ν beyond `limit` (K, …) is a spike."""
     shape, (size, n) = model.decay.shape[1:], model.observation.shape[-2:]
     # Of single numbers the product of matrices is that of numbers, at a third of the CPU.
     alone = size == n == 1

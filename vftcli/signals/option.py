@@ -102,11 +102,7 @@ class Option(NamedTuple):
         return self.name if self.is_setting else self.name.rpartition("--")[2].replace("-", "_")
 
     def number(self, text: str, kind: type[int] | type[float]) -> float:
-        """The number that a setting's text states.
-
-        Raises:
-            ParameterError: If it states none, or one out of range.
-        """
+        """The number in range that a setting's text states."""
         try:
             value = kind(text)
         except ValueError:
@@ -136,11 +132,7 @@ def setting(
 
 
 def is_yes(text: str) -> bool:
-    """Whether a setting's text is yes.
-
-    Raises:
-        ParameterError: If it is neither yes nor no.
-    """
+    """Whether a setting's text, yes or no, is yes."""
     if text not in {"yes", "no"}:
         raise ParameterError(f"{text!r} is neither yes nor no")
     return text == "yes"
@@ -151,7 +143,7 @@ NUMBERS = "numbers"
 
 
 class Choice:
-    """What a user may choose of a room: a dataclass, its fields annotated with an `Option` each."""
+    """What a user may choose of a room: fields annotated with an `Option` each."""
 
     GROUP: ClassVar[str] = ""  #: Heading of its options.
 
@@ -190,7 +182,7 @@ class Choice:
         settings: Mapping[str, str] = MappingProxyType({}),
         **words: Any,  # noqa: ANN401 - texts, numbers, lists of them
     ) -> Self:
-        """The choice that typed words and settings state; None and an empty list state nothing."""
+        """The choice that words and settings state; None and [] state nothing."""
         options, values = cls.options(), {}
         words |= cls.words_of(settings)
         for word, typed in words.items():

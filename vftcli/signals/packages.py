@@ -58,10 +58,7 @@ def needed(
 
 
 def door(room: str, *files: str) -> Callable[[str], Any]:
-    """The `__getattr__` of a room that loads these files once a name of its `__all__` is used.
-
-    So a room's choice can be loaded, which `--help` needs, without numpy.
-    """
+    """The `__getattr__` of a room that loads its files when they are used."""
 
     def attribute(name: str) -> Any:  # noqa: ANN401 - the names are of every kind
         if name in sys.modules[room].__all__:

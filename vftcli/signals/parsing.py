@@ -57,13 +57,13 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """The known name nearest to a word, as a question behind a blank; "" where none is near."""
+    """The known name nearest to a word, as a question; "" where none is near."""
     close = nearest(word, known)
     return f" Did you mean {close}?" if close else ""
 
 
 def check_known(word: str, known: Iterable[str], complaint: str) -> None:
-    """Raise a ParameterError of the complaint and of what there is unless a word is known."""
+    """Raise a ParameterError that says what there is unless a word is known."""
     if word not in (there := list(known)):
         near = did_you_mean(word, there)
         raise ParameterError(f"{complaint}; there is {', '.join(there)}{'.' * bool(near)}{near}")
@@ -90,7 +90,7 @@ def interval_text(start: float, stop: float) -> str:
 
 
 def numbers(text: str) -> tuple[float, ...] | None:
-    """The numbers of ``A,B,C``, None where a part is no number: the caller says what was due."""
+    """The numbers of ``A,B,C``, None where a part is no number."""
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:

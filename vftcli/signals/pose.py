@@ -30,7 +30,7 @@ IDENTITY = Pose(np.eye(3), np.zeros(3))  #: The pose of a frame in itself.
 
 
 def inverse(pose: Pose) -> Pose:
-    """The pose of F in S, from the pose of S in F; many at once too. (..., 3, 3), (..., 3)"""
+    """The pose of F in S, from the pose of S in F; many at once too."""
     turned = np.swapaxes(pose.rotation, -1, -2)
     return Pose(turned, -np.squeeze(turned @ pose.translation[..., None], axis=-1))
 
@@ -57,10 +57,7 @@ def skew(p: Array) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross product of vectors whose components stand in the first axis. (3, ...)
-
-    It takes a tenth of the time of NumPy's, which serves every layout.
-    """
+    """Cross product along the first axis, (3, ...): a tenth of NumPy's time."""
     return np.array(
         [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     )
@@ -84,7 +81,7 @@ def rpy_matrix(angles: Sequence[float]) -> Array:
 
 
 def rpy_angles(rotation: Array) -> tuple[float, float, float]:
-    """Roll, pitch and yaw of a rotation (3, 3), so that `rpy_matrix` gives it again. [rad]
+    """Roll, pitch and yaw of a rotation, as `rpy_matrix` takes them. [rad]
 
     At a pitch of ±π/2 roll and yaw turn about one axis; all of it is called roll there.
     """
@@ -98,7 +95,7 @@ def rpy_angles(rotation: Array) -> tuple[float, float, float]:
 
 
 def rotation_onto(direction: Array) -> Array:
-    """A rotation whose z axis points along `direction` (3,), whatever its turn about it. (3, 3)"""
+    """A rotation whose z axis points along `direction` (3,). (3, 3)"""
     z = direction / np.linalg.norm(direction)
     if np.allclose(z, (0.0, 0.0, 1.0), atol=1e-15):
         return np.eye(3)
@@ -116,7 +113,7 @@ def exp_quaternion(vector: Array) -> Array:
 
 
 def log_quaternion(quaternion: Array) -> Array:
-    """The rotation vector of a unit quaternion, its angle from 0 to 2π. (…, 4) → (…, 3) [rad]"""
+    """The rotation vector of a unit quaternion, up to 2π long. (…, 3) [rad]"""
     w, vector = quaternion[..., :1], quaternion[..., 1:]
     sine = np.sqrt(np.sum(vector**2, axis=-1, keepdims=True))
     angle = 2.0 * np.arctan2(sine, w)
@@ -127,7 +124,7 @@ def log_quaternion(quaternion: Array) -> Array:
 
 
 def quaternion_product(a: Array, b: Array) -> Array:
-    """Quaternion product a·b: first b's rotation, then a's, both about fixed axes. (…, 4)"""
+    """Product a·b: first b's rotation, then a's, about fixed axes. (…, 4)"""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(

@@ -31,7 +31,7 @@ def enter(begin: float, end: float) -> None:
 
 
 def steps(items: Sequence[Item]) -> Iterator[Item]:
-    """The items of a loop; before each the share that is done is told. Loops may be nested."""
+    """The items of a loop; before each it says what share is done."""
     begin, width = _part.get()
     for k, item in enumerate(items):
         first = begin + width * k / len(items)

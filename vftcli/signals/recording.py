@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -12,20 +13,22 @@ from vftcli.signals.arrays import (
     Indices,
     Mask,
     check_clock,
+    check_fields,
     check_series,
-    check_shape,
     release,
     seal,
 )
 from vftcli.signals.errors import (
     ClockError,
     MissingSignalError,
+    ParameterError,
+    ReferenceTorqueError,
     ShapeError,
 )
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
-from vftcli.signals.shown import Shown, frame_of, per_joint
+from vftcli.signals.shown import Shown, TimeSeries, per_joint
 from vftcli.signals.wrench import WrenchFrame, per_axis
 
 if TYPE_CHECKING:
@@ -45,7 +48,7 @@ class Cut(NamedTuple):
 
 
 class Awaited:
-    """A field that may be given as a function; it is called when the field is first read.
+    """A field that may be given as a function, called when it is first read.
 
     A digest is computed beside everything else, and nobody waits for it before it is written down.
     """
@@ -119,21 +122,22 @@ class Source(Shown):
 IN_MEMORY = Source()  #: Of a recording that was made in memory.
 
 
-#: Fields of a Recording that hold a signal → what that is.
-MEANINGS = {
-    "q": "joint positions",
-    "dq": "joint velocities",
-    "current": "motor currents",
-    "torque": "joint torques",
-    "torque_without_gravity": "joint torques without gravity's",
-    "target_q": "target positions",
-    "target_dq": "target velocities",
-    "target_current": "target currents",
-    "target_torque": "target torques",
-    "tau_ext": "vendor estimates of the external torque",
-    "temperature": "joint temperatures",
-    "wrench": "wrenches",
+#: Fields of a Recording that hold a signal → its unit and what it is.
+SIGNALS = {
+    "q": ("rad", "joint positions"),
+    "dq": ("rad/s", "joint velocities"),
+    "current": ("A", "motor currents"),
+    "torque": ("N·m", "joint torques"),
+    "torque_without_gravity": ("N·m", "joint torques without gravity's"),
+    "target_q": ("rad", "target positions"),
+    "target_dq": ("rad/s", "target velocities"),
+    "target_current": ("A", "target currents"),
+    "target_torque": ("N·m", "target torques"),
+    "tau_ext": ("N·m", "vendor estimates of the external torque"),
+    "temperature": ("°C", "joint temperatures"),
+    "wrench": ("N and N·m", "wrenches"),
 }
+MEANINGS = {name: meaning for name, (_, meaning) in SIGNALS.items()}
 #: Those of them that hold one column a joint.
 JOINT_SIGNALS = tuple(name for name in MEANINGS if name != "wrench")
 #: Signals whose columns in tables are called otherwise than the field of a Recording.
@@ -147,8 +151,8 @@ EXAMINED = frozenset(
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Recording(Shown):
-    """Measurements of an n-joint robot at T instants; a missing signal is None, never zeros."""
+class Recording(TimeSeries):
+    """Measurements of n joints at T instants; a missing signal is None."""
 
     t: Array  #: Time since the first sample, strictly increasing. (T,) [s]
     q: Array  #: Joint positions. (T, n) [rad]
@@ -184,17 +188,12 @@ class Recording(Shown):
         if np.size(self.t) == 0:
             raise ClockError(f"{self.name}: no samples")
         check_clock(self.t, self.name)
-        shape = (len(self.t), self.joints)
-        for name in JOINT_SIGNALS:
-            if (signal := getattr(self, name)) is not None:
-                check_shape(signal, shape, name, self.name)
-        if self.wrench is not None:
-            check_shape(self.wrench, (len(self.t), 6), "wrench", self.name)
+        check_fields(self, self.name, (self.samples, self.joints), *JOINT_SIGNALS)
+        check_fields(self, self.name, (self.samples, 6), "wrench")
         if self.joint_names and len(self.joint_names) != self.joints:
             told = f"{len(self.joint_names)} joint names for {self.joints} joints"
             raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
-        if self.payload_com is not None:
-            check_shape(np.asarray(self.payload_com), (3,), "payload_com", self.name)
+        check_fields(self, self.name, (3,), "payload_com")
 
     def _headline(self) -> str:
         there = f"{self.samples} samples of {self.joints} joints over {self.duration:.4g} s"
@@ -208,14 +207,10 @@ class Recording(Shown):
             yield name, MEANINGS[name], values.shape[1], least, most
 
     def columns(self) -> Iterator[tuple[str, Array]]:
-        """Name and values of every signal's columns, as ``q/1``, in a fixed order."""
+        """Every signal's columns, as ``q/1``, as `vftcli convert` writes them."""
         for name in self.signals:
             split = per_axis if name == "wrench" else per_joint
             yield from split(COLUMN_NAMES.get(name, name), getattr(self, name))
-
-    def to_polars(self) -> "pl.DataFrame":
-        """Time ``t`` and every signal, one column a joint or axis, as `vftcli convert` writes."""
-        return frame_of([("t", self.t), *self.columns()])
 
     @property
     def joints(self) -> int:
@@ -250,22 +245,21 @@ class Recording(Shown):
         return tuple(name for name in MEANINGS if getattr(self, name) is not None)
 
     def require(self, name: str) -> Array:
-        """Return a signal, or say that the log lacks it and what would supply it.
-
-        Raises:
-            MissingSignalError: If the log does not have the signal.
-        """
+        """A signal, or a MissingSignalError that says what would supply it."""
         value: Array | None = getattr(self, name)
         if value is None:
-            derive = (
-                ", or derive them from the positions: --set log.derive=dq" if name == "dq" else ""
-            )
+            derive = ", or derive them from the positions: --set log.derive=dq"
             raise MissingSignalError(
                 f"{self.name}: the log has no {MEANINGS[name]} ({name}); it has "
                 f"{', '.join(self.signals)}. Record them, or name their columns with --columns"
-                f"{derive}."
+                f"{derive if name == 'dq' else ''}."
             )
         return value
+
+    def changed(self, *remarks: Remark, **fields: Any) -> "Recording":  # noqa: ANN401 - fields
+        """The recording with other fields, and remarks that say so."""
+        source = replace(self.source, remarks=(*self.source.remarks, *remarks))
+        return replace(self, source=source, **fields)
 
     def rows(self, rows: slice | Indices | Mask) -> "Recording":
         """Some of its samples; their times stay those of the whole log."""
@@ -285,16 +279,10 @@ class Recording(Shown):
     def with_effort(
         self, kind: str, *, source: str | None = None, factor: float = 1.0
     ) -> "Recording":
-        """Return the recording with its effort taken for what it really is, and with no other.
+        """The recording with its effort as a `kind` of `EFFORTS`, and no other.
 
-        Args:
-            kind: One of `EFFORTS`.
-            source: Which of the log's efforts it is; None for the one that is called so, or the
-                only one there is.
-            factor: What its values are multiplied with.
-
-        Raises:
-            MissingSignalError: If the log has no effort, or several and none of this kind.
+        `source` names which of the log's efforts it is; None for the one that is called so, or the
+        only one there is.
         """
         there = [name for name in EFFORTS if getattr(self, name) is not None]
         source = source or (kind if kind in there else None)
@@ -306,63 +294,37 @@ class Recording(Shown):
         source = source or there[0]
         value: Array = getattr(self, source)
         taken = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
-        where = replace(self.source, remarks=(*self.source.remarks, taken))
         # 0 + x: no zero of the other sign.
-        changed: dict[str, Any] = {**dict.fromkeys(there), kind: 0.0 + factor * value}
-        return replace(self, source=where, **changed)
+        return self.changed(taken, **{**dict.fromkeys(there), kind: 0.0 + factor * value})
 
     def with_joints(self, places: Sequence[int]) -> "Recording":
-        """Return the recording with some of its joints, in an order; what goes is said.
-
-        Args:
-            places: The place of each joint among those of this recording, from 0.
-        """
-        order = list(places)
+        """The recording with the joints at some places, in their order; what goes is said."""
+        order, names = list(places), self.joint_names
         if order == list(range(self.joints)):
             return self
-        names = self.joint_names
-        left = [names[k] for k in range(self.joints) if k not in order]
+        left = [name for k, name in enumerate(names) if k not in order]
         remarks = [fact("joints-by-name", joints=[names[k] for k in order])]
         remarks += [fact("joints-left-out", joints=left)] if left else []
-        joints = [name for name in JOINT_SIGNALS if getattr(self, name) is not None]
-        changed: dict[str, Any] = {name: getattr(self, name)[:, order] for name in joints}
-        return replace(
-            self,
-            joint_names=tuple(names[k] for k in order),
-            source=replace(self.source, remarks=(*self.source.remarks, *remarks)),
-            **changed,
-        )
+        joints = [name for name in self.signals if name in JOINT_SIGNALS]
+        fields = {name: getattr(self, name)[:, order] for name in joints}
+        return self.changed(*remarks, joint_names=tuple(names[k] for k in order), **fields)
 
     def behind_gear(self, gear: Array, efficiency: Array) -> "Recording":
-        """Return the recording of the links where it was logged at the motors.
+        """The recording of the links, logged at the motors: q = q_m / N, τ = N η τ_m.
 
-        q = q_m / N, τ = N η τ_m: positions and velocities are divided by the gear's ratio N,
-        torques multiplied with it and its efficiency η. Currents and the vendor's estimate stay.
-
-        Args:
-            gear: Ratio of each joint, negative where the motor turns the other way. (n,)
-            efficiency: Share of the motor's torque that arrives. (n,)
+        N is the gear's ratio, negative where the motor turns the other way, η its efficiency. (n,)
+        Currents and the vendor's estimate stay.
         """
         scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / gear)
         scales |= dict.fromkeys(
             ("torque", "torque_without_gravity", "target_torque"), gear * efficiency
         )
-        changed: dict[str, Any] = {
-            name: getattr(self, name) * scale
-            for name, scale in scales.items()
-            if getattr(self, name) is not None
-        }
-        taken = fact("gear-applied", ratios=gear.tolist())
-        source = replace(self.source, remarks=(*self.source.remarks, taken))
-        return replace(self, source=source, **changed)
+        there = [name for name in self.signals if name in scales]
+        fields = {name: getattr(self, name) * scales[name] for name in there}
+        return self.changed(fact("gear-applied", ratios=gear.tolist()), **fields)
 
     def without(self, rows: Mask, cuts: Iterable[Cut] = ()) -> "Recording":
-        """Return the recording without some samples; gaps of its clock stay in their place.
-
-        Args:
-            rows: The samples that go. (T,)
-            cuts: Why.
-        """
+        """The recording without some rows (T,); gaps stay in their place."""
         source, number = self.source, np.where(rows, -1, np.cumsum(~rows) - 1)
         samples = source.row_samples
         now = number if samples is None else np.where(samples < 0, -1, number[samples])
@@ -370,11 +332,7 @@ class Recording(Shown):
         return replace(self.rows(~rows), source=source)
 
     def between(self, start: float, stop: float) -> "Recording":
-        """Return the samples with start ≤ t ≤ stop; their times stay those of the whole log. [s]
-
-        Raises:
-            ClockError: If fewer than two samples fall into the span.
-        """
+        """The samples, at least two, with start ≤ t ≤ stop. [s]"""
         keep = (self.t >= start) & (self.t <= stop)
         if np.count_nonzero(keep) < 2:
             raise ClockError(
@@ -382,3 +340,47 @@ class Recording(Shown):
                 f"the log runs from {self.t[0]:g} to {self.t[-1]:g} s"
             )
         return self.without(~keep)
+
+
+def same_run(one: Recording, other: Recording) -> bool:
+    """Whether two recordings were read from equal bytes.
+
+    A span of a recording is the same run as the whole. Two recordings that one file holds one
+    after the other are two runs if its clock tells them apart, or if they are two of its parts.
+    """
+    if one is other:
+        return True
+    mine, theirs = one.source, other.source
+    if (mine.rows, mine.t0, mine.part) != (theirs.rows, theirs.t0, theirs.part):
+        return False  # so that nobody waits for the digest of a large file to hear this
+    return bool(mine.sha256) and mine.sha256 == theirs.sha256
+
+
+def repeated(logs: Sequence[Recording]) -> tuple[str, str] | None:
+    """The names of the first two logs that are the same run, if any."""
+    pairs = ((a.name, b.name) for a, b in combinations(logs, 2) if same_run(a, b))
+    return next(pairs, None)
+
+
+def refuse_repeated_logs(logs: Sequence[Recording], option: str = "LOG") -> None:
+    """Refuse logs that are the same run: their agreement would be evidence."""
+    if twice := repeated(logs):
+        raise ParameterError(
+            f"{twice[0]} and {twice[1]}, each given as {option}, are the same run (equal sha256), "
+            "which says nothing new the second time; give each run once"
+        )
+
+
+def refuse_repeated_runs(recording: Recording, free: Sequence[Recording]) -> None:
+    """Refuse free runs that are the log itself, or one another."""
+    for run in free:
+        if same_run(recording, run):
+            raise ReferenceTorqueError(
+                f"{run.name} is the log itself (equal sha256): a free run is another log of the "
+                "same motion; for free cycles within one log leave --free away"
+            )
+    if twice := repeated(free):
+        raise ReferenceTorqueError(
+            f"{twice[0]} and {twice[1]} are the same run (equal sha256), so they agree whatever "
+            "their error; give each free run once"
+        )

@@ -132,7 +132,7 @@ def heading(remark: Remark) -> str:
 
 
 def filled(template: str, remark: Remark) -> str:
-    """A template with a remark's values; ``{joints}`` and ``{span}`` are those of its place."""
+    """A template with a remark's values, ``{joints}`` and ``{span}``."""
     where = remark.where
     joints = ", ".join(f"J{j}" for j in where.joints)
     return ListFormatter().vformat(

@@ -32,7 +32,7 @@ RATE = 50.0  #: Rate from which velocities are derived without being asked for. 
 
 
 def with_velocity(recording: Recording) -> Recording:
-    """A log with velocities derived from its positions, and a caution; as it is if it has them.
+    """A log with velocities derived from its positions, if it has none.
 
     dq = the gradient of q on the log's own stamps, low-passed without phase shift.
     """
@@ -43,14 +43,13 @@ def with_velocity(recording: Recording) -> Recording:
     within = np.ptp(recording.q, axis=0) < ONE_TURN
     q = np.where(within, np.unwrap(recording.q, axis=0), recording.q)
     slopes = np.gradient(q, recording.t, axis=0)
-    told = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
-    source = recording.source
-    source = replace(source, derived=("dq",), remarks=(*source.remarks, told))
-    return replace(recording, dq=low_pass(recording.t, slopes, cutoff), source=source)
+    said = caution("derived-velocity", cutoff_Hz=cutoff, blunted_ms=1e3 * BLUNTED / cutoff)
+    changed = recording.changed(said, dq=low_pass(recording.t, slopes, cutoff))
+    return replace(changed, source=replace(changed.source, derived=("dq",)))
 
 
 def is_fast(recording: Recording) -> bool:
-    """Whether a log is sampled often enough that its velocities can be derived unasked."""
+    """Whether a log's rate lets its velocities be derived unasked."""
     return recording.samples >= 3 and recording.median_step * RATE <= 1.001
 
 
@@ -81,8 +80,8 @@ FINEST = 1e-6  #: And efforts off by less: a log in single precision keeps 1e-5 
 def without_isolated(recording: Recording) -> Recording:
     """A recording without samples that stand alone, said; itself where there are none.
 
-    A sample that is a little too far off is drawn to the limit, one that is twice as far off to
-    its neighbours' median, and it falls straight between: no sample is switched.
+    One a little too far off is drawn to the limit, one twice as far off to its neighbours' median,
+    and it falls straight between: no sample is switched.
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
     changed = np.zeros(recording.q.shape, dtype=bool)
@@ -102,17 +101,13 @@ def without_isolated(recording: Recording) -> Recording:
     where = Where(joints=tuple(int(j) + 1 for j in np.flatnonzero(changed.any(axis=0))))
     count = int(np.count_nonzero(changed.any(axis=1)))
     said = fact("isolated-samples-evened", where, samples=count)
-    source = replace(recording.source, remarks=(*recording.source.remarks, said))
-    return replace(recording, source=source, **values)
+    return recording.changed(said, **values)
 
 
 def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     """Columns without samples that stand alone, and where these are. (T, n) each
 
-    Args:
-        x: Signals. (T, n)
-        least: What never is too far. (n,)
-        peak: As `PEAK`, 0 where no peak is meant.
+    What is off by `least` (n,) never is too far; `peak` is as `PEAK`, 0 where no peak is meant.
     """
     made = np.array(x)
     if len(x) <= 6 * NEAR:
@@ -142,14 +137,10 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
 
 
 def at_an_end(x: Array, limit: Array) -> Array:
-    """The first samples, compared with a line through those of the log's end. (`NEAR`, n)
+    """The first samples, drawn to a line through those of the log's end.
 
-    Its slope is the median of their steps, and a sample's place the median of where the others put
-    it, so that one bad sample among them moves it by less than what they differ by.
-
-    Args:
-        x: Samples at an end of the log. (3 `NEAR`, n)
-        limit: How far the first may be off. (`NEAR`, n)
+    Slope and places are medians, so that one bad sample moves them by less than what the others
+    differ by.
     """
     slope = np.median(np.diff(x, axis=0), axis=0)
     level = x - np.arange(len(x))[:, None] * slope
@@ -158,14 +149,7 @@ def at_an_end(x: Array, limit: Array) -> Array:
 
 
 def drawn_to(middle: Array, place: Array, x: Array, limit: Array) -> Array:
-    """Samples, and of those that are off by more than the limit what is nearer to their place.
-
-    Args:
-        middle: What they are compared with. (…, n)
-        place: Where they belong if they are bad. (…, n)
-        x: The samples. (…, n)
-        limit: How far they may be off. (…, n)
-    """
+    """Samples, those off `middle` by more than the limit nearer to their place."""
     off = x - middle
     bad = np.clip(np.abs(off) / limit - 1.0, 0.0, 1.0)
     drawn = (1.0 - bad) * (middle + np.sign(off) * limit) + bad * place

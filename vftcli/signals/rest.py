@@ -25,7 +25,7 @@ NEAR_REST = 0.3  #: Stiction counts this long around a rest too, where no free p
 
 
 def slower(dq: Array, speed: float = REST) -> Mask:
-    """Where joints are slower than a speed [rad/s]; at just that they are neither. As `dq`"""
+    """Where joints are slower than a speed, not at just that [rad/s]. As `dq`"""
     return np.asarray((dq < speed) & (dq > -speed))
 
 
@@ -35,7 +35,7 @@ def faster(dq: Array, speed: float = MOVES) -> Mask:
 
 
 def duration(t: Array, dq: Array) -> Array:
-    """How long the stop lasts that a sample belongs to, 0 where the joint moves. (T, n) [s]"""
+    """Length of the stop that a sample belongs to, 0 in motion. (T, n) [s]"""
     length = np.zeros(dq.shape)
     step = median_step(t)
     for j, slow in enumerate(slower(dq).T):
@@ -45,13 +45,13 @@ def duration(t: Array, dq: Array) -> Array:
 
 
 def standing(t: Array, dq: Array) -> Mask:
-    """Where a joint stops for at least `LEAST` seconds, the moments before and after too. (T, n)"""
+    """Where a joint stops for `LEAST` seconds, and moments around. (T, n)"""
     # A joint is stuck before its speed is zero and settles after it has broken away.
     return np.column_stack([grown(t, long, BREAKAWAY) for long in (duration(t, dq) >= LEAST).T])
 
 
 def resting(t: Array, dq: Array) -> Mask:
-    """Where a joint is slower than `REST` for more than half of the time around. (T, n)
+    """Where a joint is slower than `REST` in most of the time around. (T, n)
 
     Unlike `standing` it knows no shortest stop: it tells friction at rest from friction in motion.
     """
@@ -65,7 +65,7 @@ def resting(t: Array, dq: Array) -> Mask:
 
 
 def held(q: Array, step: float) -> Mask:
-    """Where no joint travels further than `HELD`, by positions q (T, n) [rad] at steps [s]. (T,)"""
+    """Where no joint travels further than `HELD`; q (T, n) [rad]. (T,)"""
     reach = max(1, round(0.5 * WINDOW / step))
     found = np.zeros(len(q), dtype=bool)
     if len(q) > 2 * reach:

@@ -20,9 +20,7 @@ class Clock(NamedTuple):
 def clock_of(t: Array) -> Clock:
     """The clock of a whole log. (T,) [s]
 
-    The nominal sample time of an uneven clock is its median step; that of an even one its mean
-    step, which has more digits than any single difference of stamps; of a single sample 1 s, which
-    nothing uses.
+    An even clock's mean step has more digits than a difference of stamps.
     """
     if len(t) < 2:
         return Clock(True, 1.0)
@@ -32,17 +30,14 @@ def clock_of(t: Array) -> Clock:
 
 
 def median_step(t: Array) -> float:
-    """Median time between samples, the nominal sample time of a clock (T,). [s]
-
-    The median rather than the mean, because a gap belongs to no sample time.
-    """
+    """Median time between samples of a clock; a gap belongs to none. [s]"""
     if len(t) < 2:
         raise ClockError("one sample has no sample time")
     return median(np.diff(t))
 
 
 def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
-    """Numbers of the samples after which a clock waits longer than `steps` median steps. (G,)"""
+    """Samples after which a clock waits longer than `steps` steps. (G,)"""
     if len(t) < 2:
         return np.zeros(0, dtype=np.intp)
     taken = np.diff(t)
@@ -52,11 +47,7 @@ def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
 def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None) -> Array:
     """Columns of `x`, known at `t`, interpolated linearly to the times `at`. (S, n)
 
-    Args:
-        at: Times to have the columns at. (S,) [s]
-        t: Times at which they are known, increasing. (T,) [s]
-        x: Columns. (T, n)
-        outside: Value before the first and after the last known time; None holds the end values.
+    Before the first and after the last known time they are `outside`; None holds the end values.
     """
     out = empty_series(len(at), x.shape[1])
     for column, known in zip(out.T, x.T, strict=True):
@@ -65,10 +56,9 @@ def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None
 
 
 def bridge_unknown(t: Array, x: Array) -> Array:
-    """Columns with their unknown (non-finite) samples replaced by a straight line across. (T, n)
+    """Columns with a straight line across unknown samples. (T, n)
 
-    Before the first known sample and after the last the column keeps that sample's value; one
-    without any becomes zero.
+    At the ends the nearest known value is held; a column without any becomes zero.
     """
     columns = []
     for column in x.T:
@@ -78,7 +68,7 @@ def bridge_unknown(t: Array, x: Array) -> Array:
 
 
 def white_noise(x: Array) -> Array:
-    """Standard deviation of the white part of each column, from second differences. (n,)"""
+    """Standard deviation of each column's white part. (n,)"""
     if len(x) < 3:
         return np.full(x.shape[1], np.nan)
     curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
@@ -86,14 +76,7 @@ def white_noise(x: Array) -> Array:
 
 
 def runs_of(mask: Mask) -> list[tuple[int, int]]:
-    """Where the unbroken runs of true samples begin and end, as ``slice`` takes them.
-
-    Args:
-        mask: True or false, sample by sample. (T,)
-
-    Returns:
-        Of each run the index of its first sample and of the one behind its last.
-    """
+    """First sample of each run of true ones, and the one behind its last."""
     # With a false sample at either end every run has both its edges.
     walled = np.concatenate([[False], mask, [False]])
     edges = np.flatnonzero(walled[1:] != walled[:-1]).tolist()
@@ -101,7 +84,7 @@ def runs_of(mask: Mask) -> list[tuple[int, int]]:
 
 
 def intervals(t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0) -> list[tuple[int, int]]:
-    """Runs of a mask, those less than `gap` apart as one, that then last at least `least` [s]."""
+    """Runs of a mask, joined across less than `gap`, of `least` or more. [s]"""
     found: list[tuple[int, int]] = []
     for start, stop in runs_of(mask):
         joined = bool(found) and t[start] - t[found[-1][1] - 1] < gap
@@ -118,7 +101,7 @@ def covered(runs: Sequence[tuple[int, int]], samples: int, margin: int = 0) -> M
 
 
 def grown(t: Array, mask: Mask, margin: float) -> Mask:
-    """A mask with the samples up to `margin` before and after each of its runs [s]. (T,)"""
+    """A mask with `margin` before and after each of its runs [s]. (T,)"""
     found = mask.copy()
     for start, stop in runs_of(mask):
         first = np.searchsorted(t, t[start] - margin)

@@ -53,7 +53,7 @@ class Shown:
 
 
 def cell(value: object) -> str:
-    """A value as a table shows it: a dash for what is not known, four digits of a number."""
+    """A value as a table shows it: a dash for unknown, four digits of a number."""
     if value is None or (isinstance(value, float) and np.isnan(value)):
         return UNKNOWN
     return f"{value:.4g}" if isinstance(value, float) else str(value)
@@ -100,11 +100,20 @@ def frame_of(columns: Iterable[tuple[str, Any]]) -> "pl.DataFrame":
     given = dict(columns)
     table = pl.DataFrame(given)
     # Only columns that need it: to fill all of a long log takes longer than to write it.
-    unknown = [s.name for s in table if s.dtype == pl.Float64 and has_nan(given[s.name])]
+    floats = {s.name: np.asarray(given[s.name], float) for s in table if s.dtype == pl.Float64}
+    unknown = [name for name, x in floats.items() if x.size and np.isnan(x.min())]
     return table.with_columns(pl.col(unknown).fill_nan(None)) if unknown else table
 
 
-def has_nan(values: Any) -> bool:  # noqa: ANN401 - of an array, or what makes one
-    """Whether any number is NaN: the lowest is, then."""
-    numbers = np.asarray(values, dtype=np.float64)  # of what is not known, None, NaN
-    return bool(numbers.size and np.isnan(numbers.min()))
+class TimeSeries(Shown):
+    """Columns along a clock."""
+
+    t: Array  #: Time. (T,) [s]
+
+    def columns(self) -> Iterator[tuple[str, Array]]:
+        """Name and values of each column, named as in the files that we write."""
+        raise NotImplementedError
+
+    def to_polars(self) -> "pl.DataFrame":
+        """Time ``t`` and every column; what is not known is null."""
+        return frame_of([("t", self.t), *self.columns()])

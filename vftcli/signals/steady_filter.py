@@ -58,15 +58,6 @@ def filtered(
     return found, states[:, -1]
 
 
-class BlockFilter(NamedTuple):
-    """What a filter of n joints makes of one block."""
-
-    toeplitz: Array  #: Block's inputs → what is wanted at each of its samples. (n, BLOCK, BLOCK)
-    ends: Array  #: Block's inputs → the state at its end. (n, BLOCK, m)
-    carry: Array  #: State before the block → what is wanted at each of its samples. (n, m, BLOCK)
-    powers: Array  #: Fᵏ for k = 0 … BLOCK. (n, BLOCK + 1, m, m)
-
-
 def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> tuple[Array, Array]:
     """Run s_t = F s_{t−1} + g d_t.
 
@@ -80,17 +71,37 @@ def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> 
     Returns:
         One combination of the state, wanted·s_t (T, n), and the state after the last sample (m, n).
     """
-    blocks, state = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T), start.T
-    out = empty_series(*d.shape)
-    columns = np.ascontiguousarray(d.T)
+    toeplitz, ends, carry, powers = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T)
+    out, state, columns = empty_series(*d.shape), start.T, np.ascontiguousarray(d.T)
     for first in range(0, len(d), PIECE):
-        span = slice(first, first + PIECE)
-        state = filter_piece(blocks, columns[:, span], state, out.T[:, span])
+        piece, answer = columns[:, first : first + PIECE], out.T[:, first : first + PIECE]
+        n, samples = piece.shape
+        count = samples // BLOCK
+        covered = count * BLOCK
+        inputs = piece[:, :covered].reshape(n, count, BLOCK)
+        x = np.empty((n, count + 1, state.shape[1]))
+        x[:, 0] = state
+        np.matmul(inputs, ends, out=x[:, 1:])
+        sum_by_doubling(x, powers[:, BLOCK])
+        for j in range(n):
+            rows = answer[j, :covered].reshape(count, BLOCK)
+            np.matmul(inputs[j], toeplitz[j], out=rows)
+            rows += np.dot(x[j, :-1], carry[j])
+        # The few samples left fill no block: the same matrices, cut off.
+        rest, left, state = piece[:, None, covered:], samples - covered, x[:, -1]
+        tail = rest @ toeplitz[:, :left, :left] + state[:, None] @ carry[:, :, :left]
+        answer[:, covered:] = tail[:, 0]
+        forced = (rest @ ends[:, BLOCK - left :])[:, 0]
+        state = forced + (powers[:, left] @ state[..., None])[..., 0]
     return out, state.T
 
 
-def blocks_of(F: Array, g: Array, wanted: Array) -> BlockFilter:
-    """Prepare a filter, joints first: F (n, m, m), g and wanted (n, m)."""
+def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, Array]:
+    """What a filter of n joints makes of one block; F (n, m, m), g and wanted (n, m).
+
+    Of a block's inputs what is wanted at each sample (n, BLOCK, BLOCK) and the state at its end
+    (n, BLOCK, m); of the state before what is wanted (n, m, BLOCK); and Fᵏ for k = 0 … BLOCK.
+    """
     n, m = g.shape
     powers = np.empty((n, BLOCK + 1, m, m))
     powers[:, 0], powers[:, 1] = np.eye(m), F
@@ -102,34 +113,9 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> BlockFilter:
     impulse = np.zeros((n, 2 * BLOCK - 1))
     impulse[:, BLOCK - 1 :] = (response @ wanted[..., None])[..., 0]
     at = np.arange(BLOCK)
-    return BlockFilter(
-        toeplitz=impulse[:, BLOCK - 1 + at[None, :] - at[:, None]],
-        ends=np.ascontiguousarray(response[:, ::-1]),
-        carry=(wanted[:, None, None] @ powers[:, 1:])[:, :, 0].transpose(0, 2, 1).copy(),
-        powers=powers,
-    )
-
-
-def filter_piece(blocks: BlockFilter, d: Array, state: Array, out: Array) -> Array:
-    """Filter d (n, N) into `out` (n, N); the state before it → the state after it. (n, m)"""
-    n, samples = d.shape
-    count = samples // BLOCK
-    covered = count * BLOCK
-    inputs = d[:, :covered].reshape(n, count, BLOCK)
-    x = np.empty((n, count + 1, state.shape[1]))
-    x[:, 0] = state
-    np.matmul(inputs, blocks.ends, out=x[:, 1:])
-    sum_by_doubling(x, blocks.powers[:, BLOCK])
-    for j in range(n):
-        answer = out[j, :covered].reshape(count, BLOCK)
-        np.matmul(inputs[j], blocks.toeplitz[j], out=answer)
-        answer += np.dot(x[j, :-1], blocks.carry[j])
-    # The few samples left fill no block: the same matrices, cut off.
-    rest, left, state = d[:, None, covered:], samples - covered, x[:, -1]
-    tail = rest @ blocks.toeplitz[:, :left, :left] + state[:, None] @ blocks.carry[:, :, :left]
-    out[:, covered:] = tail[:, 0]
-    forced = (rest @ blocks.ends[:, BLOCK - left :])[:, 0]
-    return forced + (blocks.powers[:, left] @ state[..., None])[..., 0]
+    toeplitz = impulse[:, BLOCK - 1 + at[None, :] - at[:, None]]
+    carry = (wanted[:, None, None] @ powers[:, 1:])[:, :, 0].transpose(0, 2, 1).copy()
+    return toeplitz, np.ascontiguousarray(response[:, ::-1]), carry, powers
 
 
 def sum_by_doubling(x: Array, R: Array) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -11,16 +11,14 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
+    check_fields,
     check_shape,
     frozen_mask,
     seal,
 )
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
-from vftcli.signals.shown import Shown, frame_of
-
-if TYPE_CHECKING:
-    import polars as pl
+from vftcli.signals.shown import TimeSeries
 
 #: Names of the six components, force first, as in column names and tables.
 AXES = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -50,7 +48,7 @@ class WrenchFrame:
 
     @classmethod
     def parsed(cls, text: str) -> "WrenchFrame":
-        """The frame that ``AXES[@POINT][,by-robot]`` states, as ``--columns wrench[base]=…``."""
+        """The frame that ``AXES[@POINT][,by-robot]`` states."""
         place, _, sign = text.strip().partition(",")
         axes, at, point = place.strip().partition("@")
         sign = sign.strip() or "on-robot"
@@ -65,7 +63,7 @@ class WrenchFrame:
 
     @classmethod
     def of_conversion(cls, notation: object) -> "WrenchFrame | None":
-        """The frame that a log converted by us holds, None where it states none that is known.
+        """The frame that a log converted by us holds, None of an unknown one.
 
         Earlier versions wrote a sentence there; such a file still reads, its frame not stated.
         """
@@ -97,7 +95,7 @@ FRANKA_FRAME = WrenchFrame("base", "base", "by-robot")
 
 
 def unit_of(axis: str | int) -> str:
-    """The unit of one axis of a wrench, told by its name or its number from 0: N or N·m."""
+    """The unit of an axis, by its name or its number from 0: N or N·m."""
     number = AXES.index(axis) if isinstance(axis, str) else axis
     return "N" if number < 3 else "N·m"
 
@@ -109,7 +107,7 @@ def per_axis(name: str, values: Array) -> Iterator[tuple[str, Array]]:
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
-class Wrench(Shown):
+class Wrench(TimeSeries):
     """Force and moment that the environment exerts on the robot."""
 
     name: str  #: Short name of the observer or of the reference it comes from.
@@ -135,9 +133,8 @@ class Wrench(Shown):
         object.__setattr__(self, "masked", mask)
         check_clock(self.t, self.name)
         check_shape(self.values, (samples, 6), "wrench", self.name)
-        for name, shape in (("sd", (samples, 6)), ("sigma_min", (samples,))):
-            if (value := getattr(self, name)) is not None:
-                check_shape(value, shape, name, self.name)
+        check_fields(self, self.name, (samples, 6), "sd")
+        check_fields(self, self.name, (samples,), "sigma_min")
         check_shape(mask, (samples,), "mask", self.name)
 
     def _headline(self) -> str:
@@ -146,22 +143,17 @@ class Wrench(Shown):
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "axis", "unit", "least", "most", "largest sd"
-        told = np.isfinite(self.known).all(axis=1)
+        sure = np.isfinite(self.known).all(axis=1)
         for k, axis in enumerate(AXES):
-            values = self.values[told, k]
-            sd = None if self.sd is None or not told.any() else float(self.sd[told, k].max())
-            ends = (float(values.min()), float(values.max())) if told.any() else (None, None)
-            yield axis, unit_of(axis), *ends, sd
+            values, sd = self.values[sure, k], None if self.sd is None else self.sd[sure, k]
+            figures = (values.min, values.max, None if sd is None else sd.max)
+            yield axis, unit_of(axis), *(float(f()) if f and sure.any() else None for f in figures)
 
     def columns(self) -> Iterator[tuple[str, Array]]:
-        """Name and values of every axis, as ``wrench/best/fx``, and of its standard deviation."""
+        """Every axis, as ``wrench/best/fx``, and its standard deviation."""
         yield from per_axis(f"wrench/{self.name}", self.known)
         if self.known_sd is not None:
             yield from per_axis(f"wrench_sd/{self.name}", self.known_sd)
-
-    def to_polars(self) -> "pl.DataFrame":
-        """Time ``t`` and every axis, named as in ``estimates.parquet``; unknown is null."""
-        return frame_of([("t", self.t), *self.columns()])
 
     @property
     def hidden(self) -> Mask:
@@ -196,7 +188,7 @@ class Wrench(Shown):
 
     @property
     def size_sd(self) -> Array | None:
-        """Standard deviation of |F|, from that of the axes along F taken as independent. (T,) [N]
+        """Standard deviation of |F|, the axes taken as independent. (T,) [N]
 
         Where there is no force it is the largest of the axes', since F may point anywhere.
         """

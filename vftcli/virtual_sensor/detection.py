@@ -45,7 +45,7 @@ class ContactInterval(NamedTuple):
 def contact_intervals(
     t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0
 ) -> tuple[ContactInterval, ...]:
-    """Stretches of a mask as `vftcli.signals.intervals.intervals` has them, in time."""
+    """Stretches of a mask as `vftcli.signals.series.intervals` has them, in time."""
     runs = intervals(t, mask, least, gap)
     return tuple(ContactInterval(float(t[start]), float(t[stop - 1])) for start, stop in runs)
 
