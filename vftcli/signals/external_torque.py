@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
+    check_fields,
     check_series,
     check_shape,
     empty_series,
@@ -18,11 +19,9 @@ from vftcli.signals.arrays import (
     handed_over,
     seal,
 )
-from vftcli.signals.errors import ShapeError
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
-from vftcli.signals.shown import Shown, frame_of, joined, per_joint
-
+from vftcli.signals.shown import Shown, TimeSeries, joined, per_joint
 
 ALL = slice(None)  #: All rows.
 COVERS = 1.96  #: Half width of a 95 % band, in standard deviations.
