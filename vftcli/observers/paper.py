@@ -359,11 +359,8 @@ class KalmanObserver(BlockObserver):
         Q and R are the convention's effective densities at this sample time; the delay to a ramp
         is L₁/L₂ − Ts/2 with the discrete gains, exact for A_τ = 0.
         """
-        d, model, gains = (
-            self.densities(joints),
-            self.model(step, joints),
-            self.steady(step, joints),
-        )
+        d, model = self.densities(joints), self.model(step, joints)
+        gains = self.steady(step, joints)
         # The convention scales all of Q: Q₂₂/Ts (with A_τ = 0) is the effective density.
         literal = self.as_printed or self.noise_convention == "literal"
         scale = step if literal and self.discretisation == "fe" else 1.0
@@ -383,11 +380,8 @@ class KalmanObserver(BlockObserver):
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Exact response to τ_ext = e^{jωt}, its integral, the momentum, sampled. (F, n)"""
-        model, gains, omega = (
-            self.model(step, joints),
-            self.steady(step, joints),
-            angular(frequency),
-        )
+        model, omega = self.model(step, joints), angular(frequency)
+        gains = self.steady(step, joints)
         back = np.exp(-1j * omega * step)
         (f11, f12), (f21, f22) = closed_loop(gains, model)
         # (I − F z⁻¹) x = L p: the inverse's second row times L.

@@ -41,18 +41,9 @@ class KalmanSmoother(Shown):
 
     def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
         """A smoothed log; `sd` is the smoother's own √P₂₂."""
-        kalman, step, n, d = (
-            self.filter,
-            terms.clock.step,
-            terms.joints,
-            self.filter.unexplained(terms),
-        )
-        model, gains, even = (
-            kalman.model(step, n),
-            kalman.steady(step, n),
-            kalman.is_steady(terms.clock),
-        )
-        if not even:
+        kalman, step, n = self.filter, terms.clock.step, terms.joints
+        model, gains, d = kalman.model(step, n), kalman.steady(step, n), kalman.unexplained(terms)
+        if not (even := kalman.is_steady(terms.clock)):
             model = kalman.model(np.broadcast_to(terms.dt, (terms.samples, 1)), n)
             gains = gain_sequence(model, kalman.first_prior(step, n), gains.posterior)
         (_, p12, p22), a12, S = gains.posterior, model.a12, gains.S
@@ -74,12 +65,9 @@ class KalmanSmoother(Shown):
                 [f12 * f12, 2.0 * f12 * f22, f22 * f22],
             ]
         )
-        gained = from_the_end(
-            information,
-            np.array([1.0 / S, a12 / S, a12**2 / S]),
-            np.ones_like(tau),
-            np.array([p12**2, 2.0 * p12 * p22, p22**2]),
-        )
+        g = np.array([np.ones_like(a12), a12, a12**2]) / S
+        weights = np.array([p12**2, 2.0 * p12 * p22, p22**2])
+        gained = from_the_end(information, g, np.ones_like(tau), weights)
         sd = handed_over(np.sqrt(p22 - gained))
         return ExternalTorque(name=self.name, t=terms.t, tau=handed_over(tau), sd=sd)
 

@@ -82,10 +82,11 @@ def match_observers(
             "--gains or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
-    values: dict[str, Any] = {
-        goal.name + {"delay": "_s", "bandwidth": "_Hz"}[goal.name]: goal.value
-    }
-    remarks = [fact(f"{goal.name}-matched", **values)]
+    remarks = [
+        fact("delay-matched", delay_s=goal.value)
+        if goal.name == "delay"
+        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
+    ]
     if {"fdo", "gmo"} <= {observer.name for observer in tuned}:
         remarks.append(fact("first-order-observers-alike"))
     return tuned, tuple(remarks)
