@@ -17,7 +17,6 @@ from vftcli.outputs.believability import (
     headline,
     health,
     joint_words,
-    load_doubt,
     resting,
 )
 from vftcli.outputs.screen import facts
@@ -97,9 +96,12 @@ def test_rows_that_may_be_a_load_are_doubted(without_reference: Analysis) -> Non
     load = warning("light-load", load_kg=1.2, sd_kg=0.1, robot="ur5")
     made = replace(examined(without_reference, load), contacts=contact_list(contact()))
     assert headline(made).endswith("they may be its weight.")
-    assert load_doubt(replace(made, contacts=contact_list(contact(is_load=True)))) == ""
-    assert load_doubt(replace(made, contacts=contact_list())) == ""
-    assert load_doubt(replace(made, examinations=())) == ""
+    for other in (
+        replace(made, contacts=contact_list(contact(is_load=True))),
+        replace(made, contacts=contact_list()),
+        replace(made, examinations=()),
+    ):
+        assert "weight" not in headline(other)
 
 
 def test_one_remedy_is_given_once(without_reference: Analysis) -> None:

@@ -123,13 +123,24 @@ def admittance_record(
 ) -> dict[str, Any]:
     """Everything that `run.json` of a replay holds."""
     p, logs = replay.parameters, [recording] if recording is not None else []
+    loop: dict[str, Any] | None = None
+    if run is not None:
+        loop = {
+            "controller": run.controller.name,
+            "stable": run.stable,
+            "zero_removed": run.zero,
+            "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
+        }
+        if (made := run.simulation) is not None:
+            loop |= {"scenario": made.scenario.name, "seed": made.seed}
+        loop |= {"latencies": latency_rows(run)}
     found = {
         "rows": replay.rows,
         "examination": health_record(examinations),
         "input": input_record(recording) if recording is not None else None,
         "robot": robot_record(replay.robot),
         "force": replay.source,
-        "closed_loop": None if run is None else loop_record(run),
+        "closed_loop": loop,
         "start_rad": replay.start,
         "parameters": {
             "axes": AXES,
@@ -156,19 +167,6 @@ def admittance_record(
         **log_remarks(logs),
     }
     return envelope(command, list(map(log_entry, logs)), replay.remarks, found)
-
-
-def loop_record(run: ClosedLoop) -> dict[str, Any]:
-    """A closed loop's run, stability and latencies, for the record."""
-    about: dict[str, Any] = {
-        "controller": run.controller.name,
-        "stable": run.stable,
-        "zero_removed": run.zero,
-        "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
-    }
-    if run.simulation is not None:
-        about |= {"scenario": run.simulation.scenario.name, "seed": run.simulation.seed}
-    return about | {"latencies": latency_rows(run)}
 
 
 def render_admittance(

@@ -9,9 +9,8 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, latex, terminal
+from vftcli.outputs.grid import Column, Grid, csv_rows, keyed_grid, latex, terminal
 from vftcli.outputs.quantity import minus
-from vftcli.signals.arrays import Array
 
 
 def number_form(form: str) -> Callable[[float], str]:
@@ -56,7 +55,7 @@ RETURNS = (
 
 def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
     """The comparison as CSV; what is not known is empty."""
-    return csv_rows(rows, list(rows[0]) if rows else list(COLUMNS))
+    return csv_rows(rows, rows[0] if rows else COLUMNS)
 
 
 def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -75,13 +74,8 @@ def comparison_grid(
     """
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
-    keys = list(COLUMNS)[1:]
-    return Grid(
-        title=title,
-        columns=tuple(COLUMNS.values()),
-        rows=tuple((name_of(row), *(row[key] for key in keys)) for row in ordered),
-        swatches=True,
-    )
+    named = ({**row, "controller": name_of(row)} for row in ordered)
+    return keyed_grid(COLUMNS, named, title, swatches=True)
 
 
 def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
@@ -98,19 +92,17 @@ def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
 
 def latency_grid(run: ClosedLoop) -> Grid:
     """The latencies of a closed loop, from the true force and as the paper times them."""
-    return Grid(
-        title="From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of "
-        "the flange; from its fall below to the estimate's; as the paper times, from the estimate "
-        "past its threshold to 5 mm, from its fall below to where the flange goes no farther",
-        columns=(
-            Column("axis", words=True),
-            *(Column(head, form=".3f") for head in LATENCIES.values()),
-            Column("at rest before"),
-        ),
-        rows=tuple(
-            (axis, *times, "yes" if rested else "no")
-            for axis, *times, rested in map(dict.values, latency_rows(run))
-        ),
+    columns = {
+        "axis": Column("axis", words=True),
+        **{f"{name}_s": Column(head, form=".3f") for name, head in LATENCIES.items()},
+        "at_rest_before": Column("at rest before"),
+    }
+    return keyed_grid(
+        columns,
+        latency_rows(run),
+        "From the true force past its threshold to the estimate's, to 5 mm (0.02 rad) of the "
+        "flange; from its fall below to the estimate's; as the paper times, from the estimate past "
+        "its threshold to 5 mm, from its fall below to where the flange goes no farther",
     )
 
 
@@ -121,8 +113,8 @@ def latency_text(run: ClosedLoop) -> str:
     lines = []
     for row in latency_rows(run):
         detection, motion, withdrawal, reaction, turn = (
-            "never" if row[f"{name}_s"] is None else f"{row[f'{name}_s']:.3f} s"
-            for name in list(LATENCIES)[1:]
+            "never" if row[key] is None else f"{row[key]:.3f} s"
+            for key in [f"{name}_s" for name in LATENCIES][1:]
         )
         moving = "" if row["at_rest_before"] else " (the arm was moving already)"
         lines.append(
@@ -145,15 +137,13 @@ def parameter_text(replay: Replay) -> str:
         "F_tsd": p.threshold,
         "limit": p.speed_limit,
     }
-    words = ", ".join(f"{label} {position_rotation(values)}" for label, values in named.items())
-    return f"{words}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
-
-
-def position_rotation(values: Array | float) -> str:
-    """Six numbers as position / rotation, three equal ones once."""
-    texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
-    halves = (texts[:3], texts[3:])
-    return " / ".join(half[0] if len(set(half)) == 1 else ",".join(half) for half in halves)
+    words = []
+    for label, values in named.items():
+        # Six numbers as position / rotation, three equal ones once.
+        texts = [f"{value:.3g}" for value in np.broadcast_to(values, 6)]
+        halves = (half[:1] if len(set(half)) == 1 else half for half in (texts[:3], texts[3:]))
+        words.append(f"{label} {' / '.join(map(','.join, halves))}")
+    return f"{', '.join(words)}; Ts {1e3 * p.period:g} ms, {p.threshold_mode} threshold"
 
 
 def parameter_grid(replay: Replay) -> Grid:
@@ -164,9 +154,9 @@ def parameter_grid(replay: Replay) -> Grid:
         force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
         limit = float(np.broadcast_to(p.speed_limit, 6)[k])
         numbers = (float(v[k]) for v in (p.mass, p.damping, p.stiffness, p.alpha))
+        ratio, threshold = f"{p.damping_ratio[k]:.3g}", f"{p.threshold[k]:g} {force}"
         bound = f"{limit:g} {speed}" if np.isfinite(limit) else "none"
-        tail = (f"{p.threshold[k]:g} {force}", bound)
-        rows.append((axis, *numbers, f"{p.damping_ratio[k]:.3g}", *tail))
+        rows.append((axis, *numbers, ratio, threshold, bound))
     heads = {
         **{f"{letter}_d": f"${letter}_d$" for letter in "MBK"},
         "α": "",
@@ -187,11 +177,9 @@ def parameter_grid(replay: Replay) -> Grid:
 def stability_grid(replay: Replay) -> Grid:
     """The numbers that decide before anything moves: the worst of the axes of each kind."""
     rows: list[tuple[str | float, ...]] = []
+    kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for verdict in replay.verdicts:
-        for axes, part, unit in (
-            ("position", slice(0, 3), "m"),
-            ("rotation", slice(3, 6), "rad"),
-        ):
+        for axes, part, unit in kinds:
             bound = float(np.min(verdict.escape[part]))
             numbers = (float(np.max(values[part])) for values in (verdict.drag, verdict.recovery))
             escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"

@@ -15,9 +15,9 @@ from vftcli.outputs.files import (
     atomic,
     check_letters,
     digest,
-    put_text,
     table_file,
     unwritable,
+    write_text,
 )
 from vftcli.outputs.log.run_record import to_json
 from vftcli.outputs.partial import check_writable, held
@@ -64,8 +64,8 @@ class BatchFolder:
             self.rows.mkdir(parents=True, exist_ok=True)
             check_writable(self.rows)
             with held(self.rows, wait=False):
-                with atomic(self.path / MARKER, force=True) as temporary:
-                    put_text(temporary, to_json({**record, "options_sha256": options}))
+                text = to_json({**record, "options_sha256": options})
+                write_text(self.path / MARKER, text, force=True)
                 yield
         except BlockingIOError:
             raise OutputError(
@@ -129,11 +129,9 @@ class BatchFolder:
         for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
             with atomic(self.path / name, force=True) as temporary:
                 put_pieces(temporary, pieces)
-        with atomic(self.path / PAGE, force=True) as temporary:
-            put_text(temporary, page())
+        write_text(self.path / PAGE, page(), force=True)
         files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
-        with atomic(self.path / SEAL, force=True) as temporary:
-            put_text(temporary, to_json({**record, "files": files}))
+        write_text(self.path / SEAL, to_json({**record, "files": files}), force=True)
 
 
 def put_pieces(path: Path, pieces: "Iterable[pl.DataFrame]") -> None:

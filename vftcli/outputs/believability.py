@@ -108,23 +108,17 @@ class LogSummary(NamedTuple):
 
 def headline(analysis: Analysis) -> str:
     """The answer in one sentence."""
-    if analysis.contacts is not None:
-        return f"{answer(analysis.contacts)} {load_doubt(analysis)}".rstrip()
-    names = ", ".join(estimate.name for estimate in analysis.estimates)
-    return f"External torque of {analysis.robot.joints} joints by {names}; no contacts are listed."
-
-
-def load_doubt(analysis: Analysis) -> str:
-    """A sentence on rows that may be a found load's weight; else ""."""
-    found, codes = (
-        analysis.contacts,
-        {f.code for e in analysis.examinations[:1] for f in e.warnings},
-    )
-    if found is None or not found.contacts or found.load is not None or not codes & LOADS:
-        return ""
-    if any(contact.is_load for contact in found.contacts):
-        return ""
-    return "But the arm carries an unknown load: they may be its weight."
+    found, joints = analysis.contacts, analysis.robot.joints
+    if found is None:
+        names = ", ".join(estimate.name for estimate in analysis.estimates)
+        return f"External torque of {joints} joints by {names}; no contacts are listed."
+    text = answer(found)
+    codes = {finding.code for one in analysis.examinations[:1] for finding in one.warnings}
+    # Rows may be the weight of a load that was found.
+    pushed = found.contacts and not any(contact.is_load for contact in found.contacts)
+    if pushed and found.load is None and codes & LOADS:
+        text += " But the arm carries an unknown load: they may be its weight."
+    return text
 
 
 def log_line(analysis: Analysis, found: Sequence[Ground]) -> LogSummary:

@@ -64,6 +64,8 @@ class Column(NamedTuple):
             return entry
         if entry is None or (isinstance(entry, float) and np.isnan(entry)):
             return GridCell(DASH)
+        if isinstance(entry, bool):
+            return GridCell("yes" if entry else "no")
         if isinstance(entry, float):
             form = self.form
             return GridCell(format(entry, form) if isinstance(form, str) else form(entry))
@@ -98,6 +100,23 @@ class Grid:
         rows = [[c.cell(x) for c, x in zip(self.columns, row, strict=True)] for row in self.rows]
         # A name from a file may hold an end of line, or what a terminal would obey.
         return [[cell._replace(text=printable(cell.text)) for cell in row] for row in rows]
+
+
+def keyed_grid(
+    columns: Mapping[str, Column],
+    rows: Iterable[Mapping[str, Any]],
+    title: str = "",
+    *,
+    swatches: bool = False,
+) -> Grid:
+    """A table of rows for machines: of each the values of these keys, in their columns."""
+    entries = tuple(tuple(map(row.get, columns)) for row in rows)
+    return Grid(columns=tuple(columns.values()), rows=entries, title=title, swatches=swatches)
+
+
+def words(*heads: str) -> tuple[Column, ...]:
+    """Columns of words."""
+    return tuple(Column(head, words=True) for head in heads)
 
 
 def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ...]:  # noqa: ANN401
@@ -138,7 +157,8 @@ def markdown(grid: Grid) -> str:
     """A table in GitHub's Markdown with its title above, the best of each column bold."""
     heads = [escape_markdown(column.heading) for column in grid.columns]
     marks = ["---" if column.words else "---:" for column in grid.columns]
-    body = [[bold(escape_markdown(c.text), c.best, "**{}**") for c in row] for row in grid.cells]
+    texts = [[(escape_markdown(c.text), c.best) for c in row] for row in grid.cells]
+    body = [[f"**{text}**" if best else text for text, best in row] for row in texts]
     lines = [f"| {' | '.join(texts)} |" for texts in (heads, marks, *body)]
     above = [f"**{escape_markdown(grid.caption)}**", ""] if grid.caption else []
     return "".join(f"{line}\n" for line in (*above, *lines))
@@ -154,8 +174,13 @@ def latex(*grids: Grid) -> str:
     caption = (replace(first, title="") if len(grids) > 1 else first).caption or first.title
     rows = [row for grid in grids for row in grid.cells]
     texts = list(zip(*(latex_cells(texts) for texts in zip(*rows, strict=True)), strict=True))
-    wide = latex_width(first.columns, rows) > COLUMN_WIDTH
-    place = "table*" if wide else "table"
+    # About how wide it is in footnotes' type.
+    letters_across = sum(
+        max([0 if c.symbol else len(c.head), *(len(row[k].text) for row in rows)])
+        for k, c in enumerate(first.columns)
+    )
+    width = LETTER_WIDTH * letters_across + COLUMN_GAP * len(first.columns)
+    place = "table*" if width > COLUMN_WIDTH else "table"
     spec = "".join("l" if column.words else "r" for column in first.columns)
     parts = [rf"\begin{{{place}}}[tb]", r"\centering", rf"\caption{{{escape_latex(caption)}}}"]
     letters = re.sub("[^a-z0-9]+", "-", (first.title or caption).lower())[:40].strip("-")
@@ -163,14 +188,13 @@ def latex(*grids: Grid) -> str:
     parts += [r"\setlength{\tabcolsep}{4pt}", rf"\begin{{tabular}}{{{spec}}}", r"\toprule"]
     parts += latex_heads(first.columns)
     for grid in grids:
-        own, texts = texts[: len(grid.rows)], texts[len(grid.rows) :]
+        lines, texts = list(map(latex_line, texts[: len(grid.rows)])), texts[len(grid.rows) :]
+        if grid.summaries:
+            lines.insert(-grid.summaries, rf"\cmidrule{{1-{len(spec)}}}")
         parts.append(r"\midrule")
         if len(grids) > 1:
             title = rf"\textit{{{escape_latex(grid.title)}}}"
             parts.append(latex_line([rf"\multicolumn{{{len(spec)}}}{{l}}{{{title}}}"]))
-        lines = [latex_line(row) for row in own]
-        if grid.summaries:
-            lines.insert(-grid.summaries, rf"\cmidrule{{1-{len(spec)}}}")
         parts += lines
     parts += [r"\bottomrule", r"\end{tabular}"]
     notes = [escape_latex(note) for note in dict.fromkeys(n for grid in grids for n in grid.notes)]
@@ -186,13 +210,13 @@ def latex_heads(columns: Sequence[Column]) -> list[str]:
     heads = [column.symbol or escape_latex(column.head) for column in columns]
     heads[0] = heads[0][:1].upper() + heads[0][1:]
     units = [f"[{escape_latex(column.unit)}]" if column.unit else "" for column in columns]
-    lines = [heads, units] if any(units) else [heads]
     return [
         latex_line(
             text if column.words or not text else rf"\multicolumn{{1}}{{c}}{{{text}}}"
             for text, column in zip(line, columns, strict=True)
         )
-        for line in lines
+        for line in (heads, units)
+        if any(line)
     ]
 
 
@@ -202,7 +226,8 @@ def latex_cells(column: Sequence[GridCell]) -> list[str]:
     most = max((len(found[1] or "") for found in numbers if found), default=0)
     texts = []
     for cell, found in zip(column, numbers, strict=True):
-        text = bold(escape_latex(cell.text), cell.best, r"\textbf{{{}}}")
+        text = escape_latex(cell.text)
+        text = rf"\textbf{{{text}}}" if cell.best else text
         text += rf"\rlap{{$^{{{cell.mark}}}$}}" if cell.mark else ""
         # The point counts among the decimals.
         missing = DECIMALS[len(found[1] or "") : most] if found else ""
@@ -210,61 +235,24 @@ def latex_cells(column: Sequence[GridCell]) -> list[str]:
     return texts
 
 
-def latex_width(columns: Sequence[Column], rows: Sequence[Sequence[GridCell]]) -> float:
-    """About how wide a table is in footnotes' type. [in]"""
-    widths = [
-        max([0 if c.symbol else len(c.head), *(len(row[k].text) for row in rows)])
-        for k, c in enumerate(columns)
-    ]
-    return LETTER_WIDTH * sum(widths) + COLUMN_GAP * len(columns)
-
-
 def latex_line(texts: Iterable[str]) -> str:
     """Entries as one row of a LaTeX tabular."""
     return rf"{' & '.join(texts)} \\"
 
 
-def bold(text: str, best: bool, form: str) -> str:
-    """A text as it is, or put into a form for bold type."""
-    return form.format(text) if best else text
-
-
 def escape_markdown(text: str) -> str:
     """Text that Markdown shows as it is."""
-    text = printable(text)
-    for mark in "\\|*_`<>[]":
-        text = text.replace(mark, f"\\{mark}")
-    return text
+    return re.sub(r"[\\|*_`<>\[\]]", r"\\\g<0>", printable(text))
 
 
 #: Letters that LaTeX does not print as they are, or not in every encoding.
-LATEX_LETTERS = {
-    "\\": r"\textbackslash{}",
-    "&": r"\&",
-    "%": r"\%",
-    "$": r"\$",
-    "#": r"\#",
-    "_": r"\_",
-    "{": r"\{",
-    "}": r"\}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "–": "--",
-    "†": r"$\dagger$",
-    "−": "$-$",
-    "α": r"$\alpha$",
-    "ξ": r"$\xi$",
-    "µ": r"$\mu$",
-    "τ": r"$\tau$",
-    "σ": r"$\sigma$",
-    "ω": r"$\omega$",
-    "×": r"$\times$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "→": r"$\rightarrow$",
-    "<": r"$<$",
-    "·": r"\,",
-}
+LATEX_LETTERS = str.maketrans({
+    "\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}",
+    "&": r"\&", "%": r"\%", "$": r"\$", "#": r"\#", "_": r"\_", "{": r"\{", "}": r"\}",
+    "–": "--", "†": r"$\dagger$", "−": "$-$", "×": r"$\times$", "<": r"$<$", "·": r"\,",
+    "α": r"$\alpha$", "ξ": r"$\xi$", "µ": r"$\mu$", "τ": r"$\tau$", "σ": r"$\sigma$",
+    "ω": r"$\omega$", "≤": r"$\leq$", "≥": r"$\geq$", "→": r"$\rightarrow$",
+})  # fmt: skip
 
 
 def escape_latex(text: str) -> str:
@@ -273,8 +261,7 @@ def escape_latex(text: str) -> str:
     if text.startswith("-") and NUMBER.fullmatch(text):
         text = minus(text)
     # A blank behind the sign of a bound is a thin one: "< 6" is one number.
-    text = "".join(LATEX_LETTERS.get(letter, letter) for letter in text)
-    return text.replace("$<$ ", r"$<$\,")
+    return text.translate(LATEX_LETTERS).replace("$<$ ", r"$<$\,")
 
 
 def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -283,17 +270,15 @@ def json_rows(rows: Sequence[Mapping[str, Any]]) -> str:
     return json.dumps(known, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Sequence[str]) -> str:
+def csv_rows(rows: Sequence[Mapping[str, Any]], keys: Iterable[str]) -> str:
     """Rows as CSV under a line of keys; what is not known is empty, truth in small letters.
 
     A text that a spreadsheet would run as a formula, as a file's name may be, begins with "'".
     """
-    text = io.StringIO()
+    text, keys = io.StringIO(), list(keys)
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(keys)
-    for row in rows:
-        values = (known_or_none(row[key]) for key in keys)
-        writer.writerow(csv_cell(value) for value in values)
+    writer.writerows([csv_cell(known_or_none(row[key])) for key in keys] for row in rows)
     return text.getvalue()
 
 

@@ -1,6 +1,6 @@
 """Outputs of an identification: robot file, page, figures, `run.json`, and what is printed."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from math import isfinite
 from pathlib import Path
@@ -16,7 +16,7 @@ from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal
 from vftcli.outputs.log.run_record import (
     CONVENTIONS,
     envelope,
@@ -58,13 +58,9 @@ def write_identification(
     force: bool,
     form: str | None = None,
 ) -> str:
-    """Write all files or none; those of an earlier run stay as they were if one fails.
+    """Write all files or none, figures in a form, or none; return the text of `run.json`.
 
-    `logs` are the examinations of all that were read, also of those that no fit used; `form` is
-    what figures are written as, None for no figures.
-
-    Returns:
-        The text of `run.json`.
+    `logs` are the examinations of all that were read, also of those that no fit used.
     """
     names = {kind: file.name for kind, file in beside(path).items()}
     record = identification_record(found, logs, command)
@@ -232,26 +228,24 @@ def residual_grid(found: Identification) -> Grid:
 
 def parameter_grid(found: Identification) -> Grid:
     """The identified numbers with their spread, and what the profile had."""
-    rows = []
-    for row in found.parameters.iter_rows(named=True):
-        unit = row["unit"] + ("" if row["determined"] else "  (not determined)")
-        # A dash for what the profile does not have, or the log does not determine: it is no zero.
-        texts = [
-            f"{row[key]:{form}}" if isfinite(row[key]) else DASH
-            for key, form in (("value", ".5g"), ("sd", ".2g"), ("profile", ".5g"))
-        ]
-        rows.append((row["parameter"], row["joint"], *texts, unit))
-    return Grid(
-        columns=(
-            Column("number", words=True, width=19),
-            Column("joint", width=4),
-            Column("value", width=10),
-            Column("sd", width=8),
-            Column("profile", width=10),
-            Column("unit", words=True),
-        ),
-        rows=tuple(rows),
+    columns = {
+        "parameter": Column("number", words=True, width=19),
+        "joint": Column("joint", width=4),
+        "value": Column("value", form=known_form(".5g"), width=10),
+        "sd": Column("sd", form=known_form(".2g"), width=8),
+        "profile": Column("profile", form=known_form(".5g"), width=10),
+        "unit": Column("unit", words=True),
+    }
+    rows = (
+        row | {"unit": row["unit"] + ("" if row["determined"] else "  (not determined)")}
+        for row in found.parameters.iter_rows(named=True)
     )
+    return keyed_grid(columns, rows)
+
+
+def known_form(form: str) -> Callable[[float], str]:
+    """A dash for what the profile does not have, or the log does not determine: it is no zero."""
+    return lambda value: format(value, form) if isfinite(value) else DASH
 
 
 def shape_choice_grid(choices: pl.DataFrame) -> Grid:
@@ -268,12 +262,11 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
 
 def base_grid(base: pl.DataFrame) -> Grid:
     """Base parameters as the least squares gave them."""
-    numbers = (Column(head, form=signed) for head in ("value (SI)", "sd"))
-    return Grid(
-        title="Weighted least squares, before physical consistency",
-        columns=(Column("parameter", words=True), *numbers, Column("determined")),
-        rows=tuple(
-            (r["parameter"], r["value"], r["sd"], "yes" if r["determined"] else "no")
-            for r in base.iter_rows(named=True)
-        ),
-    )
+    columns = {
+        "parameter": Column("parameter", words=True),
+        "value": Column("value (SI)", form=signed),
+        "sd": Column("sd", form=signed),
+        "determined": Column("determined"),
+    }
+    title = "Weighted least squares, before physical consistency"
+    return keyed_grid(columns, base.iter_rows(named=True), title)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
+from vftcli.outputs.grid import Column, Grid, joint_columns, keyed_grid, terminal
 
 if TYPE_CHECKING:
     from vftcli.observers.tuning import Tuned
@@ -34,8 +34,9 @@ def joints_grid(robot: "Robot") -> Grid:
     rows: list[tuple[str | float, ...]] = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
     for j, joint in enumerate(chain.names):
         constant = float(robot.torque_constant[j]) if robot.torque_constant is not None else "-"
-        numbers = (float(chain.mass[j]), float(chain.rotor_inertia[j]), constant)
-        rows.append((joint, *numbers, float(robot.limits.tau_max[j]), friction_words(robot, j)))
+        inertias = float(chain.mass[j]), float(chain.rotor_inertia[j])
+        limit = float(robot.limits.tau_max[j])
+        rows.append((joint, *inertias, constant, limit, friction_words(robot, j)))
     return Grid(
         columns=(
             Column("joint", words=True, width=16),
@@ -74,9 +75,8 @@ def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
         # Without a threshold there is no alarm to count.
         if with_alarms and line.alarms is not None:
             values["false alarms [1/h]"] = line.alarms.round(3)
-        for what, numbers in values.items():
-            name = line.observer if what == "ω [rad/s]" else ""
-            rows.append((name, what, *map(float, numbers)))
+        for k, (what, numbers) in enumerate(values.items()):
+            rows.append(("" if k else line.observer, what, *map(float, numbers)))
     joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
     words = (Column("observer", words=True), Column("", words=True, width=22))
     return Grid(columns=(*words, *joints), rows=tuple(rows))
@@ -93,10 +93,10 @@ def robot_text(robot: "Robot") -> str:
         lines.append("")
         lines.extend(f"{observer}.{key} = {value}" for key, value in gains.items())
     lines += ["", *(f"note: {note}" for note in robot.remarks)]
-    for source in robot.sources:
-        lines.append(
-            f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
-        )
+    lines += [
+        f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
+        for source in robot.sources
+    ]
     if robot.payloads:
         lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
     return "\n".join(lines)
@@ -104,16 +104,11 @@ def robot_text(robot: "Robot") -> str:
 
 def bench_grid(result: Mapping[str, Any]) -> Grid:
     """Times of dynamics and observers, beside the paper's on its laptop."""
-    rows = [{"name": "dynamics", **result["dynamics"]}, *result["observers"]]
-    return Grid(
-        columns=(
-            Column("", words=True, width=15),
-            Column("total", unit="ms", form=".2f"),
-            Column("per sample", unit="µs", form=".3f"),
-            Column("paper, its laptop", unit="s", form=".3f"),
-        ),
-        rows=tuple(
-            (row["name"], 1e3 * row["total_s"], row["per_sample_us"], row.get("paper_s"))
-            for row in (*rows, *result["complete_log"])
-        ),
-    )
+    dynamics = {"name": "dynamics", **result["dynamics"]}
+    columns = {
+        "name": Column("", words=True, width=15),
+        "total_s": Column("total", "ms", lambda seconds: f"{1e3 * seconds:.2f}"),
+        "per_sample_us": Column("per sample", "µs", ".3f"),
+        "paper_s": Column("paper, its laptop", "s", ".3f"),
+    }
+    return keyed_grid(columns, [dynamics, *result["observers"], *result["complete_log"]])

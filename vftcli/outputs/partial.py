@@ -34,18 +34,13 @@ def partial_folder(parent: Path) -> Iterator[Path]:
             yield path
     finally:
         shutil.rmtree(path, ignore_errors=True)
-    clear_leftovers(parent)
-
-
-def clear_leftovers(parent: Path) -> None:
-    """Remove temporary folders in `parent` of processes that are gone."""
-    for path in parent.glob(PARTIAL):
-        found = NAME.fullmatch(path.name)
-        if found is None or path.is_symlink() or not path.is_dir():
+    for other in parent.glob(PARTIAL):
+        found = NAME.fullmatch(other.name)
+        if found is None or other.is_symlink() or not other.is_dir():
             continue
-        with suppress(OSError), held(path, wait=False):
-            if not is_running(int(found[1])) or time.time() - path.stat().st_mtime > UNSURE:
-                shutil.rmtree(path, ignore_errors=True)
+        with suppress(OSError), held(other, wait=False):
+            if not is_running(int(found[1])) or time.time() - other.stat().st_mtime > UNSURE:
+                shutil.rmtree(other, ignore_errors=True)
 
 
 def is_running(process: int) -> bool:

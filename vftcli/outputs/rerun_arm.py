@@ -161,14 +161,7 @@ def send_force(
 ) -> None:
     """Send an arrow over time; where the force is not known there is none.
 
-    Args:
-        stream: The recording.
-        path: Entity of the arrow.
-        t: Time. (S,) [s]
-        origin: Where it acts, in base axes. (S, 3) [m]
-        force: In base axes, NaN where not known. (S, 3) [N]
-        scale: Newtons that are 1 m.
-        colour: ``#rrggbb``.
+    `origin` [m] and `force` [N] are in base axes, (S, 3); `scale` newtons are 1 m.
     """
     known = np.all(np.isfinite(force), axis=1)
     count = int(known.sum())

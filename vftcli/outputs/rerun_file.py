@@ -78,14 +78,8 @@ def rerun_file(
 ) -> Iterator[Stream]:
     """Write a recording with its plots and words; yield its stream, to draw the arm into it.
 
-    Args:
-        path: Where to; an existing file is replaced.
-        title: Name of the recording.
-        tabs: The plots.
-        words: Name of a document → its Markdown.
-        poses: Where the arm has been, so that the eye sees all of it.
-        space: Name of its space.
-        marked: The span that the time panel marks, None if there is none. [s]
+    `words` holds the Markdown of every document by its name. The eye sees all `poses` of the arm,
+    in a space of this name; the time panel marks a span. [s]
     """
     # Equal data make equal recordings: no random id, no time of writing, nor rows put together by
     # how much time has gone by.
@@ -207,7 +201,7 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 
 
 def title_of(tab: Tab, plot: Chart) -> str:
-    """A plot's title; in small plots the viewer labels few ticks, so the axis' ends stand in it."""
+    """A plot's title; in small plots, where few ticks are labelled, with the axis' ends."""
     title = f"{plot.title} [{plot.units[0]}]"
     if len(tab.plots) <= 3:
         return title

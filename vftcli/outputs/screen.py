@@ -13,7 +13,6 @@ from vftcli.outputs.answer import answer, otherwise
 from vftcli.outputs.believability import (
     MARKS,
     Ground,
-    LogSummary,
     grounds,
     headline,
     health,
@@ -124,11 +123,10 @@ def written_lines(
 
 def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """|F| over time, none where no force is listed."""
-    force = forces_of_list(analysis)
-    if force is None or analysis.contacts is None:
+    force, found = forces_of_list(analysis), analysis.contacts
+    if force is None or found is None:
         return []
-    contacts = analysis.contacts.contacts
-    shown = [] if contacts[0].is_load else hardest_rows(contacts)
+    shown = [] if found.contacts[0].is_load else hardest_rows(found.contacts)
     return force_bars(analysis.t, force, shown, canvas)
 
 
@@ -138,19 +136,17 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
     if not contacts and (most is not None or not found.candidates):
         return [f"  {rest}"] if rest else []
     shown = hardest_rows(contacts, len(contacts) if most is None else most)
-    grid = terminal(contact_grid(shown), canvas.shown) if shown else ""
-    lines = [f"  {line}" for line in grid.splitlines()]
+    lines = terminal(contact_grid(shown), canvas.shown).splitlines() if shown else []
     if len(shown) < len(contacts):
-        lines.append(f"  the {len(shown)} hardest of {len(contacts)}; --details shows all")
+        lines.append(f"the {len(shown)} hardest of {len(contacts)}; --details shows all")
     if most is None and found.candidates:
-        lines += ["", "  Candidates, too little evidence to list:"]
-        grid = terminal(contact_grid(found.candidates), canvas.shown)
-        lines += [f"  {line}" for line in grid.splitlines()]
+        lines += ["", "Candidates, too little evidence to list:"]
+        lines += terminal(contact_grid(found.candidates), canvas.shown).splitlines()
     if rest:
-        lines.append(f"  {rest}")
+        lines.append(rest)
     if found.hardest is not None:
-        lines.append(f"  ({LEGEND})")
-    return lines
+        lines.append(f"({LEGEND})")
+    return [f"  {line}" if line else "" for line in lines]
 
 
 def belief_lines(found: Sequence[Ground], canvas: Canvas, most: int | None) -> list[str]:
@@ -243,8 +239,8 @@ def logs_screen(
     findings = [
         (ground, analysis.recording.name)
         for standing in ("bad", "caution")
-        for analysis, all_grounds in found
-        for ground in all_grounds
+        for analysis, each in found
+        for ground in each
         if ground.of_log and ground.standing == standing
     ]
     if findings:
@@ -278,7 +274,16 @@ def log_table(
     """One line a log: what touched the arm, and whether the log is sound."""
     judged = any(analysis.errors is not None for analysis, _ in found)
     heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
-    rows = [log_row(each[0], log_line(*each))[: len(heads)] for each in found]
+    rows = []
+    for analysis, all_grounds in found:
+        summary, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
+        if listed is not None and listed.detectable_force is not None and listed.tells_untouched:
+            rest = at_least_shown(listed.detectable_force)
+        errors = [e for block in blocks(analysis.errors)[:1] for e in block.means.errors.values()]
+        error = f"{significant(errors[0], 2)} N·m" if errors else DASH
+        span = f"{summary.duration:.1f} s"
+        row = [summary.name, span, summary.contacts, summary.hardest, rest, error]
+        rows.append(row[: len(heads)])
     rows += [[name, *[""] * (len(heads) - 1)] for name in failed]
     columns = tuple(Column(head, words=head in {"log", "hardest"}) for head in heads)
     head, *table = terminal(Grid(columns=columns, rows=tuple(rows)), canvas.shown).splitlines()
@@ -291,14 +296,3 @@ def log_table(
         text = canvas.painted(canvas.shown(f"{MARKS[standing]} {words}"), standing)
         lines.append(f"{line:<{room}}{text}")
     return lines
-
-
-def log_row(analysis: Analysis, line: LogSummary) -> list[str]:
-    """Text of a log's line, without its health."""
-    found, rest, error = analysis.contacts, DASH, DASH
-    if found is not None and found.detectable_force is not None and found.tells_untouched:
-        rest = at_least_shown(found.detectable_force)
-    for block in blocks(analysis.errors)[:1]:
-        for value in [*block.means.errors.values()][:1]:
-            error = f"{significant(value, 2)} N·m"
-    return [line.name, f"{line.duration:.1f} s", line.contacts, line.hardest, rest, error]

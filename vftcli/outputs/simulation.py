@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.log.run_record import envelope, seal
@@ -55,17 +54,13 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
 def save(
     runs: Mapping[Path, Simulation], format: str = "", force: bool = False, command: str = ""
 ) -> list[Path]:
-    """Write each log, with ``PATH.truth.parquet``, ``.scenario.toml`` and ``.run.json`` beside it.
-
-    Returns:
-        The paths of all files; of a bag, its folder.
-    """
+    """Write each log and its companions; return the paths of all files, of a bag its folder."""
     from vftcli.simulation.writers import usual_format
 
-    formats = {path: usual_format(run.scenario, run.robot, format) for path, run in runs.items()}
+    formats = [usual_format(run.scenario, run.robot, format) for run in runs.values()]
     with log_folder(runs, force) as folder:
-        for path, run in runs.items():
-            write_run(folder, path, run, formats[path], command)
+        for (path, run), form in zip(runs.items(), formats, strict=True):
+            write_run(folder, path, run, form, command)
     return [file for path in runs for file in (path, *companions(path))]
 
 
@@ -81,11 +76,7 @@ def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, co
     folder.write(scenario, to_toml(replace(run.scenario, format=format), run.seed))
     own = {truth, scenario, path.name}
     files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
-    seal(folder, record, run_record(run, format, command), files)
-
-
-def run_record(run: Simulation, format: str, command: str) -> dict[str, Any]:
-    """Record of a simulation; the scenario file says all of it."""
+    # The scenario file says the rest.
     about = {
         "scenario": run.scenario.name,
         "seed": run.seed,
@@ -93,4 +84,4 @@ def run_record(run: Simulation, format: str, command: str) -> dict[str, Any]:
         "format": format,
         "samples": len(run.measured.rows),
     }
-    return envelope(command, found=about)
+    seal(folder, record, envelope(command, found=about), files)

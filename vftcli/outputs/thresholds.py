@@ -1,12 +1,13 @@
 """Thresholds as tables, as rows for machines, and as the calls of the robots' own interfaces."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from itertools import product
 from math import ceil, isnan
 from typing import Any
 
-from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
+from vftcli.contacts.threshold_check import ThresholdDetection
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
-from vftcli.outputs.grid import Column, Grid, joint_columns, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.writing import lines_of
 
@@ -47,14 +48,11 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
     )
 
 
-def tail_entries(one: SignalThreshold) -> tuple[str | float, ...]:
+def tail_entries(one: SignalThreshold) -> tuple[Entry, ...]:
     """Interval and tail of a threshold: 95 %, u, λ, k, hours, the log."""
-    low, high = one.interval
-    span = f"{significant(low)}{DASH}{significant(high)}"
-    if one.tail is None:
-        return span, *(float("nan"),) * 4, one.log
-    tail = one.tail
-    return span, tail.start, tail.rate, str(tail.count), tail.hours, one.log
+    span, t = DASH.join(map(significant, one.interval)), one.tail
+    tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.count), t.hours)
+    return span, *tail, one.log
 
 
 def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
@@ -70,14 +68,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
             Column("any axis"),
         ),
         rows=tuple(
-            (
-                one.log,
-                one.hours,
-                one.due,
-                str(one.any_joint),
-                *map(str, one.joints),
-                str(one.any_axis),
-            )
+            (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
             for one in counted
         ),
     )
@@ -85,6 +76,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
 
 def check_grid(check: ThresholdDetection) -> Grid:
     """The contacts of a log, and their evidence."""
+    missed = {True: "on already", False: "missed"}
     return Grid(
         title=f"{check.log}: what they would have detected",
         columns=(
@@ -96,15 +88,10 @@ def check_grid(check: ThresholdDetection) -> Grid:
             Column("by", words=True),
         ),
         rows=tuple(
-            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, verdict(c))
+            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or missed[c.already_above])
             for k, c in enumerate(check.contacts, start=1)
         ),
     )
-
-
-def verdict(contact: CheckedContact) -> str:
-    """Cause of the alarm, or reason for none."""
-    return contact.by or ("on already" if contact.already_above else "missed")
 
 
 def check_line(check: ThresholdDetection) -> str:
@@ -128,43 +115,35 @@ def check_line(check: ThresholdDetection) -> str:
     return ", ".join(words)
 
 
-def threshold_rows(
-    thresholds: Sequence[tuple[str, str, float, SignalThreshold]], key: str
-) -> list[dict[str, Any]]:
-    """Rows for machines, the unit in the names."""
-    rows = []
-    for shown, of, level, one in thresholds:
-        unit, tail = of.replace("·", ""), one.tail
-        name = int(shown[1:]) if key == "joint" else shown
-        rows.append(
-            {
-                key: name,
-                f"threshold_{unit}": None if isnan(level) else level,
-                f"interval_{unit}": list(one.interval),
-                "rate_per_h": one.rate,
-                "log": one.log,
-                f"tail_from_{unit}": tail.start if tail else None,
-                f"tail_excess_{unit}": tail.excess if tail else None,
-                "tail_rate_per_h": tail.rate if tail else None,
-                "tail_maxima": tail.count if tail else None,
-                "hours": tail.hours if tail else None,
-            }
-        )
-    return rows
+def threshold_row(shown: str, of: str, level: float, one: SignalThreshold) -> dict[str, Any]:
+    """A threshold for machines, the unit in the names."""
+    unit, tail = of.replace("·", ""), one.tail
+    joint = shown.startswith("J")
+    return {
+        "joint" if joint else "axis": int(shown[1:]) if joint else shown,
+        f"threshold_{unit}": None if isnan(level) else level,
+        f"interval_{unit}": list(one.interval),
+        "rate_per_h": one.rate,
+        "log": one.log,
+        f"tail_from_{unit}": tail and tail.start,
+        f"tail_excess_{unit}": tail and tail.excess,
+        "tail_rate_per_h": tail and tail.rate,
+        "tail_maxima": tail and tail.count,
+        "hours": tail and tail.hours,
+    }
 
 
 def thresholds_record(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> dict[str, Any]:
     """All of it for machines."""
-    count = len(thresholds.joints)
-    of_wrench = threshold_rows(thresholds.named[count:], "axis")
-    axes = len(thresholds.axes)
+    count, axes = len(thresholds.joints), len(thresholds.axes)
+    rows = [threshold_row(*each) for each in thresholds.named]
     return {
         "rate_per_h": thresholds.rate,
-        "joints": threshold_rows(thresholds.named[:count], "joint"),
-        "axes": of_wrench[:axes],
-        "force": of_wrench[axes] if thresholds.force else None,
+        "joints": rows[:count],
+        "axes": rows[count : count + axes],
+        "force": rows[-1] if thresholds.force else None,
         "calls": calls(thresholds),
         "left_out": [one._asdict() for one in counted],
         "checks": list(map(check_record, checks)),
@@ -202,13 +181,12 @@ def check_record(check: ThresholdDetection) -> dict[str, Any]:
 def calls(thresholds: Thresholds) -> dict[str, str]:
     """Name of every interface that takes as many joints as there are → its text."""
     count = len(thresholds.joints)
-    written = {
-        name: write(thresholds)
-        for name, (joints, write) in INTERFACES.items()
-        if joints in (None, count)
-    }
     # An interface that needs an unknown number gets no text.
-    return {name: text for name, text in written.items() if text}
+    return {
+        name: write(thresholds)
+        for name, (joints, needed, write) in INTERFACES.items()
+        if joints in (None, count) and (not needed or are_known(getattr(thresholds, needed)))
+    }
 
 
 def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
@@ -218,18 +196,19 @@ def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
 
 def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
     """The thresholds themselves: what is beyond is a contact. [N·m, N]"""
-    return [rounded_up(one.value) for one in thresholds]
+    return rounded_up(one.value for one in thresholds)
 
 
 def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
     """The upper ends of their intervals, where the robot stops. [N·m, N]"""
-    ends = [one.value if isnan(one.interval[1]) else one.interval[1] for one in thresholds]
-    return list(map(rounded_up, ends))
+    return rounded_up(
+        one.value if isnan(one.interval[1]) else one.interval[1] for one in thresholds
+    )
 
 
-def rounded_up(value: float) -> float:
-    """A threshold as a call states it; rounding down would raise more alarms."""
-    return ceil(value * SHARES) / SHARES
+def rounded_up(values: Iterable[float]) -> list[float]:
+    """Thresholds as a call states them; rounding down would raise more alarms."""
+    return [ceil(value * SHARES) / SHARES for value in values]
 
 
 def doubt(thresholds: Thresholds) -> str:
@@ -240,8 +219,6 @@ def doubt(thresholds: Thresholds) -> str:
 
 def libfranka_call(thresholds: Thresholds) -> str:
     """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
-    if not are_known(thresholds.axes):
-        return ""
     lists = {
         "lower_torque_thresholds": lower(thresholds.joints),
         "upper_torque_thresholds": upper(thresholds.joints),
@@ -254,35 +231,28 @@ def libfranka_call(thresholds: Thresholds) -> str:
 
 def franka_ros_parameters(thresholds: Thresholds) -> str:
     """`collision_config` of franka_control_node.yaml."""
-    if not are_known(thresholds.axes):
-        return ""
-    each = {"torque": thresholds.joints, "force": thresholds.axes}
+    each = (("torque", thresholds.joints), ("force", thresholds.axes))
     lines = [doubt(thresholds), "collision_config:\n"]
-    for quantity, ones in each.items():
-        for phase in ("acceleration", "nominal"):
-            lines.append(f"  lower_{quantity}_thresholds_{phase}: {lower(ones)}\n")
-            lines.append(f"  upper_{quantity}_thresholds_{phase}: {upper(ones)}\n")
+    for (quantity, ones), phase in product(each, ("acceleration", "nominal")):
+        lines.append(f"  lower_{quantity}_thresholds_{phase}: {lower(ones)}\n")
+        lines.append(f"  upper_{quantity}_thresholds_{phase}: {upper(ones)}\n")
     return "".join(lines)
 
 
 def ur_script(thresholds: Thresholds) -> str:
     """A thread in URScript that ends the program when the size of the force is beyond the limit."""
-    if not are_known(thresholds.force):
-        return ""
-    limit = lower(thresholds.force)[0]
     own = thresholds.logged_wrench
     head = "" if own else "# learned from gmo, not from actual_TCP_force: record that\n"
-    return (
-        f"{head}thread watch_force():\n"
-        "  while True:\n"
-        f"    if force() > {limit}:  # N\n"
-        "      halt\n"
-        "    end\n"
-        "    sync()\n"
-        "  end\n"
-        "end\n"
-        "run watch_force()\n"
-    )
+    return f"""{head}thread watch_force():
+  while True:
+    if force() > {lower(thresholds.force)[0]}:  # N
+      halt
+    end
+    sync()
+  end
+end
+run watch_force()
+"""
 
 
 def toml_text(thresholds: Thresholds) -> str:
@@ -302,10 +272,11 @@ def toml_text(thresholds: Thresholds) -> str:
     return "".join(lines_of({"thresholds": table})).lstrip()
 
 
-#: Interface of a robot → how many joint torques it takes, None for any number, and its text.
-INTERFACES: dict[str, tuple[int | None, Callable[[Thresholds], str]]] = {
-    "libfranka": (7, libfranka_call),
-    "franka_ros": (7, franka_ros_parameters),
-    "ur_script": (6, ur_script),
-    "toml": (None, toml_text),
+#: Interface of a robot → how many joint torques it takes, None for any number; which thresholds
+#: must be known, "" for none; and its text.
+INTERFACES: dict[str, tuple[int | None, str, Callable[[Thresholds], str]]] = {
+    "libfranka": (7, "axes", libfranka_call),
+    "franka_ros": (7, "axes", franka_ros_parameters),
+    "ur_script": (6, "force", ur_script),
+    "toml": (None, "", toml_text),
 }

@@ -1,6 +1,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,6 @@ from vftcli.outputs.admittance_tables import (
     comparison_text,
     parameter_grid,
     parameter_text,
-    position_rotation,
     stability_grid,
 )
 from vftcli.outputs.grid import json_rows
@@ -52,8 +52,9 @@ def test_rows_for_machines_are_not_rounded(release: Replay) -> None:
         ([np.inf] * 6, "inf / inf"),
     ],
 )
-def test_equal_axes_are_told_once(values: list[float], text: str) -> None:
-    assert position_rotation(np.array(values)) == text
+def test_equal_axes_are_told_once(release: Replay, values: list[float], text: str) -> None:
+    parameters = replace(release.parameters, speed_limit=np.array(values, dtype=float))
+    assert f"limit {text}; Ts" in parameter_text(replace(release, parameters=parameters))
 
 
 def test_parameters_of_the_profile(release: Replay) -> None:

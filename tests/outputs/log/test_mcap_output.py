@@ -8,8 +8,8 @@ from rosbags.highlevel import AnyReader
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import contacts_record
-from vftcli.outputs.log import mcap_output
-from vftcli.outputs.log.mcap_output import frame_id, ros_name, stamps_of, write_mcap
+from vftcli.outputs.log import conversion
+from vftcli.outputs.log.conversion import ros_name, stamps_of, write_mcap
 from vftcli.outputs.log.run_record import jsonable
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.recording import Recording, Source
@@ -20,7 +20,7 @@ def path(touched: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A file of three blocks of samples, with two contacts."""
     path = tmp_path_factory.mktemp("mcap") / "estimates.mcap"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(mcap_output, "BLOCK", 256)
+        patch.setattr(conversion, "BLOCK", 256)
         write_mcap(path, touched)
     return path
 
@@ -83,7 +83,9 @@ def test_the_wrench_of_best_stands_in_the_flange(
 
 def test_wrenches_in_base_axes_say_about_which_point(with_wrench: Analysis) -> None:
     """The flange is where their moment refers to: the frame of base would be another."""
-    assert {frame_id(wrench) for wrench in with_wrench.wrenches} == {"base@flange"}
+    topics = conversion.estimated_topics(with_wrench, with_wrench.robot.chain.names)
+    frames = {topic.values.get("header.frame_id") for topic in topics}
+    assert frames == {None, "base@flange"}
 
 
 def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Analysis) -> None:

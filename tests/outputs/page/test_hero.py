@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
-from vftcli.outputs.page.hero import (
+from vftcli.outputs.page.details import (
     ARROW,
     SHAPES,
     SIZE,

@@ -82,16 +82,10 @@ def write_figures(
     before: str = "figures/",
 ) -> None:
     """Write figures in both widths."""
-    for name, drawing in drawings.items():
-        for width, inches in WIDTHS.items():
-            with paper_style():
-                drawn = drawing.draw(inches)
-                drawn.savefig(
-                    folder / f"{before}{name}-{width}.{form}",
-                    format=form,
-                    dpi=RESOLUTION,
-                    metadata=metadata(form, drawing.title),
-                )
+    for (name, drawing), (width, inches) in product(drawings.items(), WIDTHS.items()):
+        with paper_style():
+            path, about = folder / f"{before}{name}-{width}.{form}", metadata(form, drawing.title)
+            drawing.draw(inches).savefig(path, format=form, dpi=RESOLUTION, metadata=about)
 
 
 @contextmanager
@@ -107,26 +101,21 @@ def paper_style() -> Iterator[None]:
 
 def metadata(form: str, title: str) -> dict[str, str | None]:
     """A file's metadata: no date and no machine, so that its bytes stay equal."""
-    said: dict[str, str | None] = {"Title": printable(title)}
+    maker = f"vftcli {VERSION}"
     own: dict[str, dict[str, str | None]] = {
-        "pdf": {"Creator": f"vftcli {VERSION}", "CreationDate": None},
-        "svg": {"Creator": f"vftcli {VERSION}", "Date": None},
-        "png": {"Software": f"vftcli {VERSION}"},
+        "pdf": {"Creator": maker, "CreationDate": None},
+        "svg": {"Creator": maker, "Date": None},
+        "png": {"Software": maker},
     }
-    return said | own[form]
+    return {"Title": printable(title)} | own[form]
 
 
 def sheet(
     width: float, cells: int, columns: int, height: float, handles: "Mapping[str, Artist]"
 ) -> "tuple[Figure, NDArray[Any]]":
-    """A figure with room for some plots, row by row, and one legend above all of them.
+    """A figure with room for so many plots, row by row, and one legend above all of them.
 
-    Args:
-        width: Its width. [in]
-        cells: How many plots it will have.
-        columns: Plots beside one another.
-        height: Of one row of them. [in]
-        handles: Name in the legend → what it names; none for no legend.
+    Width, and height of a row, are in inches; the legend has a handle a name, if any.
     """
     from matplotlib.figure import Figure
 
@@ -139,12 +128,8 @@ def sheet(
     if handles:
         # As many columns as rows of about one length need.
         columns_of_names = -(-len(handles) // lines)
-        figure.legend(
-            list(handles.values()),
-            list(handles),
-            loc="outside upper center",
-            ncols=columns_of_names,
-        )
+        names, drawn = list(handles), list(handles.values())
+        figure.legend(drawn, names, loc="outside upper center", ncols=columns_of_names)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 

@@ -63,15 +63,11 @@ def line_figure(
     columns: int | None = None,
     below: str | None = None,
 ) -> "Figure":
-    """Plots row by row under one legend.
+    """Plots row by row under one legend, in this width. [in]
 
-    Args:
-        width: Of the figure. [in]
-        plots: What is drawn.
-        numbers: Numbers that stand above the first row → where. [s]
-        marks: Name → place of a mark in each plot, across and up. 2 × (n,)
-        columns: Plots beside one another; None for what fits.
-        below: What the horizontal axis is called, None for what its unit says.
+    Above the first row stand numbers at their times [s]; a name has a mark in each plot, across and
+    up, 2 × (n,). `columns` plots are beside one another, None for what fits; `below` is the name of
+    the horizontal axis, None for what its unit says.
     """
     wide = width > NARROW
     if columns is None:
@@ -247,11 +243,7 @@ def dot_figure(
 ) -> "Figure":
     """Plots under one legend, their logs' names above them where there are several.
 
-    Args:
-        width: Of the figure. [in]
-        plots: What is drawn.
-        paints: Name of every row → its colour.
-        label: What the vertical axis is, with its unit.
+    `paints` has the colour of every row by its name; `label` is the vertical axis with its unit.
     """
     from matplotlib.lines import Line2D
 

@@ -1,22 +1,213 @@
-"""Conversion: any log as a flat Parquet or CSV table, or as an MCAP that ROS 2 viewers open."""
+"""Conversion: any log as a flat Parquet or CSV table or as an MCAP, and estimates as an MCAP.
+
+An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove. Topics of `estimates.mcap`:
+`/joint_states` (positions, velocities, measured drive torque as effort),
+`/vftcli/external/<observer>` and `/vftcli/external/reference` (external torque as effort), all
+sensor_msgs/JointState; `/vftcli/wrench/<observer>` and `/vftcli/wrench/reference`
+(geometry_msgs/WrenchStamped, NaN where the pose cannot tell it); `/vftcli/contacts/log`
+(foxglove_msgs/Log) where each contact begins and ends; `/vftcli/contacts` (std_msgs/String, the
+JSON of contacts.json) once, kept for who comes late. Hyphens, which ROS names may not hold, become
+underscores. All of it is CDR: a channel of JSON messages in a ros2 file ends rosbags' reader.
+"""
 
 import json
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from vftcli.analysis import Analysis
+from vftcli.outputs.answer import beginning, contact_name
+from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.files import atomic, check_file, table_file
-from vftcli.outputs.log.mcap_output import (
-    OutputTopic,
-    joint_topic,
-    source_stamps,
-    stamps_of,
-    wrench_topic,
-    write_topics,
+from vftcli.outputs.log.run_record import jsonable
+from vftcli.readers.bags.ros_messages import (
+    Value,
+    in_parts,
+    long_name,
+    schema_text,
+    serialised,
+    stamped,
 )
+from vftcli.robots.terms import drive_torque
+from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
+
+JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
+TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
+
+INFO, WARNING = 2, 3  #: Levels of a log message.
+BLOCK = 8192  #: Samples with messages in memory at once.
+LAST_STAMP = 2**31 - 1  #: ROS 2 counts seconds in 32 bits with a sign.
+#: What `ros2 bag` writes of a latched topic: who subscribes later gets its message too.
+LATCHED = """\
+- history: keep_last
+  depth: 1
+  reliability: reliable
+  durability: transient_local
+  deadline: {sec: 9223372036, nsec: 854775807}
+  lifespan: {sec: 9223372036, nsec: 854775807}
+  liveliness: automatic
+  liveliness_lease_duration: {sec: 9223372036, nsec: 854775807}
+  avoid_ros_namespace_conventions: false
+"""
+
+Nanoseconds = NDArray[np.int64]
+
+
+class OutputTopic(NamedTuple):
+    """Messages of one topic, one a sample."""
+
+    name: str  #: The topic's name.
+    kind: str  #: The type, as package/Name.
+    #: Dotted path of a field → its value; of an array each message gets a row.
+    values: Mapping[str, Value]
+
+    def messages(self, stamps: Nanoseconds, span: slice) -> NDArray[np.uint8]:
+        """The messages of some samples, one row of bytes each."""
+        part = {k: v[span] if isinstance(v, np.ndarray) else v for k, v in self.values.items()}
+        times = stamps[span]
+        return serialised(self.kind, {**stamped(times), **part}, len(times))
+
+
+class Event(NamedTuple):
+    """One message of a topic that has few."""
+
+    stamp: int  #: When. [ns]
+    topic: str  #: The topic's name.
+    kind: str  #: The type, as package/Name.
+    values: Mapping[str, Value]  #: Dotted path of a field → its value.
+
+
+def joint_topic(
+    name: str,
+    joints: Sequence[str],
+    position: Array | None = None,
+    velocity: Array | None = None,
+    effort: Array | None = None,
+) -> OutputTopic:
+    """A topic of JointState messages; a signal that is None is left out of them. (T, n)"""
+    signals = {"position": position, "velocity": velocity, "effort": effort}
+    known = {key: values for key, values in signals.items() if values is not None}
+    return OutputTopic(name, JOINT_STATE, {"name": list(joints), **known})
+
+
+def write_mcap(path: Path, analysis: Analysis) -> None:
+    """Write the recording's torques and its estimates; an existing file is replaced."""
+    names = analysis.recording.joint_names or analysis.robot.chain.names
+    stamps = stamps_of(analysis.recording)
+    write_topics(path, stamps, estimated_topics(analysis, names), events(analysis, int(stamps[0])))
+
+
+def estimated_topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
+    """The log's own signals, every estimate, the reference."""
+    recording = analysis.recording
+    torque = drive_torque(recording, analysis.robot)
+    yield joint_topic("/joint_states", names, recording.q, recording.dq, torque)
+    for estimate in analysis.estimates:
+        name = f"/vftcli/external/{ros_name(estimate.name)}"
+        yield joint_topic(name, names, effort=estimate.tau)
+    if analysis.reference is not None:
+        yield joint_topic("/vftcli/external/reference", names, effort=analysis.reference.tau)
+    for wrench in analysis.wrenches:
+        name = f"/vftcli/wrench/{ros_name(wrench.name)}"
+        # Flange, tool or sensor, or base axes there.
+        frame = "base@flange" if wrench.frame == "base" else wrench.frame
+        yield wrench_topic(name, frame, wrench.known)
+
+
+def wrench_topic(name: str, frame: str, values: Array) -> OutputTopic:
+    """A topic of WrenchStamped messages. (T, 6) [N, N·m]"""
+    force = in_parts("wrench.force", "xyz", values[:, :3])
+    moment = in_parts("wrench.torque", "xyz", values[:, 3:])
+    return OutputTopic(name, WRENCH, {"header.frame_id": frame, **force, **moment})
+
+
+def events(analysis: Analysis, start: int) -> list[Event]:
+    """The contacts, and when each begins and ends, of a log with this first stamp. [ns]"""
+    found = analysis.contacts
+    if found is None:
+        return []
+    record = json.dumps(jsonable(contacts_record(found)), ensure_ascii=False, allow_nan=False)
+    made = [Event(start, "/vftcli/contacts", TEXT, {"data": record})]
+    for contact in found.contacts:
+        level = WARNING if contact.trust == "weak" else INFO
+        end = f"{contact_name(contact)} ends"
+        for t, words in ((contact.start, beginning(contact)), (contact.stop, end)):
+            stamp = start + round(t * 1e9)
+            values: dict[str, Value] = {"level": level, "message": words, "name": "vftcli"}
+            values |= stamped(np.array([stamp]), "timestamp")
+            made.append(Event(stamp, "/vftcli/contacts/log", LOG, values))
+    return sorted(made, key=lambda event: event.stamp)
+
+
+def ros_name(name: str) -> str:
+    """A name as ROS allows it: letters, digits and underscores."""
+    return "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name)
+
+
+def source_stamps(recording: Recording) -> Nanoseconds:
+    """Time of every sample on the log's own clock, in whole nanoseconds. (T,) [ns]"""
+    source = recording.source
+    start = source.t0_ns if source.t0_ns is not None else round(source.t0 * 1e9)
+    stamps: Nanoseconds = start + np.rint(recording.t * 1e9).astype(np.int64)
+    return stamps
+
+
+def stamps_of(recording: Recording) -> Nanoseconds:
+    """The log's own stamps, from 0 where ROS cannot count them. (T,) [ns]"""
+    stamps = source_stamps(recording)
+    # A log may count from any time, even below zero; a viewer needs stamps that ROS can hold.
+    countable = stamps[0] >= 0 and stamps[-1] // 10**9 <= LAST_STAMP
+    return stamps if countable else stamps - stamps[0]
+
+
+def write_topics(
+    path: Path, stamps: Nanoseconds, found: Iterable[OutputTopic], events: Sequence[Event] = ()
+) -> None:
+    """Write a ros2-profile MCAP with zstd chunks, sample by sample, all topics side by side.
+
+    An existing file is replaced. Each sample has a stamp [ns], (T,); events are in order of time.
+    """
+    from mcap.writer import CompressionType, Writer
+
+    found = tuple(found)
+    with path.open("wb") as file:
+        writer = Writer(file, compression=CompressionType.ZSTD)
+        writer.start(profile="ros2", library="vftcli")
+        waiting = deque(events)
+        of_events = {e.topic: channel(writer, e.topic, e.kind) for e in events}
+        channels = [channel(writer, topic.name, topic.kind) for topic in found]
+        # In blocks: all messages of an hour at 1 kHz at once would not fit in memory.
+        for start in range(0, len(stamps), BLOCK):
+            span = slice(start, start + BLOCK)
+            bodies = [topic.messages(stamps, span) for topic in found]
+            for k, stamp in enumerate(stamps[span].tolist()):
+                while waiting and waiting[0].stamp <= stamp:
+                    add_event(writer, of_events, waiting.popleft())
+                for number, body in zip(channels, bodies, strict=True):
+                    writer.add_message(number, stamp, body[k].tobytes(), stamp, start + k)
+        for event in waiting:
+            add_event(writer, of_events, event)
+        writer.finish()
+
+
+def add_event(writer: Any, channels: Mapping[str, int], event: Event) -> None:  # noqa: ANN401
+    """Write one message of a topic that has few."""
+    body = serialised(event.kind, event.values, 1).tobytes()
+    writer.add_message(channels[event.topic], event.stamp, body, event.stamp)
+
+
+def channel(writer: Any, topic: str, kind: str) -> int:  # noqa: ANN401
+    """Register a topic with its type's definition; return its channel number. Text is latched."""
+    schema = writer.register_schema(long_name(kind), "ros2msg", schema_text(kind).encode())
+    how = {"offered_qos_profiles": LATCHED} if kind == TEXT else {}
+    return int(writer.register_channel(topic, "cdr", schema, metadata=how))
 
 
 def convert(recording: Recording, path: Path, *, force: bool = False) -> None:
@@ -75,19 +266,14 @@ def write_csv(recording: Recording, path: Path) -> None:
         pl.DataFrame(dict(columns_of(recording))).write_csv(file)
 
 
-def write_mcap(recording: Recording, path: Path) -> None:
-    """Write a ros2-profile MCAP: /joint_states, and one /vftcli/… topic for each further signal."""
-    write_topics(path, stamps_of(recording), topics(recording))
-
-
-def topics(recording: Recording) -> Iterator[OutputTopic]:
-    """The topics of a log.
+def recorded_topics(recording: Recording) -> Iterator[OutputTopic]:
+    """The topics of a log: /joint_states, and one /vftcli/… for each further signal.
 
     The effort of /joint_states is the torque, or of a log that has no torque the motor current or
     the torque without gravity, as UR's driver publishes them.
     """
     names = recording.joint_names or tuple(f"joint_{j + 1}" for j in range(recording.joints))
-    efforts = (getattr(recording, name) for name in ("torque", "current", "torque_without_gravity"))
+    efforts = (recording.torque, recording.current, recording.torque_without_gravity)
     effort = next((value for value in efforts if value is not None), None)
     yield joint_topic("/joint_states", names, recording.q, recording.dq, effort)
     # JointState has no field for these: each is the effort of its own topic.
@@ -104,6 +290,6 @@ def topics(recording: Recording) -> Iterator[OutputTopic]:
 #: Ending of the file's name → how it is written.
 WRITERS: dict[str, Callable[[Recording, Path], None]] = {
     ".parquet": write_parquet,
-    ".mcap": write_mcap,
+    ".mcap": lambda log, path: write_topics(path, stamps_of(log), recorded_topics(log)),
     ".csv": write_csv,
 }

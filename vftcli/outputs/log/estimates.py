@@ -1,11 +1,7 @@
 """Files of `vftcli estimate`: estimates as columns, `run.json`, extras."""
 
 import json
-from collections.abc import (
-    Iterable,
-    Iterator,
-    Sequence,
-)
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -111,10 +107,9 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:
-    """Write the table of a long log as groups of rows: all of it has no room beside the log.
+    """Write the table of a long log as groups of rows; return the analysis of the last.
 
-    Returns:
-        The analysis of the last group.
+    All of it has no room beside the log.
     """
     pq = needed("pyarrow.parquet", "the estimates of a long log")
 
@@ -155,13 +150,6 @@ def frames_of(analysis: Analysis) -> dict[str, StatedFrame]:
     }
 
 
-def write_csv(path: Path, analysis: Analysis) -> None:
-    """Write the table as CSV with nine digits after the point; unknown is empty."""
-    table = estimates_table(analysis)
-    with table_file(path) as file:
-        table.write_csv(file, float_precision=9)
-
-
 #: Flag → name of its file.
 EXTRAS = {"csv": "estimates.csv", "mcap": "estimates.mcap", "rrd": "recording.rrd"}
 
@@ -184,9 +172,11 @@ def write_extras(
     for extra in choice.extras:
         path = folder / f"{place}{EXTRAS[extra]}"
         if extra == "csv":
-            write_csv(path, analysis)
+            # Nine digits after the point; unknown is empty.
+            with table_file(path) as file:
+                estimates_table(analysis).write_csv(file, float_precision=9)
         elif extra == "mcap":
-            from vftcli.outputs.log.mcap_output import write_mcap
+            from vftcli.outputs.log.conversion import write_mcap
 
             write_mcap(path, analysis)
         else:
@@ -205,15 +195,8 @@ def write_estimate_folder(
 ) -> tuple[Analysis, str]:
     """Write `estimates.parquet`, `run.json` and the extras into a folder, all or nothing.
 
-    Args:
-        path: The folder.
-        analysis: The analysis of the log; of a long log its groups, with CSV as the only extra.
-        command: The command line.
-        choice: Which extras are written.
-        force: Whether an existing folder may be replaced.
-
-    Returns:
-        The analysis of the whole log, and the text of `run.json`.
+    Of a long log its groups are given, with CSV as the only extra. What comes back is the analysis
+    of the whole log, and the text of `run.json`.
     """
     with OutputFolder(path, force, estimate_files(choice.extras)) as folder:
         table = folder / "estimates.parquet"

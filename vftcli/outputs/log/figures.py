@@ -76,9 +76,11 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
         if refined.curves:
             found["tuning"] = tuning_drawing(refined.curves)
+    plots = [plot for chart in response_charts(analysis) for plot in plots_of(chart)]
     found["responses"] = Drawing(
         "Gain, phase and delay of the observers, joint 1",
-        partial(responses, response_charts(analysis)),
+        # One below the other in one column, side by side in two.
+        lambda width: line_figure(width, plots, columns=len(plots) if width > NARROW else 1),
     )
     return found
 
@@ -133,9 +135,9 @@ def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "F
     return on_paper(partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found)))
 
 
-def torque_drawing(analysis: Analysis, names: Sequence[str] = ()) -> Drawing:
+def torque_drawing(analysis: Analysis) -> Drawing:
     """External torque with the reference."""
-    chart = drawn_lines(analysis, torque_chart(analysis), names)
+    chart = drawn_lines(analysis, torque_chart(analysis))
     return Drawing(
         f"{analysis.recording.name}: external torque on the robot about each joint's axis",
         partial(line_figure, plots=plots_of(chart), numbers=numbers_of(analysis.contacts)),
@@ -147,33 +149,26 @@ def wrench_drawing(analysis: Analysis) -> Drawing | None:
     chart = wrench_chart(analysis)
     if chart is None:
         return None
-    chart = drawn_lines(analysis, chart)
-    return Drawing(
-        f"{analysis.recording.name}: force and moment on the robot, {chart.title}",
-        partial(wrench_figure, chart, numbers_of(analysis.contacts)),
-    )
+    chart, numbers = drawn_lines(analysis, chart), numbers_of(analysis.contacts)
 
+    def draw(width: float) -> "Figure":
+        """Forces above moments, or in one column's width beside them."""
+        order = range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)
+        return line_figure(width, plots_of(chart, only=order), numbers=numbers)
 
-def wrench_figure(chart: Chart, numbers: Mapping[int, float], width: float) -> "Figure":
-    """Forces above moments, or in one column's width beside them."""
-    order = range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)
-    return line_figure(width, plots_of(chart, only=order), numbers=numbers)
+    title = f"{analysis.recording.name}: force and moment on the robot, {chart.title}"
+    return Drawing(title, draw)
 
 
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:
     """The chart with the lines of these observers and the reference; a band only of one alone."""
     estimated = [line.name for line in analysis.estimates]
     wanted = names or ([BEST] if BEST in estimated else estimated)
-    # Of a file only that it is one: its path has no room.
-    plain = (
-        {}
-        if analysis.reference is None
-        else {
-            legend_name(
-                analysis, "reference"
-            ): f"reference ({analysis.reference.name.split(':')[0]})"
-        }
-    )
+    plain = {}
+    if analysis.reference is not None:
+        # Of a file only that it is one: its path has no room.
+        kind = analysis.reference.name.split(":")[0]
+        plain[legend_name(analysis, "reference")] = f"reference ({kind})"
     own = [line.name for line in chart.series if line.name in wanted]
     series = tuple(
         line._replace(
@@ -238,14 +233,14 @@ def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Draw
         gain = np.broadcast_to(gain, (len(frequency), spectra.joints))
         lines.append(ChartLine(f"|H| of {name}", gain, INK, BROKEN[k % len(BROKEN)]))
     over = chart._replace(key="gain", title="|H|", series=tuple(lines), lowest=LOWEST)
-    return Drawing(f"{chart.title}, and |H|", partial(spectra_figure, chart, over))
 
+    def draw(width: float) -> "Figure":
+        """The spectra with what their decibels are of."""
+        figure = line_figure(width, plots_of(chart, over))
+        figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
+        return figure
 
-def spectra_figure(chart: Chart, over: Chart, width: float) -> "Figure":
-    """The spectra with what their decibels are of."""
-    figure = line_figure(width, plots_of(chart, over))
-    figure.supylabel("Power density (dB of 1 (N·m)²/Hz)", fontsize=8.0)
-    return figure
+    return Drawing(f"{chart.title}, and |H|", draw)
 
 
 def tuning_drawing(
@@ -254,10 +249,7 @@ def tuning_drawing(
 ) -> Drawing:
     """Expected error over the natural frequency, and what was chosen.
 
-    Args:
-        curves: Observer → what was minimised.
-        chosen: Observer → its rates [rad/s] and expected errors [N·m]; None for each curve's least.
-            2 × (n,)
+    That is of an observer its rates [rad/s] and errors [N·m], None for each curve's least. 2 × (n,)
     """
     if chosen is None:
         chosen = {name: (curve.best, curve.least) for name, curve in curves.items()}
@@ -266,13 +258,6 @@ def tuning_drawing(
     plots = plots_of(chart)
     below = "Natural frequency (Hz)"
     return Drawing(chart.title, partial(line_figure, plots=plots, marks=marks, below=below))
-
-
-def responses(charts: Sequence[Chart], width: float) -> "Figure":
-    """Gain, phase and delay, one below the other in one column, side by side in two."""
-    plots = [plot for chart in charts for plot in plots_of(chart)]
-    columns = len(plots) if width > NARROW else 1
-    return line_figure(width, plots, columns=columns)
 
 
 def tuned_figures(spectra: Spectra, tuned: Sequence[Tuned]) -> dict[str, Drawing]:

@@ -63,8 +63,7 @@ def report_files(
 ) -> list[str]:
     """Names of all files that a report of logs with these labels may hold, with these extras.
 
-    `form` is what figures are written as, None without any; `several` is whether there is a
-    sub-folder a log, None for where there is more than one.
+    `several` is whether there is a sub-folder a log, None for where there is more than one.
     """
     own = [*FILES, *extra_files(extras), *figure_files(form, LOG_FIGURES)]
     if not (len(labels) > 1 if several is None else several):
@@ -82,11 +81,7 @@ def write_report(
     choice: OutputChoice = PLAIN,
     form: str | None = None,
 ) -> str:
-    """Write the report of one log, all files or none; figures in a form, or none.
-
-    Returns:
-        The text of `run.json`.
-    """
+    """Write the report of one log, all files or none; return the text of `run.json`."""
     names = report_files([analysis.recording.name], choice.extras, form)
     with OutputFolder(path, force, names) as folder:
         return fill(folder, "", analysis, command, choice, form)
@@ -104,8 +99,7 @@ def write_reports(
 ) -> str:
     """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
 
-    Returns:
-        One record as text, with the logs' own in it.
+    What comes back is one record as text, with the logs' own in it.
     """
     import polars as pl
 
@@ -217,11 +211,7 @@ def jacobian_columns(made: JacobianJudgement) -> Iterator[tuple[str, Array]]:
 def write_jacobian_folder(
     path: Path, made: JacobianJudgement, command: str, *, force: bool = False
 ) -> str:
-    """Write `estimates.parquet`, the errors if there are any, and `run.json`, all or nothing.
-
-    Returns:
-        The text of `run.json`.
-    """
+    """Write estimates, the errors if there are any, and `run.json`; return the latter's text."""
     import polars as pl
 
     table = pl.DataFrame(dict(jacobian_columns(made)))

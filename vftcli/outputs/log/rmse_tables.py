@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.errors import JointMeans, joint_means
-from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns
+from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns, keyed_grid, words
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.wrench import AXES, unit_of
@@ -153,7 +153,7 @@ def rmse_grid(table: Block) -> Grid:
         title=table.title,
         quantity="RMSE",
         unit="N·m",
-        columns=(Column("observer", words=True), *joints, Column("mean")),
+        columns=(*words("observer"), *joints, Column("mean")),
         rows=tuple(rows),
         summaries=int(table.has_floor),
         marked=True,
@@ -185,19 +185,16 @@ def details(row: dict[str, Any]) -> dict[str, str]:
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
-        joints = joint_columns(group["joint"].unique().sort().to_list())
+        columns = *words("observer"), *joint_columns(group["joint"].unique().sort().to_list())
         found: dict[str, dict[str, list[str]]] = {}
         for row in group.iter_rows(named=True):
             for title, text in details(row).items():
                 found.setdefault(title, {}).setdefault(row["observer"], []).append(text)
-        for title, rows in found.items():
-            if any(text != DASH for texts in rows.values() for text in texts):
-                yield Grid(
-                    title=f"{group['recording'][0]}: {title}",
-                    columns=(Column("observer", words=True), *joints),
-                    rows=tuple((name, *texts) for name, texts in rows.items()),
-                    swatches=True,
-                )
+        for title, each in found.items():
+            if any(set(texts) != {DASH} for texts in each.values()):
+                rows = tuple((name, *texts) for name, texts in each.items())
+                above = f"{group['recording'][0]}: {title}"
+                yield Grid(title=above, columns=columns, rows=rows, swatches=True)
 
 
 def marks_in_words(found: Sequence[Block]) -> str:
@@ -276,7 +273,7 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
             title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
             quantity="RMSE",
             columns=(
-                Column("observer", words=True),
+                *words("observer"),
                 *(Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES),
             ),
             rows=tuple(rows),
@@ -324,26 +321,16 @@ def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
         return
     rows = errors.filter(pl.col("contacts").is_not_null())
     if len(rows):
-        yield Grid(
-            title="contacts against the reference",
-            columns=tuple(Column(head, words=True) for head in CONTACTS.values()),
-            rows=tuple(tuple(row[key] for key in CONTACTS) for row in rows.iter_rows(named=True)),
-        )
+        columns = dict(zip(CONTACTS, words(*CONTACTS.values()), strict=True))
+        yield keyed_grid(columns, rows.iter_rows(named=True), "contacts against the reference")
 
 
 def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
     """Zero drift per observer and axis, with five decimals as the paper prints it."""
-    span = (Column("span [s]"),) if spans else ()
-    axes = (
-        Column(axis, unit_of(axis) if spans else "", ".5f", width=0 if spans else 9)
-        for axis in AXES
+    title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
+    axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
+    columns = *words("observer"), *[Column("span [s]")] * spans, *axes
+    rows: tuple[tuple[Entry, ...], ...] = tuple(
+        (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
     )
-    return Grid(
-        columns=(Column("observer", words=True), *span, *axes),
-        rows=tuple(
-            (d.name, *((f"{d.span[0]:g}–{d.span[1]:g}",) if spans else ()), *map(float, d.mean))
-            for d in drifts
-        ),
-        title="Zero drift; the first span's is removed" if spans else "",
-        swatches=True,
-    )
+    return Grid(title=title, columns=columns, rows=rows, swatches=True)

@@ -1,6 +1,5 @@
 """run.json: what was run on what, so that every number can be made again."""
 
-import hashlib
 import json
 import platform
 import re
@@ -18,7 +17,7 @@ from vftcli.observers.observer import Observer, Tuning
 from vftcli.observers.table import BEST
 from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.examination import health_record, rate_of
-from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.files import OutputFolder, digest
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
 from vftcli.signals.parsing import whole
@@ -39,9 +38,7 @@ NUMBERS = re.compile(r"\[\n[^\[\]{}\"]*\n\s*\]")
 END = "\n}\n"  #: How an object's text ends.
 #: Package → its module; its version is recorded if loaded, none is imported for it.
 PACKAGES = {
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "polars": "polars",
+    **{name: name for name in ("numpy", "scipy", "polars")},
     "pin": "pinocchio",
     "rerun-sdk": "rerun",
     "rosbags": "rosbags",
@@ -111,11 +108,9 @@ def seal(
     record: Mapping[str, Any],
     files: Mapping[str, str] | None = None,
 ) -> str:
-    """Write a run's record with the digest of every file beside it, the last of them to be written.
+    """Write a run's record with the digest of every file beside it, the last; return its text.
 
-    Returns:
-        The text of the record alone: digests of recordings differ from run to run, since Rerun
-        numbers what it writes by the clock.
+    That is without digests: those of recordings differ, since Rerun numbers rows by the clock.
     """
     place = name.rpartition("/")[0]
     files = folder.digests(place) if files is None else files
@@ -216,14 +211,16 @@ def robot_record(robot: Robot) -> dict[str, Any]:
 
 def file_sha256(path: Path | None) -> str | None:
     """Hex digest of a file's bytes, None where there is no file."""
-    if path is None or not path.is_file():
-        return None
-    return hashlib.sha256(path.read_bytes()).hexdigest()
+    return digest(path) if path is not None and path.is_file() else None
 
 
 def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]:
     """An observer's parameters, and what they mean at the log's sample time."""
-    record = {"name": observer.name, "parameters": parameters(observer)}
+    # What ran is the observer inside, with the gains that the log chose.
+    inner: Any = getattr(observer, "observer", observer)
+    own = [field.name for field in fields(inner) if field.init] if is_dataclass(inner) else []
+    parameters = {name: jsonable(getattr(inner, name)) for name in own}
+    record = {"name": observer.name, "parameters": parameters}
     if tuning is None:
         return record
     return record | {
@@ -233,19 +230,6 @@ def observer_record(observer: Observer, tuning: Tuning | None) -> dict[str, Any]
         "bandwidth_hz": tuning.bandwidth,
         "dc_gain": tuning.dc_gain,
         "numbers_to_tune": tuning.parameter_count,
-    }
-
-
-def parameters(observer: Observer) -> dict[str, Any]:
-    """An observer's parameters by name, as JSON can hold them."""
-    # What ran is the observer inside, with the gains that the log chose.
-    observer = getattr(observer, "observer", observer)
-    if not is_dataclass(observer):
-        return {}
-    return {
-        field.name: jsonable(getattr(observer, field.name))
-        for field in fields(observer)
-        if field.init
     }
 
 
@@ -323,13 +307,10 @@ def all_remarks(analysis: Analysis) -> list[Remark]:
     # Compared by their words: values may be arrays, which do not compare as one truth.
     of_run = set(map(str, found))
     for torque in analysis.torques:
-        found += [about(torque.name, n) for n in torque.remarks if str(n) not in of_run]
+        for remark in torque.remarks:
+            if str(remark) not in of_run:
+                where = remark.where._replace(about=remark.where.about or torque.name)
+                found.append(replace(remark, where=where))
     if analysis.virtual_sensor is not None:
         found += analysis.virtual_sensor.remarks
     return list({str(note): note for note in found}.values())
-
-
-def about(name: str, remark: Remark) -> Remark:
-    """A remark that says what it is about, where it does not yet."""
-    where = remark.where
-    return remark if where.about else replace(remark, where=where._replace(about=name))

@@ -18,6 +18,7 @@ from vftcli.outputs.grid import (
     latex,
     markdown,
     terminal,
+    words,
 )
 from vftcli.outputs.log.rmse_tables import (
     DAGGER,
@@ -162,10 +163,8 @@ def pair_row(row: dict[str, Any]) -> tuple[str | float, ...]:
 def pairs_text(rows: pl.DataFrame) -> str:
     """The paired differences of all logs, as a terminal table."""
     heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")
-    grid = Grid(
-        columns=(Column("recording", words=True), *map(Column, heads)),
-        rows=tuple(map(pair_row, rows.iter_rows(named=True))),
-    )
+    columns = *words("recording"), *map(Column, heads)
+    grid = Grid(columns=columns, rows=tuple(map(pair_row, rows.iter_rows(named=True))))
     return f"{terminal(grid)}*: p below {SURE:g}\n"
 
 
@@ -177,7 +176,7 @@ def print_text(found: "Comparison") -> str:
         rows.append((f"{name}, here", *map(float, found.ours[name])))
     grid = Grid(
         title=f"{found.recording} beside {found.published.title}, N·m",
-        columns=(Column("observer", words=True), *joint_columns(len(found.floor))),
+        columns=(*words("observer"), *joint_columns(len(found.floor))),
         rows=(*rows, ("floor, here", *map(float, found.floor))),
     )
     return "\n".join([terminal(grid), *(f"- {text}" for text in found.remarks), ""])

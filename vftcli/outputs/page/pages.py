@@ -13,7 +13,7 @@ from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, l
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.examination import rate_of
-from vftcli.outputs.grid import Column, Grid, GridCell
+from vftcli.outputs.grid import Grid, GridCell, words
 from vftcli.outputs.log.rmse_tables import (
     axis_grids,
     blocks,
@@ -27,7 +27,6 @@ from vftcli.outputs.log.rmse_tables import (
 )
 from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import details, log_charts
-from vftcli.outputs.page.hero import arm_drawing, free_spans, timelines
 from vftcli.outputs.page.shell import page, part
 from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.signals.remarks import sentence
@@ -52,16 +51,15 @@ def render(analysis: Analysis) -> str:
         ranges = [contact.anywhere[1] for contact in found.contacts if contact.anywhere is not None]
         view |= {
             "most": max(ranges, default=1.0),
-            "drawings": [(contact, arm_drawing(analysis, contact)) for contact in found.contacts],
-            "free": free_spans(analysis),
-            "timelines": timelines(analysis, found),
+            "drawings": [(each, details.arm_drawing(analysis, each)) for each in found.contacts],
+            "free": details.free_spans(analysis),
+            "timelines": details.timelines(analysis, found),
             "contact_grids": details.contact_details(found),
             "model": details.model_pairs(found),
         }
     if (sensed := analysis.virtual_sensor) is not None:
         grids = [drift_grid(sensed.drifts, spans=True)] if sensed.drifts else []
-        if analysis.errors is not None:
-            grids += contact_grids(analysis.errors)
+        grids += contact_grids(analysis.errors) if analysis.errors is not None else ()
         view |= {"wrench_axes": FRAMES[sensed.sensor.frame], "wrench_grids": grids}
         view["condition"] = log_charts.condition_charts(analysis)
     if (refined := analysis.refinement) is not None:
@@ -150,13 +148,13 @@ def render_index(
     lines = [(index_line(*each), each[1].errors) for each in analyses]
     lines.sort(key=lambda line: line[0].rank)
     robots = dict.fromkeys(a.robot.title or a.robot.name for _, a in analyses)
-    title, words = index_headline([analysis for _, analysis in analyses])
+    title, lead = index_headline([analysis for _, analysis in analyses])
     return page(
         "logs.html",
         title,
         scripts=["sort.js"],
         eyebrow=(f"{len(analyses) + len(failed)} logs", ", ".join(robots)),
-        words=words,
+        words=lead,
         examinations=[one for _, analysis in analyses for one in analysis.examinations],
         overview=overview([line for line, _ in lines]),
         failed=failed,
@@ -182,19 +180,19 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
     title = f"Something pushed the arm in {len(pushed)} of {len(analyses)} logs."
     if not pushed and not loads:
         title = "Nothing pushed the arm, as far as these logs can tell."
-    words = ""
+    lead = ""
     if hard := [(by_force(found.hardest), found) for found in pushed if found.hardest is not None]:
         most = max(hard, key=itemgetter(0))[1]
-        words = f"Hardest in {most.recording}: {hardest_words(most)}."
+        lead = f"Hardest in {most.recording}: {hardest_words(most)}."
     if loads:
-        words += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
-    return title, words.strip()
+        lead += f" {loads} more bear{'s' * (loads == 1)} a load, or a wrong payload or model."
+    return title, lead.strip()
 
 
 def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first; a click on a head sorts by it."""
     rows = tuple(map(overview_row, sorted(lines, key=lambda line: line.rank)))
-    return Grid(columns=tuple(Column(head, words=True) for head in HEADS), rows=rows)
+    return Grid(columns=words(*HEADS), rows=rows)
 
 
 def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
@@ -216,12 +214,9 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
     listed = sum(line.contacts != DASH for line in lines)
     count = failures.height
-    grid = Grid(
-        columns=tuple(Column(head, words=True) for head in ("Log", "Stage", "Error", "Why")),
-        rows=tuple(
-            (*where, GridCell(line, html=part("parts/wrapped", line)))
-            for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
-        ),
+    rows = tuple(
+        (*where, GridCell(line, html=part("parts/wrapped", line)))
+        for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
     )
     return page(
         "logs.html",
@@ -229,7 +224,7 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
         scripts=["sort.js"],
         eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
         words=f"{counted(count, 'log')} could not be analysed." if count else "",
-        failures=grid,
+        failures=Grid(columns=words("Log", "Stage", "Error", "Why"), rows=rows),
         count=count,
         overview=overview(lines),
     )
