@@ -7,7 +7,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.estimates import estimates_table, write_csv, write_estimates
+from vftcli.outputs.log.choice import OutputChoice
+from vftcli.outputs.log.estimates import (
+    estimates_table,
+    write_estimate_folder,
+    write_estimates,
+)
 
 
 def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) -> None:
@@ -35,8 +40,8 @@ def test_without_a_reference_there_is_no_column(without_reference: Analysis) -> 
 
 
 def test_csv_has_the_same_columns(analysis: Analysis, tmp_path: Path) -> None:
-    write_csv(tmp_path / "e.csv", analysis)
-    with (tmp_path / "e.csv").open() as file:
+    write_estimate_folder(tmp_path, analysis, "", OutputChoice(extras=("csv",)))
+    with (tmp_path / "estimates.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert list(rows[0]) == estimates_table(analysis).columns
     assert rows[0]["tau_ext/reference/1"] == ""
