@@ -23,7 +23,7 @@ def test_a_list_survives_its_record() -> None:
     [
         (None, "no run.json of theirs is beside it; give the log"),
         ("{}", "no run.json of theirs is beside it"),
-        ('{"contacts": null, "input": {"path": "a.csv"}}', "give the log, a.csv"),
+        ('{"contacts": null, "input": {"path": "a.csv", "sha256": ""}}', "log, a.csv"),
     ],
 )
 def test_without_a_list_the_log_is_asked_for(text: str | None, words: str, tmp_path: Path) -> None:

@@ -75,8 +75,8 @@ def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
     write_reports(tmp_path, [touched], command="", failed={"bad.csv": "no log"})
     (place,) = (p for p in tmp_path.iterdir() if p.is_dir())
     assert {p.name for p in tmp_path.iterdir() if p.is_file()} <= set(SUMMARY_FILES)
-    (record,) = json.loads((tmp_path / "contacts.json").read_text(encoding="utf-8"))
-    assert record == json.loads((place / "contacts.json").read_text(encoding="utf-8"))
+    record, own = ((at / "contacts.json").read_text("utf-8") for at in (tmp_path, place))
+    assert record == own
     with pytest.raises(OutputError, match="exists"):
         write_reports(tmp_path, [touched], command="")
 
