@@ -173,7 +173,7 @@ def matched_joints(file: Section, chain: Chain, tree: BodyTree) -> list[Section]
 
 
 def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
-    """Which joints, flange and locked parts were taken."""
+    """Which joints, flange and locked parts the arm has."""
     locked = {joint.name: lumped.position(joint) for joint in lumped.locked}
     taken: dict[str, Any] = {
         "robot": lumped.tree.name,

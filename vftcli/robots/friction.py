@@ -326,7 +326,7 @@ def dry_torques(robot: Robot) -> Array:
 def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     """Half the step of a joint's friction where its velocity turns. Like `load`
 
-    It is taken from the parameters: at some low speed smoothing, viscous part and fading would
+    It is made of the parameters: at some low speed smoothing, viscous part and fading would
     count in it. Presliding friction is held at rest, in full or in part.
     """
     known = joint.parameters

@@ -49,7 +49,7 @@ def mjcf_tree(path: Path, root: ET.Element) -> BodyTree:
         # Behind where in its source it stands.
         reason = " ".join([*words, *str(error).split()]).rpartition("message: ")[2]
         raise RobotError(f"{path}: not an MJCF that Pinocchio can read: {reason}") from None
-    # A joint's link is the body whose frame is the joint's, else it has the joint's own name.
+    # A joint's link is the body with the joint's own frame, else it has the joint's name.
     names = [str(name) for name in model.names]
     for frame in model.frames:
         k = frame.parentJoint
@@ -112,7 +112,7 @@ class MjcfJoint(NamedTuple):
         return body
 
     def joint(self, names: list[str]) -> TreeJoint:
-        """The joint in a tree whose links have these names."""
+        """The joint in a tree of links with these names."""
         model, k = self.model, self.number
         joint, form = model.joints[k], model.joints[k].shortname()
         kind = next((kind for name, kind in KINDS.items() if re.fullmatch(name, form)), "")

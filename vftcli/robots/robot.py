@@ -58,7 +58,7 @@ class JointFriction(Shown):
 
 
 class PerJoint(Shown):
-    """A record whose fields all have a number a joint."""
+    """A record of arrays with a number a joint."""
 
     def __post_init__(self) -> None:
         seal(self, *vars(self))

@@ -1,6 +1,6 @@
 """A robot as URDF and MJCF describe it: links in a tree, a joint between each and its parent."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
@@ -54,6 +54,11 @@ class TreeJoint:
         return self.placement @ Pose(exp_matrix(along), np.zeros(3))
 
 
+def first_twice(names: Iterable[str]) -> str:
+    """The first name, sorted, that is there twice, or ""."""
+    return next((a for a, b in pairwise(sorted(names)) if a == b), "")
+
+
 @dataclass(frozen=True, kw_only=True)
 class BodyTree:
     """Links and joints of a description."""
@@ -68,15 +73,13 @@ class BodyTree:
     def __post_init__(self) -> None:
         if len(self.joints) > MOST:
             raise RobotError(f"{self.path}: has {len(self.joints)} joints, more than {MOST}")
-        names = sorted(joint.name for joint in self.joints)
-        if twice := next((a for a, b in pairwise(names) if a == b), None):
+        if twice := first_twice(joint.name for joint in self.joints):
             raise RobotError(f"{self.path}: two joints are named {twice!r}; each needs its own")
         for joint in self.joints:
             for link in (joint.parent, joint.child):
                 if link not in self.bodies:
                     raise RobotError(f"{self.path}: joint {joint.name!r}: no link {link!r}")
-        children = sorted(joint.child for joint in self.joints)
-        if twice := next((a for a, b in pairwise(children) if a == b), None):
+        if twice := first_twice(joint.child for joint in self.joints):
             raise RobotError(f"{self.path}: link {twice!r} hangs on two joints; a tree's has one")
         if missed := sorted(self.bodies.keys() - set(self.links)):
             raise RobotError(

@@ -89,7 +89,7 @@ def frozen_mask(value: ArrayLike) -> Mask:
 
 
 def empty_series(samples: int, columns: int) -> Array:
-    """An uninitialised (T, n) array whose columns are contiguous."""
+    """An uninitialised (T, n) array of contiguous columns."""
     return np.empty((columns, samples)).T
 
 
