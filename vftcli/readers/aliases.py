@@ -1,4 +1,4 @@
-"""Aliases: the names under which users' tables hold the signals, found without being told."""
+"""Aliases: the names under which users' tables hold the signals."""
 
 import re
 import tomllib
@@ -115,9 +115,9 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
 
 
 def _found(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
-    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
     picks = [_pick_of(table, signal, groups) for signal in ALIASES if signal not in known]
-    found = [pick for pick in picks if pick is not None and taken.isdisjoint(pick.cells)]
+    found = [pick for pick in picks if pick is not None and used.isdisjoint(pick.cells)]
     if "wrench" not in known and (wrench := wrench_pick(table)) is not None:
         found.append(wrench)
     return found
@@ -128,7 +128,7 @@ def _missing(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> 
 
     Velocities, and an effort where it names none; what two groups could be is left out.
     """
-    known, taken = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+    known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
     joints = next(len(pick.cells) for pick in stated if pick.signal == "q")
     found = []
     for wanted in (("dq",), EFFORTS):
@@ -137,7 +137,7 @@ def _missing(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> 
             with suppress(LogError):
                 picks.append(_pick_of(table, signal, groups))
         fitting = [p for p in picks if p is not None and len(p.cells) == joints]
-        fitting = [pick for pick in fitting if taken.isdisjoint(pick.cells)]
+        fitting = [pick for pick in fitting if used.isdisjoint(pick.cells)]
         if len(fitting) == 1:
             columns = table.names[fitting[0].cells[0].column]
             remark = fact("signal-by-name", signal=fitting[0].signal, column=columns)

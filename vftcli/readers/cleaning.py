@@ -161,7 +161,7 @@ def _without_empty_joints(raw: RawLog) -> RawLog:
     if not empty.any() or empty.all():
         return raw
     keep = np.flatnonzero(~empty)
-    told = fact("joints-empty", joints=[names[k] for k in np.flatnonzero(empty)])
+    remark = fact("joints-empty", joints=[names[k] for k in np.flatnonzero(empty)])
     return replace(
         raw,
         signals=joined(
@@ -169,7 +169,7 @@ def _without_empty_joints(raw: RawLog) -> RawLog:
             for values in zip(*map(pieces, raw.signals.values()), strict=True)
         ),
         joint_names=tuple(names[k] for k in keep),
-        remarks=(*raw.remarks, told),
+        remarks=(*raw.remarks, remark),
     )
 
 

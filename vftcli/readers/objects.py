@@ -319,7 +319,7 @@ def load_arrays_only(file: LogFile) -> Data:
     remedy = "Pickles are opened only if they hold nothing but NumPy arrays; save with np.savez."
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read, never told
+            warnings.simplefilter("ignore")  # old opcodes' escapes: refused or read
             # Looked over as a whole first: loading builds objects on the way to what it refuses.
             _check_opcodes(content)
             unpickler = ArrayUnpickler(content)

@@ -36,7 +36,7 @@ class RawLog:
     degrees_possible: bool = False  #: Whether nothing says that the positions are in radians.
     #: What the reader dropped, turned or derived, and what looks suspicious.
     remarks: "tuple[Remark, ...]" = ()
-    payload_mass: float | None = None  #: Mass the controller was told of. [kg]
+    payload_mass: float | None = None  #: Mass that the controller counts with. [kg]
     payload_com: tuple[float, ...] | None = None  #: Its centre of mass in flange axes. (3,) [m]
     #: Which of several recordings in the file this is, as "episode 3"; "" for the only one.
     part: str = ""

@@ -104,21 +104,23 @@ class Census:
                 "the file is damaged."
             )
         if self.counted is not None and kept < self.counted:
-            told = warning("messages-missing", kept=kept, counted=self.counted, by=counter)
+            remark = warning("messages-missing", kept=kept, counted=self.counted, by=counter)
         elif self.counted_chunks is not None and chunks != self.counted_chunks:
-            told = warning("chunks-missing", kept=kept, chunks=chunks, counted=self.counted_chunks)
+            remark = warning(
+                "chunks-missing", kept=kept, chunks=chunks, counted=self.counted_chunks
+            )
         elif self.counted is None and missing > 0:
             size = self.data_end + missing
-            told = warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size)
+            remark = warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size)
         elif left and self.closed:
-            told = fact("index-cut", kept=kept, chunks=chunks)
+            remark = fact("index-cut", kept=kept, chunks=chunks)
         elif left:
-            told = warning("chunks-cut", kept=kept, rest_bytes=left)
+            remark = warning("chunks-cut", kept=kept, rest_bytes=left)
         elif not self.closed:
-            told = caution("recorder-stopped", kept=kept)
+            remark = caution("recorder-stopped", kept=kept)
         else:
             return
-        ingest.note(told)
+        ingest.note(remark)
 
 
 USUAL_RATIO = 15  #: Recorded numbers shrink by 3 to 15.
@@ -185,7 +187,7 @@ CONTAINERS = {
 
 
 def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
-    """The messages of files, one behind the other; what a library raises is told in one line."""
+    """The messages of files, one behind the other; what a library raises is said in one line."""
     for file in files:
         begins = next((magic for magic in CONTAINERS if file.head.startswith(magic)), None)
         if begins is None:

@@ -76,7 +76,7 @@ class Gathering:
         chosen: Signal → message field, "" for its own, and factor, as --columns says: -tau=effort,
             current[mA]=effort, -tau.
         signals: Field of Recording → values at the leading topic's times. (T, k)
-        taken: Topics beside the leading one of which a signal was taken.
+        used: Topics beside the leading one of which a signal was taken.
         remarks: What was chosen, and what looks suspicious.
     """
 
@@ -91,7 +91,7 @@ class Gathering:
             if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
         }
         self.signals: dict[str, Array] = {}
-        self.taken: set[str] = set()
+        self.used: set[str] = set()
         self.remarks: list[Remark] = []
         self._take_lead()
         self._settle_effort()
@@ -221,7 +221,7 @@ class Gathering:
             return None
         start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
         x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
-        self.taken.add(topic)
+        self.used.add(topic)
         rate, leads = 1e9 / usual, lead.channel.topic
         self.remarks.append(
             fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
@@ -240,7 +240,7 @@ class Gathering:
                 )
         topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
         topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
-        left = sorted(topics - {lead.channel.topic} - self.taken)
+        left = sorted(topics - {lead.channel.topic} - self.used)
         left.sort(key=lambda topic: FORCES.search(topic) is None)
         if left:
             self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
