@@ -39,7 +39,8 @@ def test_kept_options_give_the_numbers_of_typed_ones(run, here: Path) -> None:
     _, expected, _ = run("compare", LOG, *typed, "--reference", "zero", "--json")
     keep(here, KEPT)
     code, out, err = run("compare", LOG, "--json", "--quiet")
-    assert (code, out) == (0, expected)
+    assert code == 0
+    assert json.loads(out)["rows"] == json.loads(expected)["rows"]
     # Said even where little else is: a file nobody thinks of changes the results.
     assert err.splitlines()[0].startswith("note: vftcli.toml gives ")
     for option in ("--robot ur5", "--observer fdo --observer gmo", "--reference zero"):

@@ -7,6 +7,7 @@ import shutil
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,7 +21,6 @@ from vftcli.cli.config import (
     config_option,
     forget,
     is_configured,
-    known_options,
     settle,
 )
 from vftcli.cli.progress import echo
@@ -288,7 +288,9 @@ def formats(name: str | None) -> Iterator[str]:
 
 def settings() -> Iterator[str]:
     """Every setting of all commands: name, unit, meaning and default."""
-    _, every = known_options()
+    app = import_module("vftcli.cli").make_app()
+    commands: dict[str, Any] = vars(typer.main.get_command(app))["commands"]
+    every = {kind: None for c in commands.values() for kind in vars(c.callback)["choices"]}
     rows = sorted(row for kind in every for row in settings_of(kind))
     yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
     yield from two_columns(rows, columns())

@@ -229,9 +229,8 @@ def settings_of(words: Iterable[str], choices: Sequence[type[Choice]]) -> dict[s
     Raises:
         ParameterError: If a word is malformed or there is no such setting.
     """
-    return settings_as_typed(
-        dict(assignment(word, "--set", "NAME=VALUE") for word in words), choices
-    )
+    given = dict(assignment(word, "--set", "NAME=VALUE") for word in words)
+    return settings_as_typed(given, choices, "--set ")
 
 
 def set_words(choices: Iterable[type[Choice]]) -> Iterator[str]:

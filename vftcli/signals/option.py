@@ -207,9 +207,9 @@ def settings_by_name(choices: Iterable[type[Choice]]) -> dict[str, tuple[Option,
 
 
 def settings_as_typed(
-    given: Mapping[str, object], choices: Iterable[type[Choice]]
+    given: Mapping[str, object], choices: Iterable[type[Choice]], by: str = ""
 ) -> dict[str, str]:
-    """Name → text of settings, each one of the choices'.
+    """Name → text of settings, each one of the choices'; `by` is what they are typed behind.
 
     Raises:
         ParameterError: If there is no such setting, or a value is none.
@@ -219,6 +219,7 @@ def settings_as_typed(
         if not any(kind.takes(name) for kind in there):
             near = did_you_mean(name, settings_by_name(there))
             raise ParameterError(
-                f"{name}: this command has no such setting; vftcli help settings lists all.{near}"
+                f"{by}{name}: this command has no such setting; vftcli help settings lists all."
+                f"{near}"
             )
     return {name: text_of(value, name) for name, value in given.items()}
