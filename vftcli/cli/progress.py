@@ -122,9 +122,10 @@ def clock(seconds: float) -> str:
     return f"{hours}:{minute:02}:{second:02}" if hours else f"{minute}:{second:02}"
 
 
-def is_terminal(stream: TextIO) -> bool:
+def is_terminal(stream: TextIO | None) -> bool:
     """Whether somebody looks at a stream, on a terminal that can take a line away again."""
-    return stream.isatty() and os.environ.get("TERM") != "dumb"
+    seen = stream is not None and stream.isatty()  # None where the caller closed it
+    return seen and os.environ.get("TERM") != "dumb"
 
 
 def is_watched() -> bool:
