@@ -23,7 +23,7 @@ from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import from_base
-from vftcli.virtual_sensor.sensor import check_vendor, find_mounting
+from vftcli.virtual_sensor.sensor import find_mounting, vendor_remarks
 from vftcli.virtual_sensor.sensor_reading import (
     SensorReading,
     contact_elsewhere,
@@ -154,8 +154,6 @@ def sense(
         drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
         wrenches = tuple(without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True))
     free = zero.unloaded(t)
-    vendor = check_vendor(recording, raw, chain)
-    elsewhere = tuple(e for w in wrenches if (e := contact_elsewhere(w, free)) is not None)
     hides = any(w.hidden.any() for w in wrenches)
     return SensorReading(
         sensor=sensor,
@@ -163,9 +161,7 @@ def sense(
         masked=raw.hidden,
         drifts=tuple(chained.from_iterable(drifts)),
         free=free,
-        vendor=vendor,
         smoothed=smoothed,
-        elsewhere=elsewhere,
         remarks=(
             *warnings,
             *fitted,
@@ -173,8 +169,8 @@ def sense(
             *(mask_remark(raw.hidden, raw.sigma_min) if hides else ()),
             *moved,
             *bands,
-            *(() if vendor is None else vendor.remarks),
-            *(remark for e in elsewhere for remark in e.remarks),
+            *vendor_remarks(recording, raw, chain),
+            *(remark for w in wrenches for remark in contact_elsewhere(w, free)),
         ),
     )
 

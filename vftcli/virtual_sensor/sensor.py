@@ -9,13 +9,12 @@ from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.lag import Offset, time_offset
+from vftcli.signals.lag import time_offset
 from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import bridge_unknown, resample_columns
-from vftcli.signals.wrench import Wrench, WrenchFrame
+from vftcli.signals.wrench import ExternalTorque, Wrench
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import Mounting
 from vftcli.virtual_sensor.log_wrench import UNSTATED
@@ -159,61 +158,23 @@ def permutation(Q: Array) -> Array:
     return P
 
 
-@dataclass(frozen=True, kw_only=True)
-class VendorCheck:
-    """What a vendor's wrench field turns out to be."""
-
-    stated_frame: WrenchFrame | None  #: What the log states of it, or None.
-    frame: str  #: "base" or "flange": the axes that fit best.
-    axes: AxesFit | None  #: Order, sign and gain of its axes in that frame.
-    offset: Offset  #: Its lag behind ours, negative where it is earlier.
-    zeros: float  #: Share of the samples in which it is exactly zero on all axes.
-    at_zeros: float  #: What our force reads there, rms of its norm. [N]
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """The findings."""
-        found = []
-        if self.zeros == 1.0:
-            found.append(caution("log-wrench-all-zero", force_N=self.at_zeros))
-        elif self.zeros > 0:
-            found.append(caution("log-wrench-zero", share=self.zeros, force_N=self.at_zeros))
-        if self.axes is None or not self.axes.correlation > RESEMBLES:
-            return (*found, *([caution("log-wrench-unlike")] if self.zeros < 1.0 else []))
-        # The trace of a signed permutation is 3 for our own axes and −3 for the opposite ones.
-        turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
-        found.append(
-            fact(
-                turn.get(round(float(np.trace(self.axes.matrix))), "log-wrench-fits-other-axes"),
-                stated=str(self.stated_frame or "frame not stated"),
-                frame=self.frame,
-                axes=self.axes.words,
-                gain=self.axes.gain,
-                lag_ms=self.offset.lag * 1e3,
-                correlation=self.axes.correlation,
-            )
-        )
-        if self.axes.derived:
-            found.append(caution("log-wrench-derived", correlation=DERIVED))
-        return tuple(found)
-
-
-def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorCheck | None:
-    """Compare the log's wrench with ours in base and in flange axes; None if the log has none."""
+def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Remark]:
+    """Convention of the log's own wrench, fitted against ours in base and in flange axes."""
     theirs = recording.wrench
     if theirs is None:
-        return None
-    stated = recording.wrench_frame
+        return []
     empty = ~np.any(theirs, axis=1)
-    zeros = float(np.mean(empty))
+    share, remarks = float(np.mean(empty)), []
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
-    at_zeros = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
-    shares = {"zeros": zeros, "at_zeros": at_zeros}
+    force = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
+    if share == 1.0:
+        return [caution("log-wrench-all-zero", force_N=force)]
+    if share > 0:
+        remarks.append(caution("log-wrench-zero", share=share, force_N=force))
     # Zeros may stand for "not known", and would pull every fit towards nothing.
     usable = ~empty & ~ours.hidden
     if np.count_nonzero(usable) < 10:
-        nothing = Offset(float("nan"), float("nan"))
-        return VendorCheck(stated_frame=stated, frame="base", axes=None, offset=nothing, **shares)
+        return [*remarks, caution("log-wrench-unlike")]
     flange = link_poses(chain, recording.q).rotation[:, -1]
     forces = {"base": ours.force, "flange": np.einsum("tji,tj->ti", flange, ours.force)}
     given = np.where(usable[:, None], theirs[:, :3], np.nan)
@@ -225,4 +186,21 @@ def check_vendor(recording: Recording, ours: Wrench, chain: Chain) -> VendorChec
         recording.t - offset.lag, recording.t, bridge_unknown(recording.t, turned)
     )
     axes = fit_axes(np.where(usable[:, None], moved, np.nan) @ fits[frame].matrix, given)
-    return VendorCheck(stated_frame=stated, frame=frame, axes=axes, offset=offset, **shares)
+    if not axes.correlation > RESEMBLES:
+        return [*remarks, caution("log-wrench-unlike")]
+    # The trace of a signed permutation is 3 for our own axes and −3 for the opposite ones.
+    turn = {3: "log-wrench-fits", -3: "log-wrench-fits-turned"}
+    remarks.append(
+        fact(
+            turn.get(round(float(np.trace(axes.matrix))), "log-wrench-fits-other-axes"),
+            stated=str(recording.wrench_frame or "frame not stated"),
+            frame=frame,
+            axes=axes.words,
+            gain=axes.gain,
+            lag_ms=offset.lag * 1e3,
+            correlation=axes.correlation,
+        )
+    )
+    if axes.derived:
+        remarks.append(caution("log-wrench-derived", correlation=DERIVED))
+    return remarks

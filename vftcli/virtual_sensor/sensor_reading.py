@@ -16,7 +16,6 @@ from vftcli.signals.series import covered, runs_of
 from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER, ZeroChoice
-from vftcli.virtual_sensor.sensor import VendorCheck
 from vftcli.virtual_sensor.smoother import SmoothedWrench
 from vftcli.virtual_sensor.solvers import SCALE
 from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
@@ -62,36 +61,27 @@ class Drift:
         )
 
 
-class NullSpaceVerdict(NamedTuple):
-    """Where the torque of an arm of more than six joints is no tip wrench's."""
-
-    name: str  #: The observer.
-    threshold: float  #: `MARGIN` times the largest norm in the free part. [N·m]
-    share: float  #: Share of the samples above it: contact elsewhere on the arm, or a wrong model.
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What it says, nothing where next to no sample lies above the threshold."""
-        if not self.share > LEAST_SHARE:
-            return ()
-        values = {"share": self.share, "threshold_Nm": self.threshold}
-        return (caution("contact-elsewhere", Where(self.name), **values),)
-
-
-def contact_elsewhere(wrench: Wrench, free: Mask) -> NullSpaceVerdict | None:
-    """Judge a wrench's null-space channel by its free part, None for an arm of six joints.
-
-    None too where the channel is not known in any sample of the free part.
-    """
+def null_space_limit(wrench: Wrench, free: Mask) -> float | None:
+    """`MARGIN` times the largest null-space torque in the free part (T,), None without. [N·m]"""
     if wrench.null_space is None:
         return None
     known = wrench.null_space[free & np.isfinite(wrench.null_space)]
-    if not len(known):
-        return None
     # The largest, not a quantile: the free part holds no contact, so all of it is error.
-    threshold = MARGIN * float(known.max())
-    share = float(np.mean(np.nan_to_num(wrench.null_space) > threshold))
-    return NullSpaceVerdict(wrench.name, threshold, share)
+    return MARGIN * float(known.max()) if len(known) else None
+
+
+def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
+    """A remark where the torque of an arm of more than six joints is no tip wrench's.
+
+    Contact elsewhere on the arm exceeds the limit of the null-space channel, or a wrong model.
+    """
+    limit = null_space_limit(wrench, free)
+    if limit is None or wrench.null_space is None:
+        return ()
+    share = float(np.mean(np.nan_to_num(wrench.null_space) > limit))
+    if not share > LEAST_SHARE:
+        return ()
+    return (caution("contact-elsewhere", Where(wrench.name), share=share, threshold_Nm=limit),)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -104,12 +94,8 @@ class SensorReading(Shown):
     drifts: tuple[Drift, ...] = ()  #: Zero drift, one an unloaded span and observer.
     #: Samples known to be unloaded: those of the zero spans, or of the unloaded start. (T,)
     free: Mask
-    #: What convention the log's own wrench is in, None if it has none.
-    vendor: VendorCheck | None = None
     #: What the smoother found, by the observer whose wrench it is.
     smoothed: Mapping[str, SmoothedWrench] = field(default_factory=dict)
-    #: The null-space channel's verdicts, for arms of more than six joints.
-    elsewhere: tuple[NullSpaceVerdict, ...] = ()
     #: The wrench the others are judged by, in the same frame, or None.
     reference: Wrench | None = None
     remarks: tuple[Remark, ...] = ()  #: What the reader of the numbers should know.
@@ -118,6 +104,12 @@ class SensorReading(Shown):
     def masked_share(self) -> float:
         """Share of the samples in which the pose cannot tell the wrench."""
         return float(np.mean(self.masked))
+
+    @property
+    def null_space_limit(self) -> float | None:
+        """Limit of the null-space channel, None for arms of six joints or without free part. [N·m]"""
+        limits = (null_space_limit(wrench, self.free) for wrench in self.wrenches)
+        return next((limit for limit in limits if limit is not None), None)
 
     @property
     def hides(self) -> bool:

@@ -216,10 +216,10 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
             for w in sensed.wrenches
             if w.null_space is not None
         ]
-        limit = np.array([e.threshold for e in sensed.elsewhere[:1]])
+        limit = sensed.null_space_limit
         title = "Torque that no wrench at the flange explains"
         yield chart("null_space", title, "N·m", lines)._replace(
-            band=limit if limit.size else None, band_label="free part"
+            band=None if limit is None else np.array([limit]), band_label="free part"
         )
 
 
