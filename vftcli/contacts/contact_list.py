@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 #: Evidence and band of a row that is good; a wider band makes it weak.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
-#: Where only forces larger than this are told along an axis, the pose is blind to it. [N]
+#: Where only forces larger than this are detected along an axis, the pose is blind to it. [N]
 BLIND = 500.0
 #: Columns that a table of contacts has even where it has no row.
 FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
 
 
 class ForceCourse(NamedTuple):
-    """How hard a contact pushes from its start to its end, at the place whose force it states."""
+    """How hard a contact pushes from its start to its end, at the place that its force is for."""
 
     t: Array  #: Time. (K,) [s]
     force: Array  #: |F|. (K,) [N]
@@ -86,8 +86,8 @@ class Contact(Shown):
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "field", "value"
         for key, value in self.record().items():
-            told = value if isinstance(value, (str, float, int)) else value_text(value)
-            yield key, UNKNOWN if told == "" else told
+            shown = value if isinstance(value, (str, float, int)) else value_text(value)
+            yield key, UNKNOWN if shown == "" else shown
 
     @property
     def _size(self) -> str:
@@ -267,10 +267,12 @@ class ContactList(Shown):
 
     def _headline(self) -> str:
         count, hardest = len(self), self.hardest
-        told = f"{count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
+        counted = f"{count} contact{'s' * (count != 1)} in {self.duration:.4g} s"
         if hardest is None:
-            return f"of {self.recording}: {told}"
-        return f"of {self.recording}: {told}, the hardest {hardest._size} at {hardest.peak:.2f} s"
+            return f"of {self.recording}: {counted}"
+        return (
+            f"of {self.recording}: {counted}, the hardest {hardest._size} at {hardest.peak:.2f} s"
+        )
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "#", "from – to [s]", "|F| at its peak", "force x y z [N]", "where", "trust"
@@ -299,14 +301,13 @@ class ContactList(Shown):
             load: Mass and standard deviation of its load as weighed there, if so. [kg]
             doubted: Whether the velocities that every size rests on are in doubt.
         """
-        made = self
-        if self.load is not None and load is not None:
-            made = replace(self, load=self.load._replace(mass=load[0], sd=load[1]))
-        if not doubted:
-            return made
-        why = caution("size-by-wrong-velocity")
-        rows = tuple(replace(row, remarks=(*row.remarks, why)) for row in self.contacts)
-        return replace(made, contacts=rows)
+        carried, rows = self.load, self.contacts
+        if carried is not None and load is not None:
+            carried = carried._replace(mass=load[0], sd=load[1])
+        if doubted:
+            why = caution("size-by-wrong-velocity")
+            rows = tuple(replace(row, remarks=(*row.remarks, why)) for row in rows)
+        return replace(self, load=carried, contacts=rows)
 
     @property
     def tells_untouched(self) -> bool:

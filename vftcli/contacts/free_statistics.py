@@ -32,14 +32,14 @@ from vftcli.virtual_sensor.model_error import (
 )
 from vftcli.virtual_sensor.smoother import WrenchPrior
 
-#: Length of a block [s]; on a clock whose steps differ by this share it holds so many samples.
+#: Length of a block [s]; on a clock with steps that differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
 GAIN = 30.0  #: Gain of the momentum observer that a threshold is laid on. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
 #: How long it must stay there, and the pause up to which two such stretches are one. [s]
 LASTING, NEAR = 0.05, 0.2
-LEAST_MOVING = 50  #: Fewest samples in motion that a joint's level is taken from.
+LEAST_MOVING = 50  #: Fewest samples in motion for a level of a joint.
 #: What tells a contact from an error of the model: motion that is known to be free; the samples
 #: that the fit of the whole log calls free; the drives' dry friction; or nothing.
 Basis = Literal["free motion", "whole log", "friction", "none"]

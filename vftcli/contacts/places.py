@@ -17,13 +17,13 @@ FIRST_LINK = 2
 #: Lever of the moment that a contact's force may have about the flange or a link's middle. [m]
 LEAST_LEVER = 0.1
 FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
-ALIKE = 4.0  #: Points whose score is within this of the best one's fit as well.
+ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
 #: χ² of the best point beyond which a contact is more than a force at a point.
 MORE_THAN_A_FORCE = 20.0
 
 
 class ContactPlace(NamedTuple):
-    """A place whose contact is weighed."""
+    """A place at which a contact is weighed."""
 
     link: int  #: Number of the link; 0 for the flange.
     lever: float  #: Standard deviation of the moment over that of the force. [m]

@@ -15,7 +15,7 @@ from vftcli.signals.series import median_step
 from vftcli.virtual_sensor.detection import ContactInterval, contact_intervals
 
 SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
-BLOCK = 1.0  #: Length of the blocks whose maxima are taken. [s]
+BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
 APART = 0.5  #: Passages closer than this are one event. [s]
 KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
 ENOUGH = 5  #: Maxima beyond the level that tell a tail; below four its interval has no lower end.

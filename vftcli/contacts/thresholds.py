@@ -280,14 +280,16 @@ def thresholds_of_set(
             return ()
         # Of few readings a tail is a guess, and a guess may not outdo what others know.
         sure = {name: tail for name, tail in tails.items() if tail.count >= ENOUGH} or tails
-        told = [
+        levels = [
             SignalThreshold(*tail.threshold(rate / count), rate / count, name, tail)
             for name, tail in sure.items()
         ]
         for name in each.keys() - sure.keys():
             largest = float(each[name].max())
-            told.append(SignalThreshold(largest, (largest, float("nan")), rate / count, name, None))
-        found.append(max(told, key=lambda one: one.value))
+            levels.append(
+                SignalThreshold(largest, (largest, float("nan")), rate / count, name, None)
+            )
+        found.append(max(levels, key=lambda one: one.value))
     return tuple(found)
 
 

@@ -107,7 +107,7 @@ class SensorReading(Shown):
 
     @property
     def null_space_limit(self) -> float | None:
-        """Limit of the null-space channel, None for arms of six joints or without free part. [N·m]"""
+        """Limit of the null-space torque, None of six joints or without a free part. [N·m]"""
         limits = (null_space_limit(wrench, self.free) for wrench in self.wrenches)
         return next((limit for limit in limits if limit is not None), None)
 
