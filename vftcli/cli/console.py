@@ -85,6 +85,19 @@ def show(text: str) -> None:
         echo(text, nl=not text.endswith("\n"), colour=True)
 
 
+def say_written(
+    record: str, folder: Path, names: Sequence[str], *, json: bool, several: bool = False
+) -> None:
+    """Print which of these files were written and the page to open, or `run.json` for machines."""
+    from vftcli.outputs.screen import written_lines
+
+    say_left_out([*names, *["recording.rrd"] * several])
+    if json:
+        echo_data(record)
+    else:
+        show("\n".join(["", *written_lines(folder, names, canvas(), several=several)]))
+
+
 def open_made(path: Path) -> None:
     """Open a page, a folder's page or its recording in what shows it, and say what was opened."""
     page, recording = path, path / "recording.rrd"

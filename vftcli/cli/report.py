@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from vftcli.analysis import Analysis
-    from vftcli.cli.console import LeftOut
     from vftcli.outputs.log.estimates import Group
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.table import JacobianError
@@ -50,10 +49,11 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_left_out
+    from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_written
     from vftcli.evaluation.published import check_published, compare_with
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.report import FILES, report_files
+    from vftcli.outputs.log.estimates import extra_files
+    from vftcli.outputs.log.report import FILES, SUMMARY_FILES, report_files
     from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
@@ -80,14 +80,16 @@ def report(
         return
     if not analyses:
         left_out.end(0)
+    failed = left_out.reasons
+    if not json:  # the answer first: a file that cannot be written does not cost it
+        show_answers(analyses, failed, details=analysis.talk.details)
     choice.progress("writing", WRITING, 1.0)
-    how = {"command": command_line(), "force": force, "choice": written, "form": figures}
-    record = written_record(output, analyses, left_out.reasons, **how)
-    say_left_out(FILES)
-    if json:
-        echo_data(record)
-    else:
-        show_report(analyses, output, left_out, written.extras, details=analysis.talk.details)
+    record = written_record(
+        output, analyses, failed, command=command_line(), force=force, choice=written, form=figures
+    )
+    several = len(analyses) + len(failed) > 1
+    names = SUMMARY_FILES if several else (*FILES, *extra_files(written.extras))
+    say_written(record, output, (*names, "figures/"), json=json, several=several)
     if show:
         open_made(output)
     left_out.end(len(analyses))
@@ -107,30 +109,20 @@ def written_record(
     return write_reports(output, analyses, failed=failed, **how)
 
 
-def show_report(
-    analyses: "Sequence[Analysis]",
-    output: Path,
-    left_out: "LeftOut",
-    extras: Sequence[str],
-    *,
-    details: bool,
+def show_answers(
+    analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.cli.console import canvas, show
-    from vftcli.outputs.log.estimates import extra_files
-    from vftcli.outputs.log.report import FILES, SUMMARY_FILES
     from vftcli.outputs.log.rmse_tables import paper_bounds
     from vftcli.outputs.log.tables import print_text, to_terminal
-    from vftcli.outputs.screen import log_screen, logs_screen, written_lines
+    from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
 
-    failed = left_out.reasons
-    several = len(analyses) + len(failed) > 1
-    screen, names = canvas(), SUMMARY_FILES if several else (*FILES, *extra_files(extras))
-    below = written_lines(output, (*names, "figures/"), screen, several=several)
-    if several:
-        show(logs_screen(analyses, screen, failed, below, every=details))
+    if len(analyses) + len(failed) > 1:
+        show(logs_screen(analyses, canvas(), failed, every=details))
     else:
-        show(log_screen(analyses[0], screen, below, every=details))
+        most = MOST_LINES - FILE_LINES
+        show(log_screen(analyses[0], canvas(), most=most, every=details))
     for made in analyses if details else ():
         if made.errors is not None:
             show(to_terminal(made.errors, paper_bounds([made])))
@@ -158,7 +150,7 @@ def estimate(
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
     """
     from vftcli.batch.log_work import for_estimates
-    from vftcli.cli.console import command_line, open_made, say_left_out
+    from vftcli.cli.console import command_line, open_made, say_written
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
@@ -188,27 +180,26 @@ def estimate(
             found: Analysis | Iterator[Group] = analysed_in_blocks(recording, choice)
         else:
             found = analyse(*prepared(recording, choice), choice)
+            if not json:  # the answer first; of blocks it comes with the last of them
+                show_short(found)
         made, record = write_estimate_folder(output, found, command_line(), written, force)
     except JacobianError as error:
         write_by_jacobian(log, error, choice, output, force=force, json=json)
         return
-    say_left_out(names)
-    if json:
-        echo_data(record)
-    else:
-        show_estimates(made, output, names)
+    if not json and made is not found:
+        show_short(made)
+    say_written(record, output, names, json=json)
     if show:
         open_made(output)
 
 
-def show_estimates(made: "Analysis", output: Path, files: Sequence[str]) -> None:
-    """Print what was found in short, and what was written."""
+def show_short(made: "Analysis") -> None:
+    """Print the answer in short."""
     from vftcli.cli.console import canvas, say_analysis, show
-    from vftcli.outputs.screen import short_screen, written_lines
+    from vftcli.outputs.screen import short_screen
 
     say_analysis(made)
-    screen = canvas()
-    show(short_screen(made, written_lines(output, files, screen), screen))
+    show(short_screen(made, canvas()))
 
 
 def write_by_jacobian(

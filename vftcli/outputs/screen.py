@@ -29,6 +29,7 @@ from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
 MOST_LINES = 40  #: Lines of a screen.
+FILE_LINES = 4  #: Of them, those that name what was written: a blank one, two of names, the page.
 
 #: Lines of a ground and rows of the table, None for all; then less and less, till it fits.
 #:
@@ -44,17 +45,17 @@ MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
 
 
-def short_screen(analysis: Analysis, below: Sequence[str], canvas: Canvas) -> str:
-    """Facts, the answer and what was written."""
+def short_screen(analysis: Analysis, canvas: Canvas) -> str:
+    """Facts and the answer."""
     head = canvas.painted(facts(analysis), "bold")
-    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis), *below]
+    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis)]
     return canvas.shown("\n".join(lines)) + "\n"
 
 
 def log_screen(
-    analysis: Analysis, canvas: Canvas, below: Sequence[str] = (), *, every: bool = False
+    analysis: Analysis, canvas: Canvas, *, most: int = MOST_LINES, every: bool = False
 ) -> str:
-    """The screen of one log."""
+    """The screen of one log, of so many lines at most."""
     head = [canvas.painted(facts(analysis), "bold"), "", *answer_lines(analysis, canvas)]
     bars, found = bar_lines(analysis, canvas), grounds(analysis)
     tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
@@ -62,9 +63,9 @@ def log_screen(
     for each, rows in FORMS[:1] if every else FORMS[1:]:
         believed, listed = belief_lines(found, canvas, each), analysis.contacts
         table = [] if listed is None else list_lines(listed, rows, canvas)
-        parts = [part for part in (head, bars, table, [*believed, *tail], list(below)) if part]
+        parts = [part for part in (head, bars, table, [*believed, *tail]) if part]
         text = "\n\n".join("\n".join(block) for block in parts) + "\n"
-        if text.count("\n") <= MOST_LINES:
+        if text.count("\n") <= most:
             break
     return canvas.shown(text)
 
@@ -221,7 +222,6 @@ def logs_screen(
     analyses: Sequence[Analysis],
     canvas: Canvas,
     failed: Mapping[str, str],
-    below: Sequence[str] = (),
     *,
     every: bool = False,
 ) -> str:
@@ -249,8 +249,6 @@ def logs_screen(
             lines += ground_lines(ground, canvas, None if every else 2, name)
         if len(findings) > WORST and not every:
             lines.append(f"  and {len(findings) - WORST} more: --details")
-    if below:
-        lines += ["", *below]
     return canvas.shown("\n".join(lines)) + "\n"
 
 
