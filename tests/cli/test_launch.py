@@ -86,8 +86,8 @@ def test_without_streams_the_files_are_written(tmp_path: Path) -> None:
 def test_a_stopped_command_says_so_and_leaves_nothing(tmp_path: Path, number: int) -> None:
     """The signal comes while half of the files are written, and again while they are removed."""
     script = (
-        "import os, shutil, vftcli.outputs.log.estimates as e\n"
-        f"e.write_csv = lambda *_: os.kill(os.getpid(), {int(number)})\n"
+        "import os, shutil, polars\n"
+        f"polars.DataFrame.write_csv = lambda *_, **__: os.kill(os.getpid(), {int(number)})\n"
         "remove = shutil.rmtree\n"
         f"shutil.rmtree = lambda *a, **k: (os.kill(os.getpid(), {int(number)}), remove(*a, **k))\n"
     )
@@ -121,7 +121,11 @@ def test_a_full_disk_is_one_error_in_words_of_the_system(
     assert done.returncode == 1
     lines = [line for line in done.stderr.splitlines() if not line.startswith("note: ")]
     full = "estimates.parquet cannot be written: file too large; give another -o"
-    assert lines == ["log health: sound", f"error: {full}"]
+    # With --details there is more between the two, on the log: the answer comes first.
+    assert [lines[0], *[x for x in lines if "error" in x]] == [
+        "log health: sound",
+        f"error: {full}",
+    ]
     assert list(tmp_path.iterdir()) == []
 
 
@@ -157,3 +161,32 @@ def test_the_caller_s_threads_of_linear_algebra_change_no_byte(tmp_path: Path) -
         )
         made.append((folder / "estimates.parquet").read_bytes())
     assert made[0] == made[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["report", "estimate"])
+def test_the_answer_needs_neither_scipy_nor_rerun_and_no_file(command: str, tmp_path: Path) -> None:
+    """The screen is there before anything is written, and before what writes is loaded."""
+    script = (
+        "import sys, vftcli.outputs.files as files\n"
+        "def refuse(*_):\n"
+        "    heavy = {'scipy', 'rerun', 'pinocchio', 'matplotlib'} & sys.modules.keys()\n"
+        "    raise files.OutputError(f'the disk is full; loaded: {sorted(heavy)}')\n"
+        "files.OutputFolder.__enter__ = refuse\n"
+        "from vftcli.cli import launch\n"
+        "launch()\n"
+    )
+    words = [command, str(FIXTURE), "--robot", "ur5", "-o", "out"]
+    if command == "report":
+        words += ["--reference", "two-cycle"]
+    done = subprocess.run(
+        [sys.executable, "-c", script, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "12 contacts" in done.stdout
+    assert done.returncode == 1
+    assert "loaded: []" in done.stderr
+    assert not (tmp_path / "out").exists()

@@ -63,7 +63,7 @@ def test_compare_adds_one_row_an_axis(monkeypatch, capsys) -> None:
     words = ("compare", *COMMON, "--reference", "zero", "--interval", "1:4", "--wrench", "--json")
     code, out, err = run(monkeypatch, capsys, *words)
     assert code == 0, err
-    rows = {row["axis"]: row for row in json.loads(out) if row.get("axis")}
+    rows = {row["axis"]: row for row in json.loads(out)["rows"] if row.get("axis")}
     assert list(rows) == ["fx", "fy", "fz", "mx", "my", "mz"]
     for axis, row in rows.items():
         unit, other = ("rmse_N", "rmse_Nm") if axis.startswith("f") else ("rmse_Nm", "rmse_N")

@@ -88,8 +88,8 @@ def report(
         output, analyses, failed, command=command_line(), force=force, choice=written, form=figures
     )
     several = len(analyses) + len(failed) > 1
-    names = SUMMARY_FILES if several else (*FILES, *extra_files(written.extras))
-    say_written(record, output, (*names, "figures/"), json=json, several=several)
+    listed = SUMMARY_FILES if several else (*FILES, *extra_files(written.extras))
+    say_written(record, output, (*listed, "figures/"), json=json, several=several)
     if show:
         open_made(output)
     left_out.end(len(analyses))

@@ -93,11 +93,12 @@ def test_several_logs_get_a_folder_each_and_an_index(
     assert folders == ["run", "run-2"]
     for folder in folders:
         assert sorted(p.name for p in (tmp_path / "out" / folder).iterdir()) == sorted(FILES)
-    assert len(json.loads(text)) == 2
+    assert len(json.loads(text)["logs"]) == 2
     errors = pl.read_csv(tmp_path / "out/errors.csv")
     assert errors["recording"].unique(maintain_order=True).to_list() == labels
     assert len(errors) == 2 * len(pl.read_csv(tmp_path / "out" / folders[0] / "errors.csv"))
-    assert len(json.loads((tmp_path / "out/contacts.json").read_text(encoding="utf-8"))) == 2
+    contacts = json.loads((tmp_path / "out/contacts.json").read_text(encoding="utf-8"))
+    assert len(contacts["logs"]) == 2
     assert (tmp_path / "out/errors.md").read_text(encoding="utf-8").count("run.csv against") == 2
 
 
