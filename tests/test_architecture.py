@@ -24,7 +24,7 @@ ORDER = (
     "signals",
     "readers",
     "robots",
-    "repetition",
+    "free_motion",
     "observers",
     "virtual_sensor",
     "refinement",

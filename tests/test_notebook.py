@@ -10,8 +10,8 @@ import pytest
 
 import vftcli as vft
 from vftcli.contacts.contact_list import ContactList
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 
 ROOT = Path(__file__).parents[1]

@@ -21,13 +21,13 @@ import vftcli as vft
 from vftcli import pipeline
 from vftcli.cli import app
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion import alignment
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers import reading
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition import alignment
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import run as modelled
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice

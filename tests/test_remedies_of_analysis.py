@@ -38,7 +38,7 @@ from vftcli.robots.chain import flange_jacobian
 
 PACKAGE = Path(vftcli.__file__).parent
 ROOMS = ("admittance", "contacts", "evaluation", "identification", "observers", "outputs",
-         "refinement", "repetition", "reproduction", "simulation", "virtual_sensor",
+         "refinement", "free_motion", "reproduction", "simulation", "virtual_sensor",
          "notebook.py", "pipeline.py", "proposal.py", "streaming.py")  # fmt: skip
 
 AWAY, FLAG = "leave it away", "takes no value"

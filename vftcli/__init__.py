@@ -24,6 +24,7 @@ from vftcli.signals.version import VERSION
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.evaluation import evaluate, rmse
+    from vftcli.free_motion.two_cycle import two_cycle_difference
     from vftcli.notebook import (
         admit,
         compare,
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from vftcli.observers import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
     from vftcli.readers import read
     from vftcli.readers.reading import assemble
-    from vftcli.repetition.two_cycle import two_cycle_difference
     from vftcli.robots import Payload, Robot, load_robot
     from vftcli.robots.chain import flange_jacobian, link_poses
     from vftcli.robots.run import Run
@@ -59,7 +59,7 @@ else:
         "robots.chain",
         "observers",
         "evaluation",
-        "repetition.two_cycle",
+        "free_motion.two_cycle",
         "analysis",
         "notebook",
     )

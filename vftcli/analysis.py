@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from vftcli.contacts.contact_list import ContactList
     from vftcli.doctor.examination import Examination
     from vftcli.evaluation.published import Comparison
+    from vftcli.free_motion.free_motion import FreeMotion
     from vftcli.refinement.refine import Refinement
-    from vftcli.repetition.free_motion import FreeMotion
     from vftcli.robots.run import Run
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.sensing import FreeLog
@@ -150,7 +150,7 @@ class Analysis(Shown):
 
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
-        from vftcli.repetition.free_load import without_load
+        from vftcli.free_motion.free_load import without_load
         from vftcli.virtual_sensor.sensing import FreeLog, as_modelled
 
         if self.refinement is None:

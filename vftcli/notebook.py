@@ -27,13 +27,13 @@ from vftcli.answering import (
 from vftcli.batch.log_work import for_comparison, for_estimates
 from vftcli.doctor.examination import Examiner, examine
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification.choice import Task
 from vftcli.observers.choice import GoalChoice, ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_logs, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import ParameterError

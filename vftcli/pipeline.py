@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.doctor.examination import Examiner
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import BEST, NOT_SHOWN
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.robots import Robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs

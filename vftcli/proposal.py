@@ -10,9 +10,9 @@ from vftcli.doctor.causes import CORRECTIONS
 from vftcli.doctor.examination import examine, in_words
 from vftcli.doctor.fit import guess_robot
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Runs
 from vftcli.robots.terms import effort_name

@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 from planted_pushes import joint_torque, moving_window, planted, with_torque
 
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
 from vftcli.simulation import load_scenario

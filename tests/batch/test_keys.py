@@ -10,10 +10,10 @@ import pytest
 
 from vftcli.batch.keys import content_digest, digest_of, key_of, options_digest, with_files
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 
 

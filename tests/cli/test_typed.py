@@ -13,12 +13,12 @@ from vftcli.batch.choice import WorkersChoice
 from vftcli.cli.analysis import AnalysisOptions, LogOptions
 from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, command
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.choice import OutputChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import PackageError, ParameterError
 from vftcli.signals.option import Choice, Option

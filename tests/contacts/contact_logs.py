@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion, FreeRun
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array

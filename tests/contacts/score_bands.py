@@ -25,10 +25,10 @@ from contact_logs import FIXTURES, UR10E
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.regressor import load_wrench
 from vftcli.signals.arrays import Array, Mask

@@ -21,9 +21,9 @@ from contact_scores import Score, angle, score, touched, true_contacts
 
 from vftcli import pipeline
 from vftcli.contacts.contact_list import Contact
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse
-from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.arrays import Array, Mask
 from vftcli.simulation import load_scenario, simulate
 

@@ -22,10 +22,10 @@ from contact_scores import score, touched, true_contacts
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log, analyse_logs, list_touches
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
 from vftcli.virtual_sensor.choice import WrenchChoice

@@ -8,9 +8,9 @@ import pytest
 from contact_logs import FIXTURES, true_wrench
 
 from vftcli.analysis import Analysis
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.regressor import load_regressor, load_wrench

@@ -21,8 +21,8 @@ from vftcli.contacts.free_statistics import (
     torque_level,
 )
 from vftcli.contacts.windows import START
+from vftcli.free_motion.free_load import FreeLoad
 from vftcli.readers import read
-from vftcli.repetition.free_load import FreeLoad
 from vftcli.robots import load_robot
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run
@@ -81,7 +81,7 @@ def test_cycles_of_which_none_was_recorded_are_no_free_part() -> None:
 def test_cycles_that_do_not_exist_are_refused() -> None:
     from dataclasses import replace
 
-    from vftcli.repetition.choice import FreeChoice
+    from vftcli.free_motion.choice import FreeChoice
 
     short = motion(read(FIXTURES / "ur5_taps_ur_rtde.csv"), "ur5")
     with pytest.raises(ReferenceTorqueError):

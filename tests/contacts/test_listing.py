@@ -12,9 +12,9 @@ from contact_scores import score, true_contacts
 
 from vftcli.contacts.contact_list import ContactList
 from vftcli.contacts.listing import adjoining, list_contacts
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers import read
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ParameterError

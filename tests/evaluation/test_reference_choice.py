@@ -10,8 +10,8 @@ from vftcli.evaluation import references
 from vftcli.evaluation.judgement import reference_wrench
 from vftcli.evaluation.reference_choice import NAMES, ReferenceChoice
 from vftcli.evaluation.references import REFERENCES, make_reference
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.references import read_reference
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run

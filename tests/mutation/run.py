@@ -37,9 +37,9 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
         ["observers/*.py"],
         ["tests/observers", "tests/test_pipeline.py"],
     ),
-    "repetition": (
-        ["repetition/*.py"],
-        ["tests/repetition", "tests/refinement/test_reference_runs.py", "tests/test_pipeline.py"],
+    "free_motion": (
+        ["free_motion/*.py"],
+        ["tests/free_motion", "tests/refinement/test_reference_runs.py", "tests/test_pipeline.py"],
     ),
     "virtual_sensor": (
         ["virtual_sensor/**/*.py"],
@@ -72,7 +72,7 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "signals": (
         ["signals/*.py"],
-        ["tests/signals", "tests/repetition", "tests/observers", "tests/virtual_sensor"],
+        ["tests/signals", "tests/free_motion", "tests/observers", "tests/virtual_sensor"],
     ),
     "contacts": (["contacts/*.py"], ["tests/contacts", "tests/cli/test_contacts.py"]),
     "simulation": (["simulation/*.py"], ["tests/simulation", "tests/cli/test_simulate.py"]),

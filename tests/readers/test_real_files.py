@@ -174,7 +174,7 @@ def test_bulk_and_typed_decoding_agree_on_a_real_bag(logs: Path) -> None:
 
 def test_ur3_repeats_differ_by_noise_once_the_sign_is_turned(logs: Path) -> None:
     """repeat_a and repeat_b follow one free motion for 9.8 s: their difference is the noise."""
-    from vftcli.repetition.alignment import align
+    from vftcli.free_motion.alignment import align
 
     a = read(logs / "ur3" / "repeat_a.bag", columns="-tau=effort").between(0, 9.8)
     b = read(logs / "ur3" / "repeat_b.bag", columns="-tau=effort")

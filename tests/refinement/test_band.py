@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.refinement.refine import band_remarks, with_band
 from vftcli.refinement.whole_log import WholeLogBias
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 

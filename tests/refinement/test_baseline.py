@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion, FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording

@@ -8,13 +8,13 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement import baseline
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import MissingSignalError

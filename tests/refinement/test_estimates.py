@@ -8,12 +8,12 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.friction import dry_friction
 from vftcli.signals.errors import ParameterError, VftError

@@ -10,6 +10,8 @@ import pytest
 from known_errors import drawn_error, wrong_run
 
 from vftcli.doctor.examination import Examiner
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
 from vftcli.observers.auto_tuning import noise_level
 from vftcli.observers.choice import ObserverChoice
@@ -17,8 +19,6 @@ from vftcli.observers.spectra import Spectra
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.refinement import refine
 from vftcli.refinement.baseline import Baselines, baseline_of
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.external_torque import ExternalTorque

@@ -11,11 +11,11 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log, model, read
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.refine import refine
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs
 from vftcli.signals.remarks import Remark

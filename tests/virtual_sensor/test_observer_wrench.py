@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_load import FreeLoad
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_load import FreeLoad
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.run import Runs, RunSamples

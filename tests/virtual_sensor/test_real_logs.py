@@ -8,10 +8,10 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers.reader import ReadChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.sensor import fit_axes

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.outputs.log.choice import OutputChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.virtual_sensor.choice import WrenchChoice

@@ -8,7 +8,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.progress import echo, echo_data
-from vftcli.repetition.choice import FreeChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Option
 
 if TYPE_CHECKING:

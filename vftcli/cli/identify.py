@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.progress import echo, echo_data
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.refinement.choice import RefinementChoice
-from vftcli.repetition.choice import FreeChoice
 from vftcli.signals.errors import ParameterError
 
 if TYPE_CHECKING:

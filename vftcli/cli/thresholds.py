@@ -82,7 +82,7 @@ def truth_of(
 ) -> "tuple[ExternalTorque | None, Wrench | None]":
     """The torque and the wrench that are taken for true along a log, None where nothing says."""
     from vftcli.evaluation.references import make_reference
-    from vftcli.repetition.free_motion import FreeMotion
+    from vftcli.free_motion.free_motion import FreeMotion
 
     if asked is None:
         return None, None

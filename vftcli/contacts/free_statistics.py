@@ -7,11 +7,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from vftcli.contacts.windows import BlockLog, Lane, smooth_lanes, window_of
+from vftcli.free_motion.free_load import FreeLoad, free_load, without_load
+from vftcli.free_motion.free_motion import FreeMotion, FreePart
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.refinement.whole_log import WholeLogBias
-from vftcli.repetition.free_load import FreeLoad, free_load, without_load
-from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques

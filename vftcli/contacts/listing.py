@@ -32,9 +32,9 @@ from vftcli.contacts.rows import (
 )
 from vftcli.contacts.search import Candidates, search
 from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, BlockLog, BlockSpan
+from vftcli.free_motion.free_load import FreeLoad
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
-from vftcli.repetition.free_load import FreeLoad
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import disturbance_blocks
 from vftcli.robots.run import Run

@@ -12,7 +12,7 @@ import numpy as np
 from vftcli.contacts.contact_list import Contact
 from vftcli.contacts.free_statistics import free_part
 from vftcli.contacts.rows import NORMAL, force_course
-from vftcli.repetition.free_motion import FreeMotion
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.signals.recording import Recording
 from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.virtual_sensor.smoother import DRIVES, hidden_by_blocks, smooth_wrench

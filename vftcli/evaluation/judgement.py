@@ -11,10 +11,10 @@ from vftcli.evaluation.errors import evaluate, joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.evaluation.references import ReferenceLoad, make_reference
 from vftcli.evaluation.wrenches import with_contacts, with_wrenches
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers.observer import Tuning
 from vftcli.observers.table import BEST, PAPER
 from vftcli.refinement.refine import EXPECTED, MEASURED, gap_remark
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import VftError

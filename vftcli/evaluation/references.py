@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.free_motion.two_cycle import two_cycle_reference
 from vftcli.readers.references import read_reference
-from vftcli.repetition.free_motion import FreeMotion
-from vftcli.repetition.two_cycle import two_cycle_reference
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run

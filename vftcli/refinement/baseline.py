@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion.free_load import FreeLoad, free_load, without_load
+from vftcli.free_motion.free_motion import FreeMotion, FreePart
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
 from vftcli.observers.tuning import Goal, tune_all
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
-from vftcli.repetition.free_load import FreeLoad, free_load, without_load
-from vftcli.repetition.free_motion import FreeMotion, FreePart
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array, Mask, frozen_mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError

@@ -14,12 +14,12 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import correlation
 from vftcli.evaluation.published import facts
 from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.table import PAPER
 from vftcli.outputs.charts import REFERENCE, Chart, ChartLine
 from vftcli.outputs.page.log_charts import torque_chart, wrench_chart
 from vftcli.pipeline import AnalysisChoice, analyse
-from vftcli.repetition.choice import FreeChoice
 from vftcli.reproduction.control import deviation_chart
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, DENSITY, FLOOR, RunResult
 from vftcli.robots import load_robot

@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion.free_load import FreeLoad, without_load
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers.observer import Observer
-from vftcli.repetition.free_load import FreeLoad, without_load
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots.chain import link_poses
 from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.robot import Robot

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.free_load import FreeLoad
+from vftcli.free_motion.free_load import FreeLoad
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.run import Run, RunSamples

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.paired_runs import PairedRuns, Pairing, by_phase
+from vftcli.free_motion.paired_runs import PairedRuns, Pairing, by_phase
 from vftcli.robots.friction import REPEATED_STOP, TWO_STOPS
 from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array, Mask, at, empty_series

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.choice import FreeChoice
+from vftcli.free_motion.choice import FreeChoice
 from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
@@ -17,9 +17,9 @@ from vftcli.signals.shown import Shown
 
 # A plain estimate asks for no free motion: what finds it is loaded when it is asked for.
 if TYPE_CHECKING:
-    from vftcli.repetition.alignment import Alignment
-    from vftcli.repetition.cycles import Cycles, FreeCycles, Period
-    from vftcli.repetition.paired_runs import Pairing
+    from vftcli.free_motion.alignment import Alignment
+    from vftcli.free_motion.cycles import Cycles, FreeCycles, Period
+    from vftcli.free_motion.paired_runs import Pairing
 
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
@@ -47,7 +47,7 @@ class FreeRun:
 
     @cached_property
     def _alignment(self) -> "Alignment | ReferenceTorqueError":
-        from vftcli.repetition.alignment import align
+        from vftcli.free_motion.alignment import align
 
         try:
             return align(self.log.recording, self.recording)
@@ -74,7 +74,7 @@ class FreeRun:
     @cached_property
     def pairing(self) -> "Pairing":
         """Instant in the free run of each sample of the log."""
-        from vftcli.repetition.paired_runs import pair_with_run
+        from vftcli.free_motion.paired_runs import pair_with_run
 
         found = self.alignment
         pairing = pair_with_run(self.log.t, self.run, found.shift, found.rate)
@@ -104,14 +104,14 @@ class FreeMotion(Shown):
     @cached_property
     def period(self) -> "Period":
         """The period of the log's motion."""
-        from vftcli.repetition.cycles import find_period
+        from vftcli.free_motion.cycles import find_period
 
         return find_period(self.log.recording, self.choice.period)
 
     @cached_property
     def cycles(self) -> "Cycles":
         """The cycles of the log."""
-        from vftcli.repetition.cycles import segment
+        from vftcli.free_motion.cycles import segment
 
         return segment(self.log.recording, self.period)
 
@@ -135,7 +135,7 @@ class FreeMotion(Shown):
     @cached_property
     def free_cycles(self) -> "FreeCycles":
         """Free cycles of the log: the user's, else those found."""
-        from vftcli.repetition.cycles import FreeCycles, find_free_cycles
+        from vftcli.free_motion.cycles import FreeCycles, find_free_cycles
 
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)

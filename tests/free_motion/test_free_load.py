@@ -6,12 +6,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.free_load import FreeLoad, columns, free_load, weigh
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.free_load import FreeLoad, columns, free_load, weigh
-from vftcli.repetition.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.regressor import load_regressor
@@ -124,7 +124,7 @@ def test_what_lies_far_from_a_piece_is_not_heard(
     """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
     piece = RunSamples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
     near = columns(piece)
-    monkeypatch.setattr("vftcli.repetition.free_load.HEARD", 100.0)
+    monkeypatch.setattr("vftcli.free_motion.free_load.HEARD", 100.0)
     whole = columns(piece)
     assert near is not None
     assert whole is not None

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.repetition.difference import difference
-from vftcli.repetition.paired_runs import PairedRuns, Pairing, in_gap
+from vftcli.free_motion.difference import difference
+from vftcli.free_motion.paired_runs import PairedRuns, Pairing, in_gap
 from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError

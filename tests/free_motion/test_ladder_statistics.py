@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.cycles import find_period
-from vftcli.repetition.difference import RUNGS
-from vftcli.repetition.two_cycle import two_cycle_difference
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.cycles import find_period
+from vftcli.free_motion.difference import RUNGS
+from vftcli.free_motion.two_cycle import two_cycle_difference
 from vftcli.robots import load_robot
 from vftcli.signals.arrays import Array
 from vftcli.simulation import Simulation, load_scenario, simulate

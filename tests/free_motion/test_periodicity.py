@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion.cycles import find_period, moving_part, segment
 from vftcli.readers import read
-from vftcli.repetition.cycles import find_period, moving_part, segment
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.repetition.difference import (
+from vftcli.free_motion.difference import (
     ErrorModel,
     local_rms,
     noise_below,

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.repetition.choice import AUTOMATIC, FreeChoice
-from vftcli.repetition.cycles import pair_with_cycle
-from vftcli.repetition.difference import (
+from vftcli.free_motion.choice import AUTOMATIC, FreeChoice
+from vftcli.free_motion.cycles import pair_with_cycle
+from vftcli.free_motion.difference import (
     LOW_PASS,
     RUNGS,
     TRUSTED_SHARE,
@@ -17,8 +17,8 @@ from vftcli.repetition.difference import (
     most_certain,
     rms,
 )
-from vftcli.repetition.free_motion import FreeMotion, FreeRun
-from vftcli.repetition.paired_runs import Pairing, pair_with_run
+from vftcli.free_motion.free_motion import FreeMotion, FreeRun
+from vftcli.free_motion.paired_runs import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask

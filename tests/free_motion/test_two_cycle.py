@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 import pytest
 
+from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.difference import RUNGS
+from vftcli.free_motion.two_cycle import friction_change, two_cycle_difference
 from vftcli.readers import read
-from vftcli.repetition.choice import FreeChoice
-from vftcli.repetition.difference import RUNGS
-from vftcli.repetition.two_cycle import friction_change, two_cycle_difference
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.difference import (
+from vftcli.free_motion.difference import (
     WORTH,
     Difference,
     ErrorModel,
@@ -13,7 +13,7 @@ from vftcli.repetition.difference import (
     differences,
     most_certain,
 )
-from vftcli.repetition.paired_runs import PairedRuns, pair_with_run
+from vftcli.free_motion.paired_runs import PairedRuns, pair_with_run
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.cycles import Cycles, pair_with_cycle
-from vftcli.repetition.paired_runs import (
+from vftcli.free_motion.cycles import Cycles, pair_with_cycle
+from vftcli.free_motion.paired_runs import (
     Pairing,
     by_phase,
     in_gap,

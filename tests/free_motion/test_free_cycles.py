@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.cycles import Cycles, FreeCycles, find_free_cycles
+from vftcli.free_motion.cycles import Cycles, FreeCycles, find_free_cycles
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from vftcli.repetition.cycles import COMPLETE, Cycles, Period, segment
+from vftcli.free_motion.cycles import COMPLETE, Cycles, Period, segment
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
 

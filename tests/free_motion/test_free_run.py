@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.free_motion import alignment as room
+from vftcli.free_motion.free_motion import FreeRun
 from vftcli.readers import read
-from vftcli.repetition import alignment as room
-from vftcli.repetition.free_motion import FreeRun
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.repetition.choice import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
-from vftcli.repetition.difference import RUNGS
+from vftcli.free_motion.choice import ALIGNMENTS, FreeChoice, cutoff, cycle_numbers
+from vftcli.free_motion.difference import RUNGS
 from vftcli.signals.errors import ReferenceTorqueError
 
 

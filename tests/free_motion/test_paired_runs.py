@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.repetition.paired_runs import REPEATED, STUCK, PairedRuns, pair_with_run
+from vftcli.free_motion.paired_runs import REPEATED, STUCK, PairedRuns, pair_with_run
 
 T = 0.008 * np.arange(600)
 

@@ -10,7 +10,7 @@ from vftcli.signals.option import LOG, Choice, Option, setting
 from vftcli.signals.parsing import interval
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
-#: Rungs of the alignment ladder, from the lowest; `vftcli.repetition.difference.RUNGS` makes them.
+#: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS` makes them.
 ALIGNMENTS = ("commanded", "period", "phase", "model")
 
 
