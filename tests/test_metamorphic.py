@@ -116,7 +116,8 @@ def estimate(folder: Path, log: Path, *words: object) -> Numbers:
 
 def compare(_: Path, *words: object) -> Numbers:
     reference = () if "--reference" in words else ("--reference", "vendor")
-    return dict(flat(json.loads(run("compare", *words, "--robot", "ur5", *reference, "--json"))))
+    out = run("compare", *words, "--robot", "ur5", *reference, "--json")
+    return dict(flat(json.loads(out)["rows"]))
 
 
 def report(folder: Path, *words: object) -> Numbers:
@@ -143,8 +144,9 @@ def identify(folder: Path, *words: object) -> Numbers:
 
 def gains(folder: Path, log: Path, *words: object) -> Numbers:
     method = ("--method", "gains", "-o", folder / "gains.toml")
-    out = run("identify", log, "--robot", "ur5", *method, "--json", *words)
-    return dict(flat(json.loads(out)))
+    found = json.loads(run("identify", log, "--robot", "ur5", *method, "--json", *words))
+    del found["remarks"]  # of runs and observers in the order in which they were named
+    return dict(flat(found))
 
 
 def convert(folder: Path, log: Path, *words: object) -> Numbers:
