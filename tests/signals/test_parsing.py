@@ -135,6 +135,7 @@ VALUES = st.one_of(
 )
 
 
+@pytest.mark.slow  # the first text of a process: Hypothesis lists the letters of Unicode
 @given(value=VALUES)
 def test_a_plain_value_is_of_its_own_kind_alone(value: object) -> None:
     """Of these kinds only whole numbers are of two, and true is no number."""
