@@ -268,7 +268,7 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_517,
+    "lines of Python": 54_520,
     "files": 263,
     "functions": 2984,
     "functions over 60 lines": 11,

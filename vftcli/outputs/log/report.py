@@ -28,7 +28,6 @@ from vftcli.outputs.log.run_record import (
     seal,
     to_json,
 )
-from vftcli.outputs.page.pages import render, render_index
 from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
@@ -103,6 +102,8 @@ def write_reports(
     """
     import polars as pl
 
+    from vftcli.outputs.page.pages import render_index
+
     labels = [a.recording.name for a in analyses]
     places = places_of(labels)
     names = report_files(labels, choice.extras, form, several=True)
@@ -134,6 +135,8 @@ def fill(
     form: str | None = None,
 ) -> str:
     """Write one log's files; return the text of its `run.json`."""
+    from vftcli.outputs.page.pages import render  # templates, which no answer needs
+
     record = run_record(analysis, command)
     # The page shows the record that is written beside it, not one of its own.
     analysis = replace(analysis, run=record)
