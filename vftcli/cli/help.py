@@ -275,7 +275,7 @@ def formats(name: str | None) -> Iterator[str]:
 
     if name is None:
         yield from two_columns([(form.name, form.title) for form in FORMATS.values()], columns())
-        yield "\nvftcli help formats NAME: how to record one; gzip and zstd are taken off."
+        yield "\nvftcli help formats NAME: how to record one. It reads .gz and .zst too."
     elif name in FORMATS:
         form = FORMATS[name]
         yield f"{form.name}: {form.title}"
