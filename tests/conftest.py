@@ -18,7 +18,7 @@ from hypothesis import settings
 settings.register_profile("steady", deadline=None)
 settings.load_profile("steady")
 
-BEGUN = pytest.StashKey[float]()
+BEGUN, SHARED = pytest.StashKey[float](), pytest.StashKey[float]()
 
 LOADED_LATE = ("scipy.signal", "polars", "pinocchio", "rerun", "distributed", "matplotlib.figure")
 """What vftcli imports late, .3 to 1.6 s each: charged to no test, whatever the order."""
@@ -47,6 +47,8 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Make the times those of the tests alone; their file is found from any folder."""
+    config.stash[SHARED] = 0.0
+    config.pluginmanager.register(SharedTime())
     file = config.getoption("--cpu-record")
     if file:
         worker = os.environ.get("PYTEST_XDIST_WORKER")
@@ -60,15 +62,33 @@ def pytest_configure(config: pytest.Config) -> None:
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
     """Start a test's clock before its fixtures: what a module shares is charged to its first."""
-    item.stash[BEGUN] = cpu_time()
+    item.stash[BEGUN] = cpu_time() - item.config.stash[SHARED]
     return (yield)
+
+
+class SharedTime:
+    """Charges what the session shares to no test: which needs it first depends on the worker.
+
+    A plugin, because fixtures of the session ask no conftest below the root.
+    """
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_fixture_setup(
+        self, fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest
+    ) -> Generator[None, object, object]:
+        """Add up the time of the session's fixtures."""
+        begun = cpu_time()
+        result = yield
+        if fixturedef.scope == "session":
+            request.config.stash[SHARED] += cpu_time() - begun
+        return result
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Record the time of a test that passed; fail it if it is over the limit."""
     result = yield
-    spent = cpu_time() - item.stash[BEGUN]
+    spent = cpu_time() - item.config.stash[SHARED] - item.stash[BEGUN]
     if file := item.config.getoption("--cpu-record"):
         with file.open("a", encoding="utf-8") as times:
             times.write(f"{item.nodeid}\t{spent:.2f}\n")
