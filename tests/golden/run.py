@@ -100,6 +100,7 @@ mujoco/compare vendor: compare LOG --reference vendor --json
 LEFT_OUT = re.compile("command|versions|sha256|path|files?|message|evidence|consequence|remedy")
 SENTENCE, ROWS = 5, 30  # so many words are one; so many rows of a column
 DIGITS = 12  # kept of a number: a thousandth of the usual --rtol
+ROUNDING = 1e-12  # of sums of some thousand terms of order 1; another processor rounds otherwise
 SETTINGS = {"OPENBLAS_NUM_THREADS": "1", "POLARS_MAX_THREADS": "1", "PYTHONPATH": str(ROOT)} | {
     "COLUMNS": "100", "TERM": "dumb", "NO_COLOR": "1", "LC_ALL": "C.UTF-8", "TZ": "UTC"
 }  # fmt: skip
@@ -188,7 +189,10 @@ def seen(commands: str) -> Leaves:
 
 
 def moves(old: Leaves, new: Leaves, rtol: float) -> list[str]:
-    """A line for every place that is gone, new, or moved by more than `rtol` of its largest."""
+    """A line for every place that is gone, new, or moved by more than `rtol` of its largest.
+
+    What moved by less than `ROUNDING` is where it was.
+    """
     lost = [f"{p}: gone" for p in old if p not in new] + [f"{p}: new" for p in new if p not in old]
     both = {p: difference(old[p], new[p], rtol) for p in old if p in new}
     return lost + [f"{place}: {how}" for place, how in both.items() if how]
@@ -200,7 +204,8 @@ def difference(old: list[Any], new: list[Any], rtol: float) -> str:
         changed = list(difflib.unified_diff([*map(str, old)], [*map(str, new)], n=0))[2:]
         changed = [line for line in changed if line[:2] != "@@"]
         return f"{len(old)} → {len(new)} values: {' | '.join(changed[:6])}"
-    room = rtol * max((abs(x) for x in old if isinstance(x, float) and np.isfinite(x)), default=0)
+    largest = max((abs(x) for x in old if isinstance(x, float) and np.isfinite(x)), default=0)
+    room = max(rtol * largest, ROUNDING)
     bad = [
         f"{x} → {y}"
         for x, y in zip(old, new, strict=True)
