@@ -133,13 +133,13 @@ class Analysis(Shown):
             VftError: If there is no such plot, or matplotlib is missing.
         """
         # What draws and writes is several floors up; an analysis knows nothing of it.
-        draw = import_module("vftcli.outputs.log.figures").plot
+        draw = import_module("vftcli.outputs.figures").plot
         figure: Figure = draw(self, what, joints, observers or ())
         return figure
 
     def save(self, folder: str | Path, *, force: bool = False) -> None:
         """Write page, recording, tables and estimates into a folder, as `vftcli report` does."""
-        write = import_module("vftcli.outputs.log.report").write_report
+        write = import_module("vftcli.outputs.report").write_report
         command = self.run.get("command", "vftcli.Analysis.save")
         write(Path(folder), self, command=command, force=force)
 

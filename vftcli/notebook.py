@@ -217,7 +217,7 @@ def report(
 
 def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
     """The analysis of a log, its remarks those of log, estimates and run together."""
-    from vftcli.outputs.log.run_record import all_remarks
+    from vftcli.outputs.run_record import all_remarks
 
     (made,) = analyse_logs([log], choice)
     remarks = Remarks((*made.recording.source.remarks, *all_remarks(made)))

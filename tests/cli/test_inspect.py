@@ -57,7 +57,7 @@ def test_strict_fails_on_warnings(table: Path) -> None:
 
 
 def test_names_with_control_characters_are_shown_harmlessly(tmp_path: Path) -> None:
-    from vftcli.outputs.log.conversion import convert
+    from vftcli.outputs.conversion import convert
     from vftcli.signals.recording import Recording
 
     names = ("\x1b[31mred", "two\nlines", "<b>three</b>")

@@ -43,7 +43,7 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "virtual_sensor": (
         ["virtual_sensor/**/*.py"],
-        ["tests/virtual_sensor", "tests/evaluation", "tests/outputs/log"],
+        ["tests/virtual_sensor", "tests/evaluation", "tests/outputs"],
     ),
     "evaluation": (
         ["evaluation/*.py"],
@@ -59,7 +59,7 @@ ROOMS: Mapping[str, tuple[Sequence[str], Sequence[str]]] = {
     ),
     "refinement": (
         ["refinement/*.py"],
-        ["tests/refinement", "tests/test_pipeline.py", "tests/outputs/log"],
+        ["tests/refinement", "tests/test_pipeline.py", "tests/outputs"],
     ),
     "robots": (
         ["robots/*.py"],

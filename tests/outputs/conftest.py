@@ -14,7 +14,7 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.evaluation import evaluate
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.outputs.log.run_record import run_record
+from vftcli.outputs.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice

@@ -7,7 +7,7 @@ from contact_rows import contact, contact_list
 
 from vftcli.outputs.answer import answer
 from vftcli.outputs.contacts import contact_grid, contacts_csv, contacts_record, hardest_rows
-from vftcli.outputs.log.run_record import jsonable
+from vftcli.outputs.run_record import jsonable
 from vftcli.signals.remarks import caution
 
 KEYS = {"recording", "frame", "sign", "free_part", "smallest_force_N", "contacts", "candidates"}

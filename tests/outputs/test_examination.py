@@ -13,8 +13,8 @@ from vftcli.outputs.examination import (
     health_record,
     overridden_lines,
 )
-from vftcli.outputs.log.run_record import to_json
 from vftcli.outputs.page.shell import part
+from vftcli.outputs.run_record import to_json
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import Remark, fact, warning
 

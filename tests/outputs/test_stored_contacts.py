@@ -7,7 +7,7 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.outputs.contacts import contacts_record, stored_list, stored_record
-from vftcli.outputs.log.run_record import to_json
+from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import LogError
 
 

@@ -13,7 +13,7 @@ from vftcli.contacts.tail import tail_of
 from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.log.run_record import jsonable
+from vftcli.outputs.run_record import jsonable
 from vftcli.outputs.thresholds import (
     calls,
     check_grid,

@@ -10,7 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.log.run_record import run_record
+from vftcli.outputs.run_record import run_record
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement import baseline

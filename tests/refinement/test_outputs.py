@@ -9,9 +9,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.log.estimates import estimates_table
-from vftcli.outputs.log.rerun_recording import plot_groups
-from vftcli.outputs.log.run_record import run_record, to_json
+from vftcli.outputs.estimates import estimates_table
 from vftcli.outputs.page.log_charts import (
     observer_styles,
     spectra_chart,
@@ -19,6 +17,8 @@ from vftcli.outputs.page.log_charts import (
     tuning_chart,
 )
 from vftcli.outputs.page.pages import render
+from vftcli.outputs.rerun_recording import plot_groups
+from vftcli.outputs.run_record import run_record, to_json
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
 

@@ -33,7 +33,7 @@ from vftcli.batch.datasets.copying import (
 from vftcli.batch.datasets.hdf5 import Hdf5Dataset, files_below
 from vftcli.batch.datasets.lerobot import LeRobotDataset, statistics_of
 from vftcli.outputs.files import digest, put_text
-from vftcli.outputs.log.run_record import envelope, to_json
+from vftcli.outputs.run_record import envelope, to_json
 from vftcli.readers import FORMATS
 from vftcli.readers.opening import open_log
 from vftcli.signals.errors import LogError

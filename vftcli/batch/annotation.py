@@ -17,7 +17,7 @@ from vftcli.doctor.signals import efforts_of
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.lead import settling_samples
 from vftcli.observers.table import OBSERVERS
-from vftcli.outputs.log.run_record import observer_record, robot_record, to_json
+from vftcli.outputs.run_record import observer_record, robot_record, to_json
 from vftcli.pipeline import AnalysisChoice, analyse, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice

@@ -18,7 +18,7 @@ from vftcli.evaluation import WRENCH_SCHEMA
 from vftcli.observers.table import BEST
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import grounds, health
-from vftcli.outputs.log.choice import PLAIN, OutputChoice
+from vftcli.outputs.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.references import refuse_estimates
@@ -92,16 +92,16 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
     """Write what the command of that name writes of a log; of `compare` the errors are the rows."""
     job = task.job
     if job.do == "estimate":
-        from vftcli.outputs.log.estimates import write_estimate_folder
+        from vftcli.outputs.estimates import write_estimate_folder
 
         write_estimate_folder(folder, analysis, task.command, job.written, force=True)
     elif job.do == "report":
-        from vftcli.outputs.log.report import write_report
+        from vftcli.outputs.report import write_report
 
         write_report(folder, analysis, command=task.command, force=True, choice=job.written)
     elif job.do == "contacts":
         from vftcli.outputs.files import OutputFolder
-        from vftcli.outputs.log.report import CONTACTS, put_contacts
+        from vftcli.outputs.report import CONTACTS, put_contacts
 
         with OutputFolder(folder, True, CONTACTS) as files:
             put_contacts(files, "", [analysis], task.command)

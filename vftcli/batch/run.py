@@ -14,8 +14,8 @@ from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import LogSummary
-from vftcli.outputs.log.run_record import envelope, versions
 from vftcli.outputs.page.pages import batch_lines, render_batch
+from vftcli.outputs.run_record import envelope, versions
 from vftcli.readers.library import LogEntry, absolute, labelled
 
 if TYPE_CHECKING:

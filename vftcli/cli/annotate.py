@@ -69,7 +69,7 @@ def annotate_dataset(
     from vftcli.batch.annotated_copy import annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
     from vftcli.cli.console import command_line, detail, say, stages
-    from vftcli.outputs.log.run_record import to_json
+    from vftcli.outputs.run_record import to_json
 
     added = added_columns(add)
     asked = ForceChoice(

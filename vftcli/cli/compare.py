@@ -53,9 +53,9 @@ class DrawnErrors(opt.Bundle):
             raise typer.BadParameter("--figures and -o DIR need each other: tables go to stdout")
         if self.output is None:
             return None
-        from vftcli.outputs.figures.paper import figure_files
+        from vftcli.outputs.figures import ERROR_FIGURES
         from vftcli.outputs.files import OutputFolder
-        from vftcli.outputs.log.figures import ERROR_FIGURES
+        from vftcli.outputs.paper import figure_files
 
         names = figure_files(self.figures, ERROR_FIGURES)
         folder = OutputFolder(self.output, self.force, names)
@@ -66,8 +66,8 @@ class DrawnErrors(opt.Bundle):
         """Draw the errors, if that is asked for, and say where."""
         if (figures := self.folder()) is not None:
             from vftcli.cli.console import say
-            from vftcli.outputs.figures.paper import write_figures
-            from vftcli.outputs.log.figures import error_figures
+            from vftcli.outputs.figures import error_figures
+            from vftcli.outputs.paper import write_figures
 
             with figures as folder:
                 write_figures(folder, error_figures(errors), str(self.figures))
@@ -92,10 +92,10 @@ def compare(
     from vftcli.batch.log_work import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis, say_json
     from vftcli.evaluation import paired_significance
-    from vftcli.outputs.log import tables
-    from vftcli.outputs.log.report import jacobian_entry
-    from vftcli.outputs.log.rmse_tables import paper_bounds
-    from vftcli.outputs.log.run_record import all_remarks
+    from vftcli.outputs import tables
+    from vftcli.outputs.report import jacobian_entry
+    from vftcli.outputs.rmse_tables import paper_bounds
+    from vftcli.outputs.run_record import all_remarks
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
 

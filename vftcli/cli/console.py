@@ -140,7 +140,7 @@ def say_json(
     **found: Any,  # noqa: ANN401 - whatever JSON can hold
 ) -> None:
     """Print what a command found to stdout, for machines; what is no finite number is null."""
-    from vftcli.outputs.log.run_record import envelope, log_entry, to_json
+    from vftcli.outputs.run_record import envelope, log_entry, to_json
 
     entries = [log if isinstance(log, Mapping) else log_entry(log) for log in logs]
     echo_data(to_json(envelope(command_line(), entries, remarks, found)))
@@ -254,7 +254,7 @@ def say_analysis(analysis: "Analysis") -> None:
     say_remarks(reference)
     if (sensed := analysis.virtual_sensor) is not None:
         from vftcli.outputs.grid import terminal
-        from vftcli.outputs.log.rmse_tables import drift_grid
+        from vftcli.outputs.rmse_tables import drift_grid
         from vftcli.virtual_sensor.frames import FRAMES
 
         detail(f"note: wrench: force on the robot, {FRAMES[sensed.sensor.frame]}; {sensed.solver}")

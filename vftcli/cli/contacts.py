@@ -92,8 +92,8 @@ def print_lists(
     """Print the lists in the form that is asked for."""
     from vftcli.cli.console import canvas, command_line
     from vftcli.outputs.contacts import contacts_csv
-    from vftcli.outputs.log.report import contacts_envelope
-    from vftcli.outputs.log.run_record import to_json
+    from vftcli.outputs.report import contacts_envelope
+    from vftcli.outputs.run_record import to_json
     from vftcli.outputs.screen import log_screen, logs_screen
 
     lists = [made.contacts for made in found if made.contacts is not None]

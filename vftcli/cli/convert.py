@@ -29,8 +29,8 @@ def convert_log(
     """
     from vftcli.cli.console import say, say_json, say_left_out
     from vftcli.doctor import examine
+    from vftcli.outputs.conversion import check_conversion, convert
     from vftcli.outputs.examination import health_line
-    from vftcli.outputs.log.conversion import check_conversion, convert
     from vftcli.readers.library import Library
     from vftcli.signals.errors import ParameterError
 

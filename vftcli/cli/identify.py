@@ -142,10 +142,10 @@ def find_gains(
     from vftcli.answering import TUNED, gains_of
     from vftcli.cli.console import command_line, detail, say, say_json, say_recording
     from vftcli.outputs.examination import health_record, overridden_lines
+    from vftcli.outputs.figures import write_tuned
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
     from vftcli.outputs.listings import tuned_grid
-    from vftcli.outputs.log.figures import write_tuned
     from vftcli.readers.library import Library
 
     choice = logged.asked(Library([log]), observers=TUNED, **others)

@@ -41,7 +41,7 @@ def inspect_log(
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
-    from vftcli.outputs.log.run_record import log_entry
+    from vftcli.outputs.run_record import log_entry
     from vftcli.readers import read_first_recording
 
     if output is not None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from vftcli.analysis import Analysis
-    from vftcli.outputs.log.estimates import Group
+    from vftcli.outputs.estimates import Group
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.table import JacobianError
 
@@ -51,9 +51,9 @@ def report(
     """
     from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_written
     from vftcli.evaluation.published import check_published, compare_with
+    from vftcli.outputs.estimates import extra_files
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import extra_files
-    from vftcli.outputs.log.report import FILES, SUMMARY_FILES, report_files
+    from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files
     from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
@@ -102,7 +102,7 @@ def written_record(
     **how: Any,  # noqa: ANN401 - of `write_report`
 ) -> str:
     """The text of `run.json` of one log or several, their folder written."""
-    from vftcli.outputs.log.report import write_report, write_reports
+    from vftcli.outputs.report import write_report, write_reports
 
     if len(analyses) + len(failed) == 1:
         return write_report(output, analyses[0], **how)
@@ -114,9 +114,9 @@ def show_answers(
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.cli.console import canvas, show
-    from vftcli.outputs.log.rmse_tables import paper_bounds
-    from vftcli.outputs.log.tables import print_text, to_terminal
+    from vftcli.outputs.rmse_tables import paper_bounds
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
+    from vftcli.outputs.tables import print_text, to_terminal
 
     if len(analyses) + len(failed) > 1:
         show(logs_screen(analyses, canvas(), failed, every=details))
@@ -151,8 +151,8 @@ def estimate(
     """
     from vftcli.batch.log_work import for_estimates
     from vftcli.cli.console import command_line, open_made, say_written
+    from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.log.estimates import estimate_files, write_estimate_folder
     from vftcli.pipeline import analyse, prepared
     from vftcli.readers.library import Library
     from vftcli.readers.references import refuse_estimates
@@ -213,8 +213,8 @@ def write_by_jacobian(
 ) -> None:
     """Write what there is of a vendor's torques beside a Jacobian, where it is asked for."""
     from vftcli.cli.console import command_line, judge_by_jacobian, say, show
-    from vftcli.outputs.log.report import write_jacobian_folder
-    from vftcli.outputs.log.tables import to_terminal
+    from vftcli.outputs.report import write_jacobian_folder
+    from vftcli.outputs.tables import to_terminal
 
     if choice.wrench is None and choice.reference is None:
         raise found

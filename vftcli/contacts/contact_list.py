@@ -290,7 +290,7 @@ class ContactList(Shown):
 
     def plot(self) -> "Figure":
         """A matplotlib figure of |F| of every contact with its band, neither shown nor saved."""
-        draw = import_module("vftcli.outputs.log.figures").contacts_figure
+        draw = import_module("vftcli.outputs.figures").contacts_figure
         figure: Figure = draw(self)
         return figure
 

@@ -26,11 +26,13 @@ from vftcli.outputs.admittance_tables import (
 )
 from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
-from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
-from vftcli.outputs.figures.plots import NARROW, line_figure, plots_of
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
 from vftcli.outputs.grid import Grid, json_rows
-from vftcli.outputs.log.run_record import (
+from vftcli.outputs.page.shell import page
+from vftcli.outputs.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.plots import NARROW, line_figure, plots_of
+from vftcli.outputs.quantity import counted
+from vftcli.outputs.run_record import (
     envelope,
     input_record,
     log_entry,
@@ -38,8 +40,6 @@ from vftcli.outputs.log.run_record import (
     robot_record,
     seal,
 )
-from vftcli.outputs.page.shell import page
-from vftcli.outputs.quantity import counted
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import sentence

@@ -19,8 +19,8 @@ from vftcli.outputs.files import (
     unwritable,
     write_text,
 )
-from vftcli.outputs.log.run_record import to_json
 from vftcli.outputs.partial import check_writable, held
+from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
 
 if TYPE_CHECKING:

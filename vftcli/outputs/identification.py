@@ -13,11 +13,14 @@ from vftcli.doctor.examination import Examination
 from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
-from vftcli.outputs.figures.paper import Drawing, figure_files, write_figures
-from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
 from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal
-from vftcli.outputs.log.run_record import (
+from vftcli.outputs.page.log_charts import joint_panels
+from vftcli.outputs.page.shell import Box, Scales, page, polyline
+from vftcli.outputs.paper import Drawing, figure_files, write_figures
+from vftcli.outputs.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
+from vftcli.outputs.quantity import DASH, counted, signed
+from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,
     file_sha256,
@@ -27,9 +30,6 @@ from vftcli.outputs.log.run_record import (
     robot_record,
     seal,
 )
-from vftcli.outputs.page.log_charts import joint_panels
-from vftcli.outputs.page.shell import Box, Scales, page, polyline
-from vftcli.outputs.quantity import DASH, counted, signed
 from vftcli.robots.writing import robot_toml
 from vftcli.signals.errors import OutputError
 

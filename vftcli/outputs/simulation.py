@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.log.run_record import envelope, seal
+from vftcli.outputs.run_record import envelope, seal
 from vftcli.signals.errors import OutputError
 from vftcli.simulation.experiment import Simulation
 from vftcli.simulation.scenario import to_toml

@@ -6,7 +6,7 @@ import pytest
 
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import REPLAY_FIGURES, replay_figures
-from vftcli.outputs.figures.paper import WIDTHS, paper_style
+from vftcli.outputs.paper import WIDTHS, paper_style
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

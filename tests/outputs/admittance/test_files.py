@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import FILES, admittance_record, motion_table, write_admittance
-from vftcli.outputs.log.run_record import to_json
+from vftcli.outputs.run_record import to_json
 from vftcli.signals.errors import OutputError
 
 

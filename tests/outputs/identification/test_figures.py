@@ -3,8 +3,8 @@ from typing import Any
 
 import pytest
 
-from vftcli.outputs.figures.paper import WIDTHS, paper_style
 from vftcli.outputs.identification import IDENTIFICATION_FIGURES, identification_figures
+from vftcli.outputs.paper import WIDTHS, paper_style
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

@@ -10,10 +10,10 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.believability import Ground
-from vftcli.outputs.log.run_record import run_record
 from vftcli.outputs.page import pages
 from vftcli.outputs.page.pages import eyebrow, render
 from vftcli.outputs.page.shell import HERE, script_json
+from vftcli.outputs.run_record import run_record
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution, explanation
 

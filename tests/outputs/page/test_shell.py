@@ -80,7 +80,7 @@ def test_provenance_without_a_log_names_none() -> None:
 
 
 def test_a_command_without_a_page_loads_no_templates(loaded) -> None:
-    assert "jinja2" not in loaded("vftcli.outputs.log.report")
+    assert "jinja2" not in loaded("vftcli.outputs.report")
 
 
 def test_what_a_template_misses_is_an_error() -> None:

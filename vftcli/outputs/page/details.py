@@ -19,9 +19,9 @@ from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.charts import Span, thinned
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns, keyed_grid, words
-from vftcli.outputs.log.run_record import observer_record
 from vftcli.outputs.page.shell import Box, Scales, part, path_of, ribbon
 from vftcli.outputs.quantity import DASH, banded, signed, significant, vector
+from vftcli.outputs.run_record import observer_record
 from vftcli.refinement.refine import Budget
 from vftcli.robots.chain import link_poses
 from vftcli.signals.arrays import Array

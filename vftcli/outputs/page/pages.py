@@ -14,7 +14,10 @@ from vftcli.outputs.charts import Chart
 from vftcli.outputs.contacts import by_force
 from vftcli.outputs.examination import rate_of
 from vftcli.outputs.grid import Grid, GridCell, words
-from vftcli.outputs.log.rmse_tables import (
+from vftcli.outputs.page import details, log_charts
+from vftcli.outputs.page.shell import page, part
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
+from vftcli.outputs.rmse_tables import (
     axis_grids,
     blocks,
     contact_grids,
@@ -25,10 +28,7 @@ from vftcli.outputs.log.rmse_tables import (
     paper_bounds,
     rmse_grid,
 )
-from vftcli.outputs.log.run_record import run_record
-from vftcli.outputs.page import details, log_charts
-from vftcli.outputs.page.shell import page, part
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
+from vftcli.outputs.run_record import run_record
 from vftcli.signals.remarks import sentence
 from vftcli.virtual_sensor.frames import FRAMES
 

@@ -7,10 +7,10 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from vftcli.analysis import Analysis
+from vftcli.outputs import conversion
 from vftcli.outputs.contacts import contacts_record
-from vftcli.outputs.log import conversion
-from vftcli.outputs.log.conversion import ros_name, stamps_of, write_mcap
-from vftcli.outputs.log.run_record import jsonable
+from vftcli.outputs.conversion import ros_name, stamps_of, write_mcap
+from vftcli.outputs.run_record import jsonable
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.recording import Recording, Source
 

@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.outputs.figures.paper import (
+from vftcli.outputs.files import OutputFolder
+from vftcli.outputs.paper import (
     Drawing,
     figure_files,
     sheet,
     shortened,
     write_figures,
 )
-from vftcli.outputs.files import OutputFolder
 
 matplotlib = pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

@@ -20,7 +20,8 @@ from vftcli.outputs.grid import (
     terminal,
     words,
 )
-from vftcli.outputs.log.rmse_tables import (
+from vftcli.outputs.quantity import significant
+from vftcli.outputs.rmse_tables import (
     DAGGER,
     LATEX_DAGGER,
     PaperBounds,
@@ -32,7 +33,6 @@ from vftcli.outputs.log.rmse_tables import (
     nothing_to_compare,
     rmse_grid,
 )
-from vftcli.outputs.quantity import significant
 from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.evaluation import WRENCH_SCHEMA
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.log.rmse_tables import (
+from vftcli.outputs.rmse_tables import (
     axis_grids,
     contact_grids,
     drift_grid,

@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import SCHEMA
-from vftcli.outputs.log import tables
+from vftcli.outputs import tables
 
 
 def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:

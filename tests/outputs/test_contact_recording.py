@@ -10,14 +10,14 @@ from rerun_rows import rows_of, times_of
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.charts import PLACES
-from vftcli.outputs.log.rerun_recording import (
+from vftcli.outputs.rerun_arm import painted_links, touched_point
+from vftcli.outputs.rerun_recording import (
     best_wrench,
     contact_log,
     force_plot,
     newton_per_metre,
     write_rrd,
 )
-from vftcli.outputs.rerun_arm import painted_links, touched_point
 from vftcli.signals.remarks import Where, caution
 
 

@@ -7,11 +7,11 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
+from vftcli.outputs import report
+from vftcli.outputs.choice import NONE, OutputChoice
+from vftcli.outputs.estimates import write_estimate_folder
 from vftcli.outputs.files import digests
-from vftcli.outputs.log import report
-from vftcli.outputs.log.choice import NONE, OutputChoice
-from vftcli.outputs.log.estimates import write_estimate_folder
-from vftcli.outputs.log.report import (
+from vftcli.outputs.report import (
     ERROR_TABLES,
     FILES,
     SUMMARY_FILES,

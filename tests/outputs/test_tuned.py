@@ -5,8 +5,8 @@ import pytest
 
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.tuning import Tuned, parse_goal, tune_all, tuning_curves
-from vftcli.outputs.figures.paper import WIDTHS, figure_files, paper_style
-from vftcli.outputs.log.figures import TUNED_FIGURES, tuned_figures, write_tuned
+from vftcli.outputs.figures import TUNED_FIGURES, tuned_figures, write_tuned
+from vftcli.outputs.paper import WIDTHS, figure_files, paper_style
 from vftcli.signals.errors import OutputError
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.logged_jacobian import JacobianJudgement
+from vftcli.outputs import tables
+from vftcli.outputs.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.contacts import contacts_csv, contacts_record
-from vftcli.outputs.figures.paper import figure_files, write_figures
+from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
+from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text, table_file
-from vftcli.outputs.log import tables
-from vftcli.outputs.log.choice import NONE, PLAIN, OutputChoice
-from vftcli.outputs.log.estimates import extra_files, write_estimates, write_extras
-from vftcli.outputs.log.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.log.rmse_tables import paper_bounds
-from vftcli.outputs.log.run_record import (
+from vftcli.outputs.paper import figure_files, write_figures
+from vftcli.outputs.rmse_tables import paper_bounds
+from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,
     log_entry,
@@ -147,7 +147,7 @@ def fill(
         if name == "index.html":
             put_text(path, render(analysis))
         elif name == "recording.rrd":
-            from vftcli.outputs.log.rerun_recording import write_rrd
+            from vftcli.outputs.rerun_recording import write_rrd
 
             write_rrd(path, analysis, choice.detail)
         else:

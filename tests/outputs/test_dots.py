@@ -3,8 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.outputs.figures.paper import paper_style
-from vftcli.outputs.figures.plots import DotPlot, DotRow, dot_figure
+from vftcli.outputs.paper import paper_style
+from vftcli.outputs.plots import DotPlot, DotRow, dot_figure
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

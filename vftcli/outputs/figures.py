@@ -14,23 +14,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Tuned, tuning_curves
 from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
-from vftcli.outputs.figures.paper import (
-    WIDTHS,
-    Drawing,
-    figure_files,
-    paper_style,
-    write_figures,
-)
-from vftcli.outputs.figures.plots import (
-    NARROW,
-    DotPlot,
-    DotRow,
-    dot_figure,
-    line_figure,
-    plots_of,
-)
 from vftcli.outputs.files import OutputFolder, write_text
-from vftcli.outputs.log.rmse_tables import block, logs_of
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
@@ -41,6 +25,22 @@ from vftcli.outputs.page.log_charts import (
     tuning_chart,
     wrench_chart,
 )
+from vftcli.outputs.paper import (
+    WIDTHS,
+    Drawing,
+    figure_files,
+    paper_style,
+    write_figures,
+)
+from vftcli.outputs.plots import (
+    NARROW,
+    DotPlot,
+    DotRow,
+    dot_figure,
+    line_figure,
+    plots_of,
+)
+from vftcli.outputs.rmse_tables import block, logs_of
 from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import check_installed

@@ -6,7 +6,7 @@ import pytest
 
 import vftcli
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.run_record import all_remarks, jsonable, run_record, to_json
+from vftcli.outputs.run_record import all_remarks, jsonable, run_record, to_json
 from vftcli.signals import remarks
 from vftcli.signals.remarks import Where, caution, fact
 

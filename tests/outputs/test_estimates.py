@@ -7,8 +7,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.log.choice import OutputChoice
-from vftcli.outputs.log.estimates import (
+from vftcli.outputs.choice import OutputChoice
+from vftcli.outputs.estimates import (
     estimates_table,
     write_estimate_folder,
     write_estimates,
@@ -77,8 +77,8 @@ def test_a_long_table_is_written_in_groups_that_hold_the_same(
     analysis: Analysis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write_estimates(tmp_path / "whole.parquet", analysis)
-    monkeypatch.setattr("vftcli.outputs.log.estimates.LONG", 100)
-    monkeypatch.setattr("vftcli.outputs.log.estimates.GROUP_ROWS", 300)
+    monkeypatch.setattr("vftcli.outputs.estimates.LONG", 100)
+    monkeypatch.setattr("vftcli.outputs.estimates.GROUP_ROWS", 300)
     write_estimates(tmp_path / "groups.parquet", analysis)
     whole, groups = (pl.read_parquet(tmp_path / f"{n}.parquet") for n in ("whole", "groups"))
     assert whole.equals(groups, null_equal=True)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.outputs.choice import PLAIN, OutputChoice
 from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.log.choice import PLAIN, OutputChoice
-from vftcli.outputs.log.run_record import run_record, seal
+from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.packages import installed, needed
@@ -176,12 +176,12 @@ def write_extras(
             with table_file(path) as file:
                 estimates_table(analysis).write_csv(file, float_precision=9)
         elif extra == "mcap":
-            from vftcli.outputs.log.conversion import write_mcap
+            from vftcli.outputs.conversion import write_mcap
 
             write_mcap(path, analysis)
         else:
             needed("rerun", path.name)
-            from vftcli.outputs.log.rerun_recording import write_rrd
+            from vftcli.outputs.rerun_recording import write_rrd
 
             write_rrd(path, analysis, choice.detail)
 

@@ -11,14 +11,14 @@ from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.log.choice import FULL, LEVELS
-from vftcli.outputs.log.rerun_recording import (
+from vftcli.outputs.choice import FULL, LEVELS
+from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
+from vftcli.outputs.rerun_recording import (
     force_arrow,
     plot_groups,
     tabs_of,
     write_rrd,
 )
-from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.robots.chain import flange_jacobian, link_poses
 from vftcli.robots.choice import RobotChoice
@@ -27,7 +27,7 @@ from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
 from vftcli.virtual_sensor.frames import frame_pose
 from vftcli.virtual_sensor.solvers import wrench_of
 
-CIRCLE = Path(__file__).parents[3] / "fixtures" / "ur5_circle.csv"
+CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 
 
 @pytest.fixture(scope="module")
@@ -189,9 +189,9 @@ def test_a_long_log_is_held_by_levels_and_whole_where_the_strongest_contacts_beg
     touched: Analysis, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     analysis = touched
-    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.STRETCHES", 20)
-    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.AROUND", 0.2)
-    monkeypatch.setattr("vftcli.outputs.log.rerun_recording.WHOLE_TIME", 0.4)
+    monkeypatch.setattr("vftcli.outputs.rerun_recording.STRETCHES", 20)
+    monkeypatch.setattr("vftcli.outputs.rerun_recording.AROUND", 0.2)
+    monkeypatch.setattr("vftcli.outputs.rerun_recording.WHOLE_TIME", 0.4)
     t, found = analysis.t, analysis.contacts
     assert found is not None
     strongest = max(found.contacts, key=lambda contact: contact.peak_force or 0.0)

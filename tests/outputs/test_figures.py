@@ -7,8 +7,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import POOLED
-from vftcli.outputs.figures.paper import WIDTHS, paper_style
-from vftcli.outputs.log.figures import (
+from vftcli.outputs.figures import (
     LOG_FIGURES,
     MOST,
     error_figures,
@@ -16,6 +15,7 @@ from vftcli.outputs.log.figures import (
     torque_drawing,
     wrench_drawing,
 )
+from vftcli.outputs.paper import WIDTHS, paper_style
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

@@ -23,7 +23,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs.answer import beginning, contact_name
 from vftcli.outputs.contacts import contacts_record
 from vftcli.outputs.files import atomic, check_file, table_file
-from vftcli.outputs.log.run_record import jsonable
+from vftcli.outputs.run_record import jsonable
 from vftcli.readers.bags.ros_messages import (
     Value,
     in_parts,

@@ -4,7 +4,8 @@ import pytest
 
 from vftcli.evaluation import SCHEMA
 from vftcli.outputs.grid import GridCell, latex, markdown, terminal
-from vftcli.outputs.log.rmse_tables import (
+from vftcli.outputs.page.shell import part
+from vftcli.outputs.rmse_tables import (
     blocks,
     detail_grids,
     details,
@@ -12,7 +13,6 @@ from vftcli.outputs.log.rmse_tables import (
     marks_in_words,
     rmse_grid,
 )
-from vftcli.outputs.page.shell import part
 
 
 def errors(*changed: dict[str, object]) -> pl.DataFrame:

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.outputs.log.conversion import WRITERS, convert
+from vftcli.outputs.conversion import WRITERS, convert
 from vftcli.readers import read
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording, Source

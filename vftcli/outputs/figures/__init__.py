@@ -1,1 +1,0 @@
-"""Figures for papers, drawn by matplotlib: only what asks for them loads it."""

@@ -1,1 +1,0 @@
-"""Outputs of one log's analysis: tables, files, recordings."""
