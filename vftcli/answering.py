@@ -212,8 +212,7 @@ def replayed(
         progress: Called with the steps of a simulation that are done, and all.
     """
     from vftcli.admittance.choice import released_robot
-    from vftcli.admittance.parameters import release_deviation
-    from vftcli.admittance.replay import replay, replay_release
+    from vftcli.admittance.replay import release_deviation, replay, replay_release
     from vftcli.signals.packages import check_installed
 
     check_installed("pinocchio", "vftcli admit")
@@ -233,14 +232,11 @@ def replayed(
     control = replace(control, as_printed=choice.observers.as_printed)
     if log is None:
         deviation, arm = release_deviation(release), released_robot(choice.robot)
-        law = control.parameters(arm)
-        start, controllers = control.start_pose(arm), control.controllers(law)
         made = replay_release(
             deviation,
             arm,
-            law,
-            controllers,
-            start=start,
+            control.controllers(arm),
+            start=control.start_pose(arm),
             duration=control.duration,
             anyway=anyway,
         )
@@ -251,12 +247,9 @@ def replayed(
     check_logged(recording, "admit runs a controller that must not see the future")
     if stored is None:  # estimates of an earlier run were examined in it
         choice.examiner.examine(recording, arm)
-    law = control.parameters(arm)
+    controllers = control.controllers(arm)
     force = force_of(recording, arm, choice, control.force, named[0] if stored else None)
-    controllers = control.controllers(law)
-    made = replay(
-        force.wrench, recording.q, arm, law, controllers, source=force.source, anyway=anyway
-    )
+    made = replay(force.wrench, recording.q, arm, controllers, source=force.source, anyway=anyway)
     made = replace(made, remarks=(*force.remarks, *made.remarks))
     return Replayed(made, recording, None, choice.examiner.examinations)
 
@@ -312,11 +305,10 @@ def looped(
         raise ParameterError("the closed loop holds still over a span: give it as --zero A:B")
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
-    law = control.parameters(arm)
+    controllers = control.controllers(arm)
     observer = choice.observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     if not isinstance(observer, KalmanObserver):
         raise ParameterError("the closed loop runs kfo-fe or kfo-zoh; choose one with --observer")
-    controllers = control.controllers(law)
     run = run_closed_loop(
         scenario,
         controllers[-1],
@@ -328,5 +320,5 @@ def looped(
         progress=progress,
     )
     source = fact("force-of-loop")
-    made = replay(run.wrench, run.q, arm, law, controllers, source=source, anyway=anyway)
+    made = replay(run.wrench, run.q, arm, controllers, source=source, anyway=anyway)
     return Replayed(made, run=run)

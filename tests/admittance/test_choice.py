@@ -18,19 +18,21 @@ UR5 = load_robot("ur5")
 
 def test_one_variable_controller_an_alpha() -> None:
     choice = ControlChoice.parsed(alpha="1,1.6", settings={"admittance.controller": "variable"})
-    found = choice.controllers(choice.parameters(UR5))
+    found = choice.controllers(UR5)
     assert [c.alpha[0] for c in found] == [1.0, 1.6]
 
 
 def test_both_kinds_where_none_is_named() -> None:
     choice = ControlChoice.parsed()
-    assert len(choice.controllers(choice.parameters(UR5))) == 2
+    assert len(choice.controllers(UR5)) == 2
 
 
 def test_xi_and_threshold_mode_are_settings() -> None:
-    parameters = ControlChoice.parsed(
-        settings={"admittance.xi": "0.8", "admittance.threshold_mode": "soft"}
-    ).parameters(UR5)
+    parameters = (
+        ControlChoice.parsed(settings={"admittance.xi": "0.8", "admittance.threshold_mode": "soft"})
+        .controllers(UR5)[0]
+        .parameters
+    )
     assert parameters.xi is not None
     np.testing.assert_array_equal(parameters.xi, np.full(6, 0.8))
     assert parameters.threshold_mode == "soft"
@@ -39,11 +41,11 @@ def test_xi_and_threshold_mode_are_settings() -> None:
 def test_as_printed_the_whole_force_enters_unless_a_mode_is_named() -> None:
     def mode(*assignments: str) -> str:
         choice = ControlChoice(assignments=assignments, as_printed=True)
-        return choice.parameters(UR5).threshold_mode
+        return choice.controllers(UR5)[0].parameters.threshold_mode
 
     assert mode() == "literal"
     assert mode("admittance.threshold_mode=hard") == mode("threshold_mode=hard") == "hard"
-    assert ControlChoice.parsed().parameters(UR5).threshold_mode == "hard"
+    assert ControlChoice.parsed().controllers(UR5)[0].parameters.threshold_mode == "hard"
 
 
 def test_a_release_starts_where_it_is_set_or_where_the_file_says() -> None:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.closed_loop import ClosedLoop, OnlineKalman, latencies, run_closed_loop
-from vftcli.admittance.law import controllers, variable
-from vftcli.admittance.parameters import from_table, parse_settings
+from vftcli.admittance.law import controllers, from_table, parse_settings, variable
 from vftcli.admittance.replay import replay
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
@@ -104,7 +103,7 @@ def test_the_loop_s_record_replays_the_loop() -> None:
     robot = load_robot("ur5")
     p = loop.controller.parameters
     source = fact("force-of-loop")
-    found = replay(loop.wrench, loop.q, robot, p, controllers(p), source=source)
+    found = replay(loop.wrench, loop.q, robot, controllers(p), source=source)
     # row k of the loop is written after the force of row k: row k + 1 of the replay
     np.testing.assert_allclose(found.motion.x[1:, 1], loop.commanded, atol=1e-9)
     lost = [r.where.about for r in found.remarks if r.code == "poses-out-of-reach"]

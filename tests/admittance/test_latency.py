@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
-from vftcli.admittance.law import controllers
-from vftcli.admittance.parameters import from_table
+from vftcli.admittance.law import controllers, from_table
 from vftcli.robots import load_robot
 
 CONTROLLER = controllers(from_table(load_robot("ur5").admittance, "ur5", {}))[-1]

@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.law import (
+    Admittance,
     controllers,
     energy,
+    from_table,
     kinetic_shape,
     printed_energy,
     traditional,
     variable,
 )
 from vftcli.admittance.motion import AxisMotion, release, run
-from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.robots import load_robot
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.joints import FlangeSolver, follow
-from vftcli.admittance.law import UnstableError, controllers, variable
-from vftcli.admittance.parameters import from_table, parse_settings
+from vftcli.admittance.law import UnstableError, controllers, from_table, parse_settings, variable
 from vftcli.admittance.replay import Replay, on_control_clock, replay, replay_release
 from vftcli.robots import load_robot
 from vftcli.robots.chain import link_poses
@@ -41,7 +40,7 @@ def run(force: Force, *assignments: str, alphas: tuple[float, ...] = ()) -> Repl
     """Replay on the UR5."""
     p = parameters(*assignments)
     source = fact("force-of-sensor", frame="a push")
-    return replay(*force, UR5, p, controllers(p, alphas=alphas), source=source)
+    return replay(*force, UR5, controllers(p, alphas=alphas), source=source)
 
 
 def codes(found: Replay) -> set[str]:
@@ -151,7 +150,7 @@ def test_start_outside_the_limits_is_refused() -> None:
         run((record, q))
     p = parameters()
     with pytest.raises(ParameterError, match=r"the start pose has 5 joints; ur5 has 6"):
-        replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, p, controllers(p), start=np.zeros(5))
+        replay_release(np.array([0.3, 0, 0, 0, 0, 0]), UR5, controllers(p), start=np.zeros(5))
 
 
 def test_a_log_that_is_nearly_all_gap_is_refused() -> None:
@@ -195,11 +194,11 @@ def test_w_never_rises_in_a_replay() -> None:
 def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
     p = parameters("position.speed_limit=none")
     x = np.array([0.2, 0, 0, 0, 0, 0])
-    found = replay_release(x, UR5, p, controllers(p), start=START)
+    found = replay_release(x, UR5, controllers(p), start=START)
     assert not np.any(found.motion.escaped)
     with pytest.raises(UnstableError, match=r"beyond 0\.385 m"):
-        replay_release(2.0 * x, UR5, p, controllers(p), start=START)
-    studied = replay_release(3.0 * x, UR5, p, controllers(p), start=START, anyway=True)
+        replay_release(2.0 * x, UR5, controllers(p), start=START)
+    studied = replay_release(3.0 * x, UR5, controllers(p), start=START, anyway=True)
     assert studied.motion.escaped[1]
     assert {"motion-escaped", "law-escapes"} <= codes(studied)
 
@@ -207,7 +206,7 @@ def test_release_without_a_limit_inside_the_bound_is_let_pass() -> None:
 def test_release_needs_a_deviation() -> None:
     p = parameters()
     with pytest.raises(ParameterError, match=r"--release x=0\.3"):
-        replay_release(np.zeros(6), UR5, p, controllers(p), start=START)
+        replay_release(np.zeros(6), UR5, controllers(p), start=START)
 
 
 def test_a_force_that_is_not_known_counts_as_none_and_is_told() -> None:

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from vftcli.admittance.joints import JointPath
-from vftcli.admittance.law import controllers
+from vftcli.admittance.law import Admittance, controllers, from_table
 from vftcli.admittance.motion import AxisMotion, Drag, Phases
-from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.admittance.replay import Lyapunov, Replay, drag_remarks, replay, trouble
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
@@ -49,9 +48,7 @@ def replayed(
     given = {"start": zero[0], "wrench": zero, **others}
     return Replay(
         robot=load_robot("ur5"),
-        parameters=parameters,
-        controllers=TWO,
-        verdicts=(),
+        controllers=controllers(parameters),
         phases=Phases(zero > 0.0, zero),
         motion=made or motion(),
         path=way or path(),
@@ -146,9 +143,7 @@ def test_unknown_samples_are_counted() -> None:
     q = np.tile(load_robot("ur5").admittance["start"], (10, 1))
 
     def counted(record: Wrench) -> list[object]:
-        found = replay(
-            record, q, load_robot("ur5"), PARAMETERS, TWO, source=fact("force-of-release")
-        )
+        found = replay(record, q, load_robot("ur5"), TWO, source=fact("force-of-release"))
         return [r.values["samples"] for r in found.remarks if r.code == "force-unknown"]
 
     assert counted(wrench) == [3]

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.law import variable
+from vftcli.admittance.law import Admittance, variable
 from vftcli.admittance.motion import release, run
-from vftcli.admittance.parameters import Admittance
 
 
 def admittance(**changes: object) -> Admittance:

@@ -7,17 +7,17 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from vftcli.admittance.law import (
+    Admittance,
     UnstableError,
     check_stable,
     controllers,
     discrete_number,
     escape_factor,
-    judge,
+    from_table,
     traditional,
     variable,
 )
 from vftcli.admittance.motion import release
-from vftcli.admittance.parameters import Admittance, from_table
 from vftcli.robots import PROFILES, load_robot
 
 
@@ -48,7 +48,7 @@ def test_discrete_condition_is_the_eigenvalues() -> None:
 @pytest.mark.parametrize(("name", "number"), [("ur5", 0.11), ("panda", 0.22)])
 def test_numbers_of_the_profiles(name: str, number: float) -> None:
     """At the position's speed limit, as the issue's science prints them (two digits)."""
-    verdict = judge(variable(profile(name)))
+    verdict = variable(profile(name))
     assert verdict.recovery[0] == pytest.approx(number, abs=5e-3)
 
 
@@ -90,14 +90,14 @@ def test_escape_factors_of_the_science() -> None:
 
 
 def test_escape_bound_of_the_ur5() -> None:
-    verdict = judge(variable(replace(profile("ur5"), alpha=1.0)))
+    verdict = variable(replace(profile("ur5"), alpha=1.0))
     assert verdict.escape[0] == pytest.approx(0.616, abs=1e-3)  # printed digits
     assert verdict.escape[3] == pytest.approx(0.495, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", [name for name in PROFILES if load_robot(name).admittance])
 def test_every_profile_is_stable(name: str) -> None:
-    _, complaints = check_stable(controllers(profile(name)))
+    complaints = check_stable(controllers(profile(name)))
     assert complaints == ()
 
 
@@ -106,7 +106,7 @@ def test_unstable_settings_are_refused_with_the_number() -> None:
     slow = from_table(robot.admittance, "ur5", {"admittance": {"period": 0.5}})
     with pytest.raises(UnstableError, match=r"axis rx, drag phase: .* = 4\.25 must be below 4"):
         check_stable(controllers(slow))
-    _, complaints = check_stable(controllers(slow), anyway=True)
+    complaints = check_stable(controllers(slow), anyway=True)
     assert len(complaints) > 1
     free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
     with pytest.raises(UnstableError, match=r"axis rx has no speed limit.*beyond 0\.31 rad"):
@@ -118,7 +118,7 @@ def test_a_release_is_excused_only_inside_the_escape_bound_of_its_axes() -> None
     robot = load_robot("ur5")
     free = from_table(robot.admittance, "ur5", {"rotation": {"speed_limit": np.inf}})
     near, far = np.array([0, 0, 0, 0.3, 0, 0]), np.array([0, 0, 0, 0.3, 0.4, 0])
-    _, complaints = check_stable(controllers(free), release=near)
+    complaints = check_stable(controllers(free), release=near)
     assert {remark.code for remark in complaints} == {"law-escapes"}
     assert {remark.values["axis"] for remark in complaints} == {"rx", "ry", "rz"}
     with pytest.raises(UnstableError, match=r"axis ry has no speed limit.*beyond 0\.31 rad"):

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from vftcli.admittance.law import Admittance
 from vftcli.admittance.motion import phases
-from vftcli.admittance.parameters import Admittance
 
 
 def parameters(mode: str = "hard", hysteresis: float = 0.0) -> Admittance:

@@ -57,11 +57,10 @@ def pushed(mode: str) -> Replay:
     force[:, 1] = np.select([t < 0.4, t < 1.4], [30.0, 10.0], 0.0)
     arm = load_robot("ur5")
     control = ControlChoice.parsed(alpha="1.9", settings={"admittance.threshold_mode": mode})
-    parameters = control.parameters(arm)
     q = np.tile(arm.admittance["start"], (len(t), 1))
     wrench = Wrench(name="push", t=t, values=force, frame="base")
-    laws = control.controllers(parameters)
-    return replay(wrench, q, arm, parameters, laws, source=fact("force-of-loop"))
+    laws = control.controllers(arm)
+    return replay(wrench, q, arm, laws, source=fact("force-of-loop"))
 
 
 def test_without_a_threshold_the_traditional_one_alone_feels_the_rest_of_the_force() -> None:

@@ -9,13 +9,13 @@ import pytest
 from vftcli.observers.paper import MomentumObserver
 from vftcli.outputs.simulation import save
 from vftcli.robots import load_robot
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.simulation import Arm, Simulation, load_scenario, observe, prepare, simulate
 from vftcli.simulation.arm import build_arm
 from vftcli.simulation.experiment import simulate_pair
-from vftcli.simulation.writers.signals import flange_signals
 from vftcli.virtual_sensor.solvers import wrench_of
 
 EXACT = [
@@ -248,8 +248,8 @@ def test_bearing_weighs_what_it_should_and_the_arm_does_not_chatter() -> None:
     assert np.all(slip < 0.1), slip  # knocks shake the wrist by 0.05 rad/s
     log = run.recording
     tau = MomentumObserver(gain=30.0).estimate(dynamics_terms(log, run.robot)).tau
-    flange = flange_signals(run.robot.model, log.q, log.require("dq"))
-    wrench, _ = wrench_of(tau, flange.jacobian)
+    jacobian = flange_jacobian(run.robot.chain, log.q)
+    wrench, _ = wrench_of(tau, jacobian)
     moving, hung = (log.t > 0.6) & (log.t < 3.4), (log.t > 5.0) & (log.t < 8.5)
     assert rms(wrench[moving])[2] < 0.6
     # required 2 %; the noise of a mean over 3.5 s is 0.01 N

@@ -8,7 +8,7 @@ import pytest
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.friction import true_friction
+from vftcli.simulation.plant import true_friction
 from vftcli.simulation.scenario import FrictionSpec
 
 

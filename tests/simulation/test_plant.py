@@ -10,8 +10,13 @@ import pytest
 from vftcli.robots import Robot, load_robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.friction import TrueFriction, true_friction
-from vftcli.simulation.plant import Plant, gauss_seidel, slide_or_stick
+from vftcli.simulation.plant import (
+    Plant,
+    TrueFriction,
+    gauss_seidel,
+    slide_or_stick,
+    true_friction,
+)
 from vftcli.simulation.scenario import FrictionSpec
 
 

@@ -10,7 +10,7 @@ from vftcli.robots import Robot
 from vftcli.robots.terms import dynamics_terms
 from vftcli.signals.arrays import Array
 from vftcli.simulation import load_scenario, simulate
-from vftcli.simulation.friction import CREEP
+from vftcli.simulation.plant import CREEP
 from vftcli.simulation.scenario import MismatchSpec
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,6 @@ from vftcli.signals.option import NUMBERS, Choice, Option, names_at, setting
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
-    from vftcli.admittance.parameters import Admittance
     from vftcli.robots.robot import Robot
     from vftcli.signals.arrays import Array
 
@@ -87,7 +86,7 @@ class ControlChoice(Choice):
             "As position.stiffness=12, rz.threshold=4, admittance.xi=1, "
             "admittance.threshold_mode=soft.",
             several=True,
-            completes=names_at("admittance.parameters:NUMBERS"),
+            completes=names_at("admittance.law:NUMBERS"),
         ),
     ] = ()
     as_printed: bool = False  #: Whether the paper's printed formulas run.
@@ -103,23 +102,17 @@ class ControlChoice(Choice):
     @property
     def settings(self) -> Mapping[str, Mapping[str, Any]]:
         """The parameters that the user sets, by axis."""
-        from vftcli.admittance.parameters import parse_settings
+        from vftcli.admittance.law import parse_settings
 
         # What is named comes later, and so goes before it.
         given = ["admittance.threshold_mode=literal"] if self.as_printed else []
         given += self.assignments
         return parse_settings(given)
 
-    def parameters(self, robot: "Robot") -> "Admittance":
-        """The admittance parameters: the robot's, then those that are set."""
-        from vftcli.admittance.parameters import from_table
-
-        return from_table(robot.admittance, robot.name, self.settings)
-
     @classmethod
     def takes(cls, name: str) -> bool:
         """Whether a name is a setting of the replay, or a parameter as ``rz.threshold``."""
-        from vftcli.admittance.parameters import GROUPS
+        from vftcli.admittance.law import GROUPS
 
         section, dot, _ = name.rpartition(".")
         return super().takes(name) or not dot or section in GROUPS
@@ -136,10 +129,14 @@ class ControlChoice(Choice):
             )
         return np.array(start, dtype=np.float64)
 
-    def controllers(self, parameters: "Admittance") -> "tuple[Controller, ...]":
-        """The controllers that are compared, the traditional one first."""
-        from vftcli.admittance.law import controllers
+    def controllers(self, robot: "Robot") -> "tuple[Controller, ...]":
+        """The controllers that are compared, the traditional one first.
 
+        Their parameters are the robot's, then those that are set.
+        """
+        from vftcli.admittance.law import controllers, from_table
+
+        parameters = from_table(robot.admittance, robot.name, self.settings)
         return controllers(parameters, self.kinds, self.alphas)
 
 

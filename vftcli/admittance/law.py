@@ -1,29 +1,199 @@
-"""The variable-parameter law (47), its energy, the printed one, which rises, and its stability.
+"""The variable-parameter law (47), its parameters (Tables III and IV), energy, and stability.
 
 In the recovery phase an axis has K = αK_d e^{|v|/v₀}, M = M_d e^{−|v|/v₀}/α, B = 2ξ√(MK), so that
 B = 2ξ√(M_d K_d) is constant. The traditional controller has α = 1, no v in K and M, and B = B_d.
+The printed energy (52) rises; W falls.
 
 Semi-implicit Euler (49)–(51) is stable if 2TsB/M + Ts²K/M < 4, and M falls and K rises with speed.
 Without a speed limit the law escapes: from far enough it becomes infinitely fast in finite time.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from vftcli.admittance.parameters import AXES, Admittance
-from vftcli.signals.arrays import Array, check_shape, seal
+from vftcli.signals.arrays import Array, check_shape, frozen, seal, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import check_known
+from vftcli.signals.parsing import NUMBER, assignment, check_known, set_value
 from vftcli.signals.remarks import Remark, Where, warning
 
+#: The six axes: translation of the flange point along the base axes, rotation about them.
+AXES = ("x", "y", "z", "rx", "ry", "rz")
+#: Section of an assignment or of a robot file → the axes it speaks of.
+GROUPS: dict[str, tuple[int, ...]] = {
+    "admittance": (0, 1, 2, 3, 4, 5),
+    "position": (0, 1, 2),
+    "rotation": (3, 4, 5),
+    **{axis: (k,) for k, axis in enumerate(AXES)},
+}
+THRESHOLD_MODES = ("hard", "soft", "literal")
+#: Parameter with one number an axis → the paper's letters, accepted beside the words.
+PER_AXIS = {
+    "mass": ("m", "m_d"),
+    "damping": ("b", "b_d"),
+    "stiffness": ("k", "k_d"),
+    "alpha": (),
+    "threshold": ("f_tsd",),
+    "xi": (),
+    "hysteresis": (),
+    "speed_limit": ("v_tsd",),
+    "speed_scale": ("v0",),
+}
+#: Every number of every group of axes, as ``--set`` names it.
+NUMBERS = tuple(f"{group}.{name}" for group in GROUPS for name in PER_AXIS)
+LETTERS = {letter: name for name, letters in PER_AXIS.items() for letter in letters}
+LETTERS["ts"] = "period"
+MAY_BE_ZERO = ("damping", "threshold", "hysteresis")
+MAY_BE_ENDLESS = ("threshold", "speed_limit")
+#: Keys of ``[admittance]`` that are not one number an axis.
+PLAIN = ("period", "threshold_mode", "source", "start", "confidence")
 KINDS = ("traditional", "variable")
 #: Where 2TsB/M + Ts²K/M has to stay below: det(zI − A) = 0 then has both roots inside |z| = 1.
 DISCRETE_BOUND = 4.0
-
 UNITS = ("m", "m", "m", "rad", "rad", "rad")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Admittance:
+    """What the variable-parameter law (45)–(51) and Algorithm 1 are run with.
+
+    Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad, N·m/rad,
+    N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that of all axes.
+    """
+
+    mass: Array  #: M_d.
+    damping: Array  #: B_d.
+    stiffness: Array  #: K_d.
+    alpha: Array  #: α of (47).
+    threshold: Array  #: F_tsd: above it an axis is dragged, below it recovers.
+    #: ξ of (47), which the paper does not print; None, and NaN for an axis, is B_d/(2√(M_d K_d)),
+    #: the damping ratio of the drag phase.
+    xi: Array | None = None
+    #: Share of the threshold by which the force has to fall below it before an axis that is dragged
+    #: recovers; 0 is the paper's.
+    hysteresis: Array | float = 0.0
+    speed_limit: Array | float = np.inf  #: Ẋ_tsd; infinite for none.
+    speed_scale: Array | float = 1.0  #: v₀ in e^{|v|/v₀}: 1 m/s and 1 rad/s.
+    period: float  #: Control period. [s]
+    threshold_mode: str = "hard"  #: What of the force enters, see `vftcli.admittance.motion`.
+    source: str = ""  #: Where the numbers come from, in words.
+
+    def __post_init__(self) -> None:
+        for name in PER_AXIS:
+            if getattr(self, name) is None:
+                continue
+            array = spread(getattr(self, name), 6, "axes", f"admittance.{name}")
+            if name == "xi":
+                array = np.where(np.isnan(array), self.drag_ratio, array)
+            object.__setattr__(self, name, frozen(array))
+            zero, endless = name in MAY_BE_ZERO, name in MAY_BE_ENDLESS
+            fits = ((array > 0.0) | (zero & (array == 0.0))) & (np.isfinite(array) | endless)
+            if not np.all(fits):
+                k = int(np.argmin(fits))
+                raise ParameterError(
+                    f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
+                    f"{'zero or ' * zero}positive"
+                )
+        if np.any(np.asarray(self.hysteresis) >= 1.0):
+            raise ParameterError(
+                "admittance.hysteresis is a share of the threshold and must be below 1; "
+                f"it is {np.max(self.hysteresis):g}"
+            )
+        if not (np.isfinite(self.period) and self.period > 0.0):
+            raise ParameterError(
+                f"admittance.period is {self.period:g} s; the control period must be positive"
+            )
+        check_known(
+            self.threshold_mode, THRESHOLD_MODES, f"no threshold mode {self.threshold_mode!r}"
+        )
+
+    @property
+    def drag_ratio(self) -> Array:
+        """Damping ratio of the drag phase, B_d/(2√(M_d K_d)). (6,)"""
+        return np.asarray(self.damping / (2.0 * np.sqrt(self.mass * self.stiffness)))
+
+    @property
+    def release_threshold(self) -> Array:
+        """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
+        return np.asarray(self.threshold * (1.0 - np.asarray(self.hysteresis)))
+
+    @property
+    def damping_ratio(self) -> Array:
+        """ξ as it is used. (6,)"""
+        return self.drag_ratio if self.xi is None else self.xi
+
+
+def from_table(
+    table: Mapping[str, Any],
+    robot: str,
+    settings: Mapping[str, Mapping[str, Any]],
+) -> Admittance:
+    """The parameters of a robot file's ``[admittance]``, over which the user's settings win.
+
+    Settings are section (a key of `GROUPS`) → parameter → value.
+
+    Raises:
+        ParameterError: If a parameter is missing for an axis, unknown or out of range.
+    """
+    groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
+    # What has a default begins with it; ξ, which has none of its own, and all else with NaN.
+    values: dict[str, Any] = {
+        name: np.full(6, getattr(Admittance, name, None), np.float64) for name in PER_AXIS
+    }
+    for section, entries in (*groups, *settings.items()):
+        axes = list(GROUPS[section])
+        for name, value in entries.items():
+            if name not in PLAIN:
+                check_known(name, PER_AXIS, f"the admittance has no parameter {name!r}")
+                values[name][axes] = spread(value, len(axes), "axes", f"{section}.{name}")
+    where = "its [admittance]" if table else "an [admittance] section, which it lacks,"
+    for name, found in values.items():
+        absent = np.isnan(found)
+        if name != "xi" and np.any(absent):
+            listed = ", ".join(np.array(AXES)[absent])
+            section = next(group for group, axes in GROUPS.items() if np.all(absent[list(axes)]))
+            raise ParameterError(
+                f"{robot}: no admittance {name} for {listed}; give it in {where} or "
+                f"with --set {section}.{name}=VALUE"
+            )
+    plain = {**table, **settings.get("admittance", {})}
+    if "period" not in plain:
+        raise ParameterError(
+            f"{robot}: no admittance.period; give the control period [s] in its [admittance] or "
+            "with --set admittance.period=0.008"
+        )
+    NUMBER.check("admittance.period", plain["period"])
+    words = {name: plain[name] for name in ("threshold_mode", "source") if name in plain}
+    xi = values.pop("xi")
+    own = None if np.all(np.isnan(xi)) else xi
+    return Admittance(**values, xi=own, period=float(plain["period"]), **words)
+
+
+def parse_settings(assignments: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Read ``SECTION.PARAMETER=VALUE`` assignments of the admittance; see `GROUPS`.
+
+    ``xi=1`` without a section is ``admittance.xi=1``; the paper's letters are understood.
+    """
+    settings: dict[str, dict[str, Any]] = {}
+    for text in assignments:
+        left, value = assignment(text, "--set", "SECTION.PARAMETER=VALUE, as position.stiffness=12")
+        section, _, name = (left if "." in left else f"admittance.{left}").rpartition(".")
+        name = LETTERS.get(name.lower(), name)
+        whole = ("period", "threshold_mode", "source") if section == "admittance" else ()
+        if section not in GROUPS or name not in (*PER_AXIS, *whole):
+            raise ParameterError(
+                f"--set {text!r}: no such admittance parameter. Sections: {', '.join(GROUPS)}; "
+                f"parameters: {', '.join((*PER_AXIS, 'period'))}"
+            )
+        given: Any = value
+        if name not in {"threshold_mode", "source"}:
+            endless = name == "speed_limit" and value.lower() == "none"
+            given = set_value("inf" if endless else value, text)
+        settings.setdefault(section, {})[name] = given
+    return settings
 
 
 @dataclass(frozen=True)
@@ -55,6 +225,47 @@ class Controller:
         p = self.parameters
         return np.asarray(self.damping / (2.0 * np.sqrt(p.mass * p.stiffness)))
 
+    @cached_property
+    def drag(self) -> Array:
+        """2TsB/M + Ts²K/M of the drag phase. (6,)"""
+        p = self.parameters
+        return discrete_number(p.mass, p.damping, p.stiffness, p.period)
+
+    @cached_property
+    def recovery(self) -> Array:
+        """2TsB/M + Ts²K/M of the recovery at the speed limit; infinite without one. (6,)"""
+        p, limit = self.parameters, np.asarray(self.parameters.speed_limit)
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            swell = self.alpha * np.exp(np.where(self.rate > 0, limit * self.rate, 0))
+        return discrete_number(p.mass / swell, self.damping, p.stiffness * swell, p.period)
+
+    @cached_property
+    def escape(self) -> Array:
+        """Largest deviation from which a release at rest without a speed limit returns. (6,)
+
+        Infinite for the traditional controller. [m, rad]
+        """
+        p = self.parameters
+        distinct, each = np.unique(self.xi, return_inverse=True)
+        factor = np.array([escape_factor(xi) for xi in distinct.tolist()])[each]
+        scale = np.sqrt(p.mass / p.stiffness) / self.alpha
+        with np.errstate(divide="ignore"):
+            return np.asarray(factor * scale / self.rate)
+
+    def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
+        """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
+        where, limited = Where(self.name), np.isfinite(self.parameters.speed_limit)
+        # Without a speed limit the number is infinite, and the escape says what that means.
+        at_limit = np.where(limited, self.recovery, 0.0)
+        numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
+        for code, number in numbers.items():
+            for k in np.flatnonzero(number >= DISCRETE_BOUND):
+                yield warning(code, where, axis=AXES[k], number=float(number[k]))
+        risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
+        for k in np.flatnonzero(risky):
+            bound, unit = float(self.escape[k]), UNITS[k]
+            yield warning("law-escapes", where, axis=AXES[k], bound=bound, unit=unit)
+
 
 def traditional(parameters: Admittance) -> Controller:
     """Constant parameters (45) in both phases."""
@@ -62,12 +273,13 @@ def traditional(parameters: Admittance) -> Controller:
     return Controller("traditional", one, 0.0 * one, damping, parameters)
 
 
-def variable(parameters: Admittance) -> Controller:
-    """The variable law (47) in the recovery phase."""
+def variable(parameters: Admittance, alpha: float | None = None) -> Controller:
+    """The variable law (47) in the recovery phase, with another α than its parameters'."""
     # B_dva = 2ξ√(M_dva K_dva) = 2ξ√(M_d K_d): the same at every speed and every α.
     damping = 2.0 * parameters.damping_ratio * np.sqrt(parameters.mass * parameters.stiffness)
     rate = 1.0 / np.asarray(parameters.speed_scale)
-    return Controller("variable", parameters.alpha, rate, damping, parameters)
+    given = parameters if alpha is None else replace(parameters, alpha=np.full(6, alpha))
+    return Controller("variable", given.alpha, rate, damping, parameters)
 
 
 def controllers(
@@ -78,8 +290,7 @@ def controllers(
     wanted = kinds or KINDS
     found = [traditional(parameters)] if "traditional" in wanted else []
     if "variable" in wanted:
-        each = [replace(parameters, alpha=np.full(6, a)) for a in dict.fromkeys(alphas)]
-        found += map(variable, each or [parameters])
+        found += [variable(parameters, alpha) for alpha in dict.fromkeys(alphas) or (None,)]
     return tuple(found)
 
 
@@ -123,33 +334,6 @@ class UnstableError(ParameterError):
     """The law would not be stable with these parameters."""
 
 
-class Verdict(NamedTuple):
-    """Stability of one controller. Arrays are (6,)."""
-
-    controller: Controller  #: The controller.
-    drag: Array  #: 2TsB/M + Ts²K/M of the drag phase.
-    recovery: Array  #: The same in the recovery phase at the speed limit; infinite without one.
-    #: Largest deviation from which a release at rest does not escape if there is no speed limit;
-    #: infinite for the traditional controller. [m, rad]
-    escape: Array
-
-    def complaints(self, size: Array | float = np.inf) -> tuple[Remark, ...]:
-        """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
-        where, found = Where(self.controller.name), list[Remark]()
-        limited = np.isfinite(self.controller.parameters.speed_limit)
-        # Without a speed limit the number is infinite, and the escape says what that means.
-        at_limit = np.where(limited, self.recovery, 0.0)
-        numbers = {"law-unstable-in-drag": self.drag, "law-unstable-at-limit": at_limit}
-        for code, number in numbers.items():
-            for k in np.flatnonzero(number >= DISCRETE_BOUND):
-                found.append(warning(code, where, axis=AXES[k], number=float(number[k])))
-        risky = ~limited & np.isfinite(self.escape) & (size > self.escape)
-        for k in np.flatnonzero(risky):
-            bound, unit = float(self.escape[k]), UNITS[k]
-            found.append(warning("law-escapes", where, axis=AXES[k], bound=bound, unit=unit))
-        return tuple(found)
-
-
 def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float) -> Array:
     """2TsB/M + Ts²K/M, below 4 where semi-implicit Euler is stable. [1]"""
     return np.asarray((2.0 * period * damping + period**2 * stiffness) / mass)
@@ -182,35 +366,19 @@ def escape_factor(xi: float) -> float:
     return float(z)
 
 
-def judge(controller: Controller) -> Verdict:
-    """Everything that can be said of a controller before it runs."""
-    p = controller.parameters
-    distinct, each = np.unique(controller.xi, return_inverse=True)
-    factor = np.array([escape_factor(xi) for xi in distinct.tolist()])[each]
-    scale = np.sqrt(p.mass / p.stiffness) / controller.alpha
-    limit, rate = np.asarray(p.speed_limit), controller.rate
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        escape = factor * scale / rate
-        swell = controller.alpha * np.exp(np.where(rate > 0, limit * rate, 0))
-    drag = discrete_number(p.mass, p.damping, p.stiffness, p.period)
-    recovery = discrete_number(p.mass / swell, controller.damping, p.stiffness * swell, p.period)
-    return Verdict(controller, drag, recovery, escape)
-
-
 def check_stable(
     controllers: Sequence[Controller], *, anyway: bool = False, release: Array | None = None
-) -> tuple[tuple[Verdict, ...], tuple[Remark, ...]]:
-    """Verdicts on controllers before they run and all that is wrong; what is unstable is refused.
+) -> tuple[Remark, ...]:
+    """All that is wrong with controllers before they run; what is unstable is refused.
 
     An axis that starts a release (6,) [m, rad] inside the escape bound needs no speed limit.
     """
-    verdicts = tuple(map(judge, controllers))
     # Under a hand any deviation can come about; only a release has a size.
     size = np.inf if release is None else np.abs(release)
-    grave = [remark for verdict in verdicts for remark in verdict.complaints(size)]
+    grave = [remark for controller in controllers for remark in controller.complaints(size)]
     if grave and not anyway:
         more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
         raise UnstableError(
             f"unstable: {grave[0]}{more}. Change the parameters, or study it with --anyway."
         )
-    return verdicts, tuple(remark for verdict in verdicts for remark in verdict.complaints())
+    return tuple(remark for controller in controllers for remark in controller.complaints())

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.admittance.law import Controller
-from vftcli.admittance.parameters import AXES, Admittance
+from vftcli.admittance.law import AXES, Admittance, Controller
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product

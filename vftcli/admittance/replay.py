@@ -11,7 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.admittance.joints import FlangeSolver, JointPath, follow
-from vftcli.admittance.law import Controller, Verdict, check_stable, energy, printed_energy
+from vftcli.admittance.law import (
+    AXES,
+    Admittance,
+    Controller,
+    check_stable,
+    energy,
+    printed_energy,
+)
 from vftcli.admittance.motion import (
     AxisMotion,
     Drag,
@@ -23,13 +30,13 @@ from vftcli.admittance.motion import (
     rows_of,
     run,
 )
-from vftcli.admittance.parameters import AXES, Admittance
 from vftcli.robots.chain import link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
+from vftcli.signals.parsing import assignment, numbers
 from vftcli.signals.pose import log_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
@@ -65,9 +72,7 @@ class Replay:
     """What every controller would have made of one force record."""
 
     robot: Robot  #: The arm.
-    parameters: Admittance  #: The admittance parameters.
     controllers: tuple[Controller, ...]  #: The controllers.
-    verdicts: tuple[Verdict, ...]  #: Their stability, in the same order.
     #: Where the force comes from.
     source: Remark = field(default_factory=lambda: fact("force-of-release"))
     start: Array  #: Joint positions of the target pose X_d. (n,) [rad]
@@ -82,12 +87,16 @@ class Replay:
     rows: tuple[dict[str, Any], ...]  #: The comparison, one row a controller, axis and drag.
     remarks: tuple[Remark, ...] = ()  #: What a reader should know.
 
+    @property
+    def parameters(self) -> Admittance:
+        """The admittance parameters, those of all controllers."""
+        return self.controllers[0].parameters
+
 
 def replay(
     wrench: Wrench,
     q: Array,
     robot: Robot,
-    parameters: Admittance,
     controllers: Sequence[Controller],
     *,
     source: Remark,
@@ -100,7 +109,7 @@ def replay(
     """
     if len(wrench.t) > 1:
         refuse_mostly_gap(wrench.t, median_step(wrench.t))
-    verdicts, complaints = check_stable(controllers, anyway=anyway)
+    complaints, parameters = check_stable(controllers, anyway=anyway), controllers[0].parameters
     solver = FlangeSolver(robot)
     clock, (force, q) = on_control_clock(wrench.t, (wrench.known, q), parameters.period)
     start = solver.check_start(q[0])
@@ -108,7 +117,7 @@ def replay(
     motion = run(controllers, split.force, split.dragged)
     motion = replace(motion, t=motion.t + clock[0])
     drags, logged = drags_of(split, parameters.period), deviation_of(solver, start, q)
-    found = judge_motion(solver, start, parameters, verdicts, motion, split, drags, force)
+    found = judge_motion(solver, start, controllers, motion, split, drags, force)
     found = replace(found, source=source, logged=logged)
     unknown = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
     missing = (caution("force-unknown", samples=unknown),) if unknown else ()
@@ -119,7 +128,6 @@ def replay(
 def replay_release(
     x: Array,
     robot: Robot,
-    parameters: Admittance,
     controllers: Sequence[Controller],
     *,
     start: Array,
@@ -134,22 +142,21 @@ def replay_release(
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
         )
-    verdicts, complaints = check_stable(controllers, anyway=anyway, release=x)
+    complaints = check_stable(controllers, anyway=anyway, release=x)
     solver = FlangeSolver(robot)
     q = solver.check_start(start)
     motion = release(controllers, x, duration or settling(controllers, x))
     force = np.zeros((len(motion.t) - 1, 6))
     still = Phases(np.zeros_like(force, dtype=bool), force)
     drags = releases_of(x, len(motion.t))
-    found = judge_motion(solver, q, parameters, verdicts, motion, still, drags, force)
+    found = judge_motion(solver, q, controllers, motion, still, drags, force)
     return replace(found, remarks=(*complaints, *trouble(found)))
 
 
 def judge_motion(
     solver: FlangeSolver,
     start: Array,
-    parameters: Admittance,
-    verdicts: tuple[Verdict, ...],
+    controllers: Sequence[Controller],
     motion: AxisMotion,
     split: Phases,
     drags: Sequence[Drag],
@@ -159,20 +166,34 @@ def judge_motion(
 
     The force (T, 6) [N, N·m] is NaN where it is unknown.
     """
-    controllers = tuple(verdict.controller for verdict in verdicts)
     return Replay(
         robot=solver.robot,
-        parameters=parameters,
-        controllers=controllers,
-        verdicts=verdicts,
+        controllers=tuple(controllers),
         start=start,
         wrench=force,
         phases=split,
         motion=motion,
-        path=follow(solver, start, motion.x, parameters.period),
+        path=follow(solver, start, motion.x, controllers[0].parameters.period),
         lyapunov=lyapunov_along(controllers, motion, split),
         rows=tuple(rows_of(controllers, motion, drags, np.nan_to_num(force))),
     )
+
+
+def release_deviation(assignments: Sequence[str]) -> Array:
+    """Deviation of a release from ``axis=value`` assignments. (6,) [m, rad]"""
+    x = np.zeros(6)
+    form = f"AXIS=VALUE with an axis of {', '.join(AXES)}, as x=0.3 [m] or rz=0.5 [rad]"
+    for part in ",".join(assignments).split(","):
+        axis, text = assignment(part, "--release", form)
+        value = numbers(text)
+        if axis not in AXES or not value or not np.isfinite(value[0]):
+            raise ParameterError(f"--release {part!r} is not {form}")
+        x[AXES.index(axis)] = value[0]
+    if np.linalg.norm(x[3:]) >= np.pi:
+        raise ParameterError(
+            f"--release turns by {np.linalg.norm(x[3:]):.3g} rad; it must be less than π"
+        )
+    return x
 
 
 def settling(controllers: Sequence[Controller], x: Array) -> float:

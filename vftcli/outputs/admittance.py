@@ -12,8 +12,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.admittance.closed_loop import ClosedLoop
-from vftcli.admittance.law import Controller
-from vftcli.admittance.parameters import AXES, PER_AXIS
+from vftcli.admittance.law import AXES, PER_AXIS, Controller
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance_tables import (
@@ -152,16 +151,16 @@ def admittance_record(
         },
         "controllers": [
             {
-                "name": verdict.controller.name,
-                "kind": verdict.controller.kind,
-                "alpha": verdict.controller.alpha,
-                "xi": verdict.controller.xi,
-                "recovery_damping": verdict.controller.damping,
-                "discrete_number_drag": verdict.drag,
-                "discrete_number_recovery": verdict.recovery,
-                "escape_bound": verdict.escape,
+                "name": controller.name,
+                "kind": controller.kind,
+                "alpha": controller.alpha,
+                "xi": controller.xi,
+                "recovery_damping": controller.damping,
+                "discrete_number_drag": controller.drag,
+                "discrete_number_recovery": controller.recovery,
+                "escape_bound": controller.escape,
             }
-            for verdict in replay.verdicts
+            for controller in replay.controllers
         ],
         "conventions": CONVENTIONS,
         **log_remarks(logs),

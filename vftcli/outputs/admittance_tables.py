@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
-from vftcli.admittance.parameters import AXES
+from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.grid import Column, Grid, csv_rows, keyed_grid, latex, terminal
 from vftcli.outputs.quantity import minus
@@ -178,12 +178,13 @@ def stability_grid(replay: Replay) -> Grid:
     """The numbers that decide before anything moves: the worst of the axes of each kind."""
     rows: list[tuple[str | float, ...]] = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
-    for verdict in replay.verdicts:
+    for controller in replay.controllers:
         for axes, part, unit in kinds:
-            bound = float(np.min(verdict.escape[part]))
-            numbers = (float(np.max(values[part])) for values in (verdict.drag, verdict.recovery))
+            bound = float(np.min(controller.escape[part]))
+            each = controller.drag, controller.recovery
+            numbers = (float(np.max(values[part])) for values in each)
             escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
-            rows.append((verdict.controller.name, axes, *numbers, escape))
+            rows.append((controller.name, axes, *numbers, escape))
     return Grid(
         title="2TsB/M + Ts²K/M, stable below 4",
         columns=(

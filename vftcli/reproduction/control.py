@@ -7,10 +7,9 @@ import numpy as np
 
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, Latency, latencies, run_closed_loop
-from vftcli.admittance.law import UnstableError
+from vftcli.admittance.law import AXES, UnstableError
 from vftcli.admittance.motion import drags_of, release, releases_of, rows_of
 from vftcli.admittance.motion import run as follow_force
-from vftcli.admittance.parameters import AXES
 from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers import KalmanObserver
 from vftcli.observers.choice import ObserverChoice
@@ -67,20 +66,19 @@ def looped(
     scenario = load_scenario(name, ())
     arm = load_robot(scenario.robot)
     alone = ControlChoice(as_printed=variant == AS_PRINTED)
-    parameters = alone.parameters(arm)
     observers = ObserverChoice.parsed(
         observer=["kfo-fe"], settings={"kfo.noise_convention": CONVENTIONS[variant]}
     )
     observer = observers.build(arm, 1.0 / log_rate(scenario.sensing, arm))[0][0]
     assert isinstance(observer, KalmanObserver)
-    inner = alone.controllers(parameters)[-1]
+    inner = alone.controllers(arm)[-1]
     run = run_closed_loop(scenario, inner, observer, seed=seed, zero=UNLOADED)
     if not run.stable:
         raise UnstableError(f"{name}, seed {seed}: the arm ran away at {run.t[-1]:.2f} s")
     # One force enters every controller.
-    everything = replace(alone, alphas=tuple(alphas)).controllers(parameters)
+    everything = replace(alone, alphas=tuple(alphas)).controllers(arm)
     source = fact("force-of-loop")
-    return run, replay(run.wrench, run.q, arm, parameters, everything, source=source)
+    return run, replay(run.wrench, run.q, arm, everything, source=source)
 
 
 def ungated(found: Replay) -> Replay:
@@ -135,12 +133,11 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
     The traditional law turns after arccos(ζ)/ω_d at the latest, from x = 0. The advance is the
     largest over deviations released at the speed limit, in steps of the control period.
     """
-    control = ControlChoice(alphas=tuple(alphas))
-    parameters = control.parameters(load_robot("ur5"))
+    laws = ControlChoice(alphas=tuple(alphas)).controllers(load_robot("ur5"))
+    parameters, result = laws[0].parameters, RunResult()
     omega = np.sqrt(parameters.stiffness / parameters.mass)
     zeta = parameters.damping / (2.0 * parameters.mass * omega)
     latest = np.arccos(zeta) / (omega * np.sqrt(1.0 - zeta**2))
-    laws, result = control.controllers(parameters), RunResult()
     places = np.repeat(np.arange(0.0, FARTHEST_RELEASE, 0.01), len(laws))
     many = [law for _ in range(len(places) // len(laws)) for law in laws]
     for axis in (0, 3):
@@ -164,8 +161,7 @@ def released(
     x = np.array([deviation, 0.0, 0.0, 0.0, 0.0, 0.0])
     for variant, xi in ((CORRECTED, ()), ("ξ = 1", ("admittance.xi=1",))):
         control = ControlChoice(assignments=xi, alphas=tuple(alphas))
-        parameters = control.parameters(arm)
-        laws = control.controllers(parameters)
+        laws = control.controllers(arm)
         motion = release(laws, x, settling(laws, x))
         drags = releases_of(x, len(motion.t))
         for row in rows_of(laws, motion, drags, np.zeros((len(motion.t) - 1, 6))):
@@ -174,6 +170,7 @@ def released(
                 result.put(variant, {f"{key}/{name}": row[key]})
             result.put(variant, {f"overshoot/{name}": 100.0 * (row["overshoot"] or 0.0)})
         if not xi:
+            parameters = laws[0].parameters
             keys = "mass", "damping", "stiffness", "alpha", "threshold", "speed_limit"
             table = {key: getattr(parameters, key) for key in keys}
             for key, values in {**table, "xi": parameters.damping_ratio}.items():

@@ -177,10 +177,9 @@ def replay_bearing(
     """One force through Table IV's traditional and variable controllers."""
     words = [] if period is None else [f"admittance.period={period}"]
     control = ControlChoice(assignments=tuple(words), as_printed=as_printed)
-    parameters = control.parameters(made.robot)
-    laws = control.controllers(parameters)
+    laws = control.controllers(made.robot)
     source = fact("force-of-observer", observer=wrench.name)
-    return replay(wrench, made.recording.q, made.robot, parameters, laws, source=source)
+    return replay(wrench, made.recording.q, made.robot, laws, source=source)
 
 
 def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence[float]) -> None:

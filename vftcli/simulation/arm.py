@@ -14,8 +14,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.simulation.contacts import Touching
-from vftcli.simulation.friction import TrueFriction, true_friction
-from vftcli.simulation.plant import Plant
+from vftcli.simulation.plant import Plant, TrueFriction, true_friction
 from vftcli.simulation.scenario import PayloadSpec, Scenario, ServoSpec
 from vftcli.simulation.trajectories import Reference
 

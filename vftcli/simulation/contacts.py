@@ -4,7 +4,7 @@ A contact acts ON the robot at `point` of a `link` (0: the flange), in base axes
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -52,29 +52,16 @@ class Push(NamedTuple):
         return size * self.wrench
 
 
-class Segments(NamedTuple):
-    """Pushes that follow one another, in their order."""
+class Contact(NamedTuple):
+    """A contact during a run: when it acts, and its wrench then."""
 
-    pushes: Sequence[Push]
-    in_link: bool = False  #: Whether their wrenches are in the link's axes.
+    spans: Sequence[tuple[float, float]]  #: Start and end of each application. [s]
+    #: Wrench of the k-th application at a time [s] and a place, base axes. (6,) [N, N·m]
+    wrench: Callable[[int, float, Place], Array]
 
-    def current(self, t: float) -> Push | None:
-        """The push going on at time `t` [s], or None between two."""
-        return next((push for push in self.pushes if push.start < t < push.stop), None)
-
-    def active(self, t: float) -> bool:
-        """Whether a push is going on at time `t` [s]."""
-        return self.current(t) is not None
-
-    def wrench(self, t: float, place: Place) -> Array:
-        """The push's wrench in base axes. (6,) [N, N·m]"""
-        push = self.current(t)
-        if push is None:
-            return np.zeros(6)
-        wrench = push.at(t)
-        if self.in_link:
-            return np.concatenate([place.rotation @ wrench[:3], place.rotation @ wrench[3:]])
-        return wrench
+    def current(self, t: float) -> int | None:
+        """Index of the application going on at `t` [s], or None."""
+        return next((k for k, (a, b) in enumerate(self.spans) if a <= t < b), None)
 
 
 class PushStyle(NamedTuple):
@@ -129,19 +116,8 @@ class Hand:
         self.grip: int | None = None
         self.held_at, self.held_as = np.zeros(3), np.eye(3)
 
-    def span(self, t: float) -> int | None:
-        """Index of the grab going on at `t` [s], or None."""
-        return next((k for k, (a, b) in enumerate(self.spec.spans) if a <= t < b), None)
-
-    def active(self, t: float) -> bool:
-        """Whether the hand holds the arm at time `t` [s]."""
-        return self.span(t) is not None
-
-    def wrench(self, t: float, place: Place) -> Array:
+    def wrench(self, k: int, t: float, place: Place) -> Array:
         """Spring and damper between the handle and the hand. (6,) [N, N·m]"""
-        k = self.span(t)
-        if k is None:
-            return np.zeros(6)
         if k != self.grip:
             # A hand takes hold where the handle is at that moment, wherever that may be.
             self.grip, self.held_at, self.held_as = k, place.position, place.rotation
@@ -164,35 +140,39 @@ class Hand:
         return hold * np.concatenate([force, torque])
 
 
-class Stop(NamedTuple):
-    """A hard stop during a run: it remembers nothing."""
+def stop_of(spec: StopSpec) -> Contact:
+    """A hard stop: it pushes along its normal where it is met, and never pulls."""
+    if not any(spec.normal):
+        raise ParameterError(f"contacts.{spec.name}.normal has no length")
+    normal = np.array(spec.normal) / float(np.linalg.norm(spec.normal))
 
-    spec: StopSpec  #: Its plane.
-
-    def active(self, _t: float) -> bool:
-        """A stop is always there; whether it is met shows in its wrench."""
-        return True
-
-    def wrench(self, _t: float, place: Place) -> Array:
-        """Push along the normal, never a pull. (6,) [N, N·m]"""
-        spec = self.spec
-        normal = np.array(spec.normal) / float(np.linalg.norm(spec.normal))
+    def wrench(_k: int, _t: float, place: Place) -> Array:
         depth = float(normal @ (np.array(spec.through) - place.position))
-        if depth <= 0.0:
-            return np.zeros(6)
         size = max(spec.stiffness * depth - spec.damping * float(normal @ place.velocity), 0.0)
-        return np.concatenate([size * normal, np.zeros(3)])
+        return np.concatenate([size * (depth > 0.0) * normal, np.zeros(3)])
+
+    return Contact([(-math.inf, math.inf)], wrench)
 
 
-def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Segments | Hand | Stop:
+def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> Contact:
+    """Pushes that follow one another, in base axes or in the link's."""
+
+    def wrench(k: int, t: float, place: Place) -> Array:
+        size = pushes[k].at(t)
+        if not in_link:
+            return size
+        return np.concatenate([place.rotation @ part for part in np.split(size, 2)])
+
+    return Contact([(push.start, push.stop) for push in pushes], wrench)
+
+
+def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Contact:
     """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
     where = f"contacts.{spec.name}"
     if isinstance(spec, PushesSpec):
-        return Segments(drawn(spec, rng, duration))
+        return pushes_of(drawn(spec, rng, duration))
     if isinstance(spec, StopSpec):
-        if not any(spec.normal):
-            raise ParameterError(f"{where}.normal has no length")
-        return Stop(spec)
+        return stop_of(spec)
     if isinstance(spec, HandSpec):
         for name, rows in (("moves", spec.moves), ("turns", spec.turns)):
             if rows and len(rows) != len(spec.spans):
@@ -200,7 +180,7 @@ def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Segm
                     f"{where}.{name} has {len(rows)} rows; it must have one for each of the "
                     f"{len(spec.spans)} spans"
                 )
-        return Hand(spec)
+        return Contact(spec.spans, Hand(spec).wrench)
     if isinstance(spec, LoadSpec):
         if spec.weight < 0:
             raise ParameterError(f"{where}.weight is negative")
@@ -210,14 +190,14 @@ def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Segm
         check_known(axes, ("base", "link"), f"no axes {axes!r}")
     spans = sorted(spec.spans, key=lambda span: span[0])
     pushes = [Push(a, b, spec.rise, spec.fall, wrench) for a, b in spans]
-    return Segments(pushes, in_link=axes == "link")
+    return pushes_of(pushes, in_link=axes == "link")
 
 
 class Mounted(NamedTuple):
     """A contact and the body it acts on."""
 
     name: str  #: The contact's name.
-    contact: Segments | Hand | Stop  #: Its forces.
+    contact: Contact  #: When it acts, and how.
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
@@ -281,28 +261,24 @@ class Touching:
 
     def anything(self, t: float) -> bool:
         """Whether any contact may exert something at `t` [s]."""
-        return bool(self.walks) or any(m.contact.active(t) for m in self.mounted)
+        return bool(self.walks) or any(m.contact.current(t) is not None for m in self.mounted)
 
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
+        import pinocchio as pin
+
         tau = np.zeros_like(v)
         for walk in self.walks.values():
             tau += walk[min(int(t / self.step), len(walk) - 1)]
         for k, mounted in enumerate(self.mounted):
             self.wrenches[k] = 0.0
-            if not mounted.contact.active(t):
+            if (number := mounted.contact.current(t)) is None:
                 continue
-            J, pose = joint_jacobian(model, data, mounted.joint), data.oMi[mounted.joint]
+            J = pin.getJointJacobian(model, data, mounted.joint, pin.LOCAL_WORLD_ALIGNED)
+            pose = data.oMi[mounted.joint]
             R, arm, twist = pose.rotation, pose.rotation @ mounted.point, J @ v
             velocity = twist[:3] + cross(twist[3:], arm)
             place = Place(R @ mounted.turn, pose.translation + arm, velocity, twist[3:])
-            self.wrenches[k] = wrench = mounted.contact.wrench(t, place)
+            self.wrenches[k] = wrench = mounted.contact.wrench(number, t, place)
             tau += J[:3].T @ wrench[:3] + J[3:].T @ (wrench[3:] + cross(arm, wrench[:3]))
         return tau
-
-
-def joint_jacobian(model: Any, data: Any, joint: int) -> Array:  # noqa: ANN401
-    """Jacobian of a joint's origin in base axes; the data's own are current. (6, n)"""
-    import pinocchio as pin
-
-    return np.asarray(pin.getJointJacobian(model, data, joint, pin.LOCAL_WORLD_ALIGNED))

@@ -2,17 +2,19 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.robots import Robot, load_robot
+from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
-from vftcli.signals.wrench import WrenchFrame
+from vftcli.signals.wrench import AXES, WrenchFrame
 from vftcli.simulation.arm import Arm
-from vftcli.simulation.contacts import joint_jacobian
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import (
     Measured,
@@ -31,7 +33,6 @@ MOST_STEPS = 2_000_000  #: Most inner steps of a run: half an hour at 1 ms, a gi
 REPORT_STEPS = 500  #: Inner steps between two reports of progress.
 #: Offset between the seeds of the two runs' sensors, so that their noise differs.
 PAIR_SEED = 1_000_003
-AXES = ("fx", "fy", "fz", "mx", "my", "mz")
 Progress = Callable[[int, int], None]  #: Called with the steps done and the steps in all.
 
 
@@ -76,6 +77,16 @@ class Simulation:
     #: Reading of the flange sensor, sensor axes, ON the robot. (M, 6) [N, N·m]
     force_sensor: Array | None
     truth: Truth  #: What really happened.
+
+    @cached_property
+    def actual(self) -> "FlangeMotion":
+        """The flange as it is measured."""
+        return flange_motion(self.nominal.chain, self.measured.q, self.measured.dq)
+
+    @cached_property
+    def target(self) -> "FlangeMotion":
+        """The flange as it is commanded."""
+        return flange_motion(self.nominal.chain, self.samples.target_q, self.samples.target_dq)
 
     @property
     def recording(self) -> Recording:
@@ -206,34 +217,45 @@ def simulate_pair(
 
 def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
-    import pinocchio as pin
-
-    touching, made, model = arm.touching, arm.made, arm.plant.model
+    touching, made, chain = arm.touching, arm.made, arm.true.chain
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
     wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
-    walk = np.zeros((made, arm.robot.joints))
-    for each in touching.walks.values():
-        walk += each[:made]
-    data, last = model.createData(), arm.robot.joints
-    tau_ext, flange = interpolate(samples.time, middle, walk), np.zeros((len(samples.time), 6))
-    for k in np.flatnonzero(np.any(wrenches != 0.0, axis=(1, 2))):
-        pin.computeJointJacobians(model, data, samples.q[k])
-        tau = np.zeros(last)
-        for contact, wrench in zip(touching.mounted, wrenches[k], strict=True):
-            R = data.oMi[contact.joint].rotation
-            if contact.lever is not None:
-                flange[k] += at_other_point(wrench, R @ contact.turn @ contact.lever)
-            else:
-                J = joint_jacobian(model, data, contact.joint)
-                tau += J.T @ at_other_point(wrench, R @ contact.point)
-        offset = data.oMi[last].rotation @ arm.true.chain.flange_translation
-        J = joint_jacobian(model, data, last)
-        tau_ext[k] += tau + J.T @ at_other_point(flange[k], offset)
-    contacts = {m.name: wrenches[:, c] for c, m in enumerate(touching.mounted) if m.lever is None}
     walks = {k: interpolate(samples.time, middle, w[:made]) for k, w in touching.walks.items()}
+    tau_ext, flange = np.zeros(samples.q.shape), np.zeros((len(samples.time), 6))
+    poses, contacts = link_poses(chain, samples.q), dict[str, Array]()
+    for k, contact in enumerate(touching.mounted):
+        joint, wrench = contact.joint, wrenches[:, k]
+        turn = poses.rotation[:, joint - 1]
+        if contact.lever is not None:
+            flange += at_other_point(wrench, turn @ contact.turn @ contact.lever)
+            continue
+        contacts[contact.name] = wrench
+        point = poses.translation[:, joint - 1] + turn @ contact.point
+        for j in range(joint):
+            moved = at_other_point(wrench, point - poses.translation[:, j])
+            tau_ext[:, j] += np.sum(poses.rotation[:, j, :, 2] * moved[:, 3:], axis=1)
+    tau_ext += np.einsum("tkn,tk->tn", flange_jacobian(chain, samples.q), flange)
+    tau_ext += sum(walks.values())
     return Truth(t=samples.stamp, tau_ext=tau_ext, wrench=flange, contacts=contacts, walks=walks)
 
 
 def at_other_point(wrench: Array, lever: Array) -> Array:
-    """A wrench referred to a point from which its own point lies `lever` (3,) [m] away. (6,)"""
-    return np.concatenate([wrench[:3], wrench[3:] + np.cross(lever, wrench[:3])])
+    """Wrenches (…, 6) about a point from which their own lies `lever` (…, 3) [m] away. (…, 6)"""
+    force, moment = np.split(wrench, 2, axis=-1)
+    return np.concatenate([force, moment + np.cross(lever, force)], axis=-1)
+
+
+class FlangeMotion(NamedTuple):
+    """The flange along a motion, base axes."""
+
+    rotation: Array  # (M, 3, 3)
+    position: Array  # (M, 3) [m]
+    twist: Array  # linear, angular (M, 6) [m/s, rad/s]
+    jacobian: Array  # about the flange (M, 6, n)
+
+
+def flange_motion(chain: Chain, q: Array, dq: Array) -> FlangeMotion:
+    """The flange at positions and velocities (M, n) [rad, rad/s]."""
+    poses, jacobian = link_poses(chain, q), flange_jacobian(chain, q)
+    twist = np.einsum("kij,kj->ki", jacobian, dq)
+    return FlangeMotion(poses.rotation[:, -1], poses.translation[:, -1], twist, jacobian)

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from vftcli.admittance.law import controllers
-from vftcli.admittance.parameters import from_table
+from vftcli.admittance.law import controllers, from_table
 from vftcli.admittance.replay import Replay, replay, replay_release
 from vftcli.robots import load_robot
 from vftcli.signals.remarks import fact
@@ -20,7 +19,7 @@ def release() -> Replay:
     robot = load_robot("ur5")
     p = from_table(robot.admittance, robot.name, {})
     x = np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
-    return replay_release(x, robot, p, controllers(p), start=START, duration=2.0)
+    return replay_release(x, robot, controllers(p), start=START, duration=2.0)
 
 
 @pytest.fixture(scope="session")
@@ -33,4 +32,4 @@ def push() -> Replay:
     values[(t > 1.0) & (t < 1.6), 1] = 24.0
     wrench = Wrench(name="push", t=t, values=values, frame="base")
     source = fact("force-of-sensor", frame="a push")
-    return replay(wrench, np.tile(START, (500, 1)), robot, p, controllers(p), source=source)
+    return replay(wrench, np.tile(START, (500, 1)), robot, controllers(p), source=source)

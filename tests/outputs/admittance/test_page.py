@@ -4,8 +4,7 @@ import re
 import numpy as np
 import pytest
 
-from vftcli.admittance.law import judge, variable
-from vftcli.admittance.parameters import from_table
+from vftcli.admittance.law import from_table, variable
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance import (
     UNITS,
@@ -82,7 +81,7 @@ def test_damping_ratios(name: str, figures: tuple[str, str], release: Replay) ->
 
 def test_the_escape_bound_of_the_ur5s_rotation(release: Replay) -> None:
     assert "18°" in why("Rotation has a speed limit.", release)
-    bound = judge(variable(parameters("ur5"))).escape[3]
+    bound = variable(parameters("ur5")).escape[3]
     assert np.degrees(bound) == pytest.approx(18.0, abs=0.5)
 
 

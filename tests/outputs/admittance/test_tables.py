@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vftcli.admittance.law import controllers
 from vftcli.admittance.replay import Replay
 from vftcli.outputs.admittance_tables import (
     COLUMNS,
@@ -54,7 +55,8 @@ def test_rows_for_machines_are_not_rounded(release: Replay) -> None:
 )
 def test_equal_axes_are_told_once(release: Replay, values: list[float], text: str) -> None:
     parameters = replace(release.parameters, speed_limit=np.array(values, dtype=float))
-    assert f"limit {text}; Ts" in parameter_text(replace(release, parameters=parameters))
+    changed = replace(release, controllers=controllers(parameters))
+    assert f"limit {text}; Ts" in parameter_text(changed)
 
 
 def test_parameters_of_the_profile(release: Replay) -> None:
@@ -77,5 +79,5 @@ def test_stability_is_told_of_the_worst_axis(release: Replay) -> None:
     assert first[1] == "position"
     assert first[2] == pytest.approx(expected)
     assert [row[1] for row in stability_grid(release).rows] == ["position", "rotation"] * len(
-        release.verdicts
+        release.controllers
     )

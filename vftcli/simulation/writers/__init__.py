@@ -6,6 +6,7 @@ later: commas, six significant digits.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,11 +17,15 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
-from vftcli.simulation.experiment import AXES, Simulation, Truth, flat
+from vftcli.signals.pose import log_matrix
+from vftcli.signals.wrench import AXES
+from vftcli.simulation.arm import rigid_torque
+from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth, flat
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
+from vftcli.simulation.trajectories import Reference
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
-from vftcli.simulation.writers.signals import joint_signals, vendor_signals
+from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
 #: Column → its signal or its constants, one a column; "-NAME" is minus the signal, "next NAME" the
 #: row that follows, the last repeated: a command is executed one cycle later.
@@ -89,6 +94,81 @@ SHORT = ("timestamp", "target_q", "target_qd", "target_current", "target_moment"
 TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wrench.
 #: Of the wrench of one contact elsewhere on the arm.
 AT_CONTACT = "base axes, moment about the point that is touched"
+
+
+def joint_signals(simulation: Simulation) -> dict[str, Array]:
+    """Signals by name, one column a joint; those that the robot has. (M, n) each"""
+    samples, measured, vendor = simulation.samples, simulation.measured, simulation.vendor
+    table = {"q": measured.q, "dq": measured.dq}
+    if measured.current is not None and vendor.target_current is not None:
+        table |= {"current": measured.current, "target_current": vendor.target_current}
+    else:
+        table["tau"] = measured.torque
+    table |= {
+        "target_q": samples.target_q,
+        "target_dq": samples.target_dq,
+        "target_torque": vendor.target_torque,
+        "tau_ext": vendor.tau_ext,
+        "temperature": measured.temperature,
+    }
+    if simulation.force_sensor is not None:
+        table["wrench"] = simulation.force_sensor
+    return table
+
+
+def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
+    """Signals of vendors' tables by name, to be called. (M, …) each
+
+    With no tool set the TCP is the flange.
+    """
+    import pinocchio as pin
+
+    samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
+    target, time = simulation.target, measured.stamp + simulation.scenario.sensing.start
+    still = np.zeros_like(samples.target_q)
+    resting = Reference(samples.target_q, still, still)
+
+    def accelerometer() -> Array:
+        weightless = np.gradient(samples.target_dq, samples.time, axis=0)
+        felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
+        return np.asarray(np.einsum("kji,kj->ki", target.rotation, felt))
+
+    def momentum() -> Array:
+        data, states = model.createData(), zip(measured.q, measured.dq, strict=True)
+        linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
+        return np.array([np.linalg.norm(vector) for vector in linear])
+
+    def matrix() -> Array:
+        pose = np.zeros((len(samples.time), 4, 4))
+        pose[:, :3, :3], pose[:, :3, 3], pose[:, 3, 3] = target.rotation, target.position, 1.0
+        return pose.transpose(0, 2, 1).reshape(-1, 16)
+
+    joints = joint_signals(simulation)
+    return {
+        **{name: partial(joints.__getitem__, name) for name in joints},
+        "time": lambda: time,
+        "milliseconds": lambda: np.rint(time * 1e3).astype(int),
+        "target_ddq": lambda: samples.target_ddq,
+        "pose": lambda: pose_of(simulation.actual),
+        "twist": lambda: simulation.actual.twist,
+        # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
+        "force": lambda: (
+            wrench_of(
+                simulation.vendor.tau_ext, simulation.actual.jacobian, left_out=LEAST_SIGMA
+            ).values
+        ),
+        "target_pose": lambda: pose_of(target),
+        "target_matrix": matrix,
+        "target_twist": lambda: target.twist,
+        "accelerometer": accelerometer,
+        "momentum": momentum,
+        "torque_command": lambda: simulation.vendor.target_torque - rigid_torque(model, resting),
+    }
+
+
+def pose_of(flange: FlangeMotion) -> Array:
+    """Positions and rotation vectors. (M, 6) [m, rad]"""
+    return np.hstack([flange.position, log_matrix(flange.rotation)])
 
 
 class VendorTable(NamedTuple):

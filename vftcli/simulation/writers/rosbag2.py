@@ -16,8 +16,7 @@ from vftcli.readers.bags.ros_messages import (
     stamped,
 )
 from vftcli.signals.arrays import Array
-from vftcli.simulation.experiment import Simulation
-from vftcli.simulation.writers.signals import flange_signals
+from vftcli.simulation.experiment import FlangeMotion, Simulation
 from vftcli.virtual_sensor.solvers import wrench_of
 
 RECEIVED_LATER_NS = 400_000  #: How long after its stamp a message reaches the recorder. [ns]
@@ -101,8 +100,8 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
         signal[rows] for signal in (seen.q, seen.dq, samples.target_q, samples.target_dq)
     )
     actual, target = (
-        flange_signals(simulation.nominal.model, *motion)
-        for motion in ((q, dq), (target_q, target_dq))
+        FlangeMotion(*(part[rows] for part in flange))
+        for flange in (simulation.actual, simulation.target)
     )
     tau_ext = -vendor.tau_ext[rows]
     force, regular = wrench_of(tau_ext, actual.jacobian)
