@@ -249,20 +249,18 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
     check_kind(chain, Chain, "the chain", "robot.chain")
     check_series(q, chain.joints, "q", "the poses")
     samples, n = np.shape(q)
-    rotation, translation = np.empty((samples, n + 1, 3, 3)), np.empty((samples, n + 1, 3))
-    R: Array = np.broadcast_to(np.eye(3), (samples, 3, 3))
-    o: Array = np.zeros((samples, 3))
-    cosine, sine = np.cos(q), np.sin(q)
-    for j in range(n):
-        o = o + R @ chain.translation[j]
-        R = R @ chain.rotation[j]
-        c, s = cosine[:, j, None], sine[:, j, None]
-        x, y = R[:, :, 0], R[:, :, 1]
-        R = np.stack([c * x + s * y, c * y - s * x, R[:, :, 2]], axis=2)
-        rotation[:, j], translation[:, j] = R, o
-    translation[:, n] = o + R @ chain.flange_translation
-    rotation[:, n] = R @ chain.flange_rotation
-    return LinkPoses(rotation, translation)
+    # Time is the last axis: every entry of a matrix is one row of the memory.
+    rotation, translation = np.empty((n + 1, 3, 3, samples)), np.empty((n + 1, 3, samples))
+    R, o = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, samples)), np.zeros((3, samples))
+    cosine, sine = np.cos(q.T), np.sin(q.T)
+    for j, (turn, offset) in enumerate(zip(chain.rotation, chain.translation, strict=True)):
+        o = o + offset @ R
+        x, y, z = np.moveaxis(turn.T @ R, 1, 0)
+        R = np.stack([cosine[j] * x + sine[j] * y, cosine[j] * y - sine[j] * x, z], axis=1)
+        rotation[j], translation[j] = R, o
+    translation[n] = o + chain.flange_translation @ R
+    rotation[n] = chain.flange_rotation.T @ R
+    return LinkPoses(rotation.transpose(3, 0, 1, 2), translation.transpose(2, 0, 1))
 
 
 def flange_jacobian(chain: Chain, q: Array) -> Array:
@@ -272,6 +270,8 @@ def flange_jacobian(chain: Chain, q: Array) -> Array:
     joint torques. Pinocchio's LOCAL_WORLD_ALIGNED.
     """
     poses = link_poses(chain, q)
-    axes = poses.rotation[:, :-1, :, 2]
-    arms = poses.translation[:, -1:, :] - poses.translation[:, :-1, :]
-    return np.concatenate([np.cross(axes, arms), axes], axis=2).transpose(0, 2, 1)
+    axes = poses.rotation[:, :-1, :, 2].transpose(2, 1, 0)
+    places = poses.translation.transpose(2, 1, 0)
+    (a, b, c), (x, y, z) = axes, places[:, -1:] - places[:, :-1]
+    rows = np.stack([b * z - c * y, c * x - a * z, a * y - b * x, *axes])
+    return np.ascontiguousarray(rows.transpose(2, 0, 1))
