@@ -63,7 +63,6 @@ FILES = (
     "robots/robot.py",
     "robots/described.py",
     "robots/robot_file.py",
-    "robots/writing.py",
     "signals/remarks.py",  # the catalogue of words
     "simulation/scenario.py",
     "simulation/writers/",

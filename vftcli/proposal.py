@@ -14,9 +14,9 @@ from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, list_touches, prepared, read
 from vftcli.robots.robot import Robot
+from vftcli.robots.robot_file import lines_of
 from vftcli.robots.run import Runs
 from vftcli.robots.terms import effort_name
-from vftcli.robots.writing import lines_of
 from vftcli.signals.errors import MissingSignalError, RobotError, VftError
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording

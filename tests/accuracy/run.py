@@ -29,13 +29,13 @@ import scenarios  # noqa: E402
 
 from vftcli.free_motion.free_motion import FreeMotion  # noqa: E402
 from vftcli.observers import spectra  # noqa: E402
-from vftcli.observers.auto_tuning import (  # noqa: E402
+from vftcli.observers.choice import ObserverChoice  # noqa: E402
+from vftcli.observers.table import Setup, build_observers  # noqa: E402
+from vftcli.observers.tuning import (  # noqa: E402
     kalman_smoother,
     natural_frequencies,
     tune_to_spectra,
 )
-from vftcli.observers.choice import ObserverChoice  # noqa: E402
-from vftcli.observers.table import Setup, build_observers  # noqa: E402
 from vftcli.refinement.whole_log import whole_log_bias  # noqa: E402
 from vftcli.robots.run import Run, RunSamples  # noqa: E402
 from vftcli.signals.rest import standing  # noqa: E402

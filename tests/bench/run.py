@@ -24,10 +24,10 @@ import polars as pl
 
 from vftcli.doctor import Examiner, examine
 from vftcli.observers import KalmanObserver
-from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.tuning import tune_to_spectra
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.readers import read
 from vftcli.reproduction.timing import (

@@ -12,7 +12,7 @@ from vftcli.contacts.search import (
     turned_round,
     two_state_odds,
 )
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import runs_of
 from vftcli.virtual_sensor.model_error import error_process

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import CREEP_SHARE, PUSHED_SHARE, STOP_SHARE
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
 from vftcli.virtual_sensor.model_error import (

@@ -13,7 +13,7 @@ from vftcli.contacts.windows import (
     learn_prior,
     smooth_lanes,
 )
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.terms import Blocks
 from vftcli.virtual_sensor.model_error import TorqueNoise, error_process
 
 

@@ -9,7 +9,7 @@ import pytest
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_load import FreeLoad, columns, free_load, weigh
 from vftcli.free_motion.free_motion import FreeMotion
-from vftcli.observers.auto_tuning import tune_to_spectra
+from vftcli.observers.tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.robots import load_robot

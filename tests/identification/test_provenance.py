@@ -17,7 +17,7 @@ from vftcli.identification.result import (
     number,
 )
 from vftcli.robots import Payload, load_robot
-from vftcli.robots.writing import robot_toml
+from vftcli.robots.profile import robot_toml
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
 

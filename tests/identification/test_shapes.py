@@ -15,8 +15,8 @@ from vftcli.identification.training import (
 )
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
+from vftcli.robots.profile import robot_toml
 from vftcli.robots.running_friction import RunningFriction
-from vftcli.robots.writing import robot_toml
 
 PANDA = load_robot("panda")
 

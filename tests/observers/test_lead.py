@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.lead import LEAD, LONGEST, estimate_from_rest, lead_samples, settling_samples
+from vftcli.observers.observer import (
+    LEAD,
+    LONGEST,
+    estimate_from_rest,
+    lead_samples,
+    settling_samples,
+)
 from vftcli.observers.paper import MomentumObserver
 from vftcli.robots import load_robot
 from vftcli.signals.external_torque import DynamicsTerms

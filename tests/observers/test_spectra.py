@@ -8,7 +8,7 @@ import pytest
 from made_runs import samples_of
 
 from vftcli.observers.spectra import Spectra, looks_free, neighbour_mean, spectra_of
-from vftcli.robots.disturbance import raw_disturbance
+from vftcli.robots.terms import raw_disturbance
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
 

@@ -9,7 +9,7 @@ import pytest
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
-from vftcli.observers.auto_tuning import tune_to_spectra
+from vftcli.observers.tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.refinement.refine import band_remarks, with_band

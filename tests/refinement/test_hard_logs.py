@@ -13,9 +13,9 @@ from vftcli.doctor.examination import Examiner
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers import MomentumObserver
-from vftcli.observers.auto_tuning import noise_level
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra
+from vftcli.observers.tuning import noise_level
 from vftcli.pipeline import AnalysisChoice, analyse
 from vftcli.refinement import refine
 from vftcli.refinement.baseline import Baselines, baseline_of

@@ -17,8 +17,8 @@ from vftcli.refinement.model_error import (
     usual_friction,
 )
 from vftcli.robots import load_robot
-from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.robot import JointFriction
+from vftcli.robots.terms import raw_disturbance
 
 
 def test_the_expected_errors_are_shares_of_the_robot_s_own_numbers():

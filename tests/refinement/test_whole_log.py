@@ -12,8 +12,8 @@ from vftcli.refinement.model_error import smooth_motion, usual_friction
 from vftcli.refinement.whole_log import stride_of, whole_log_bias
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.disturbance import raw_disturbance
 from vftcli.robots.run import Run
+from vftcli.robots.terms import raw_disturbance
 from vftcli.signals.recording import Recording
 
 sys.path.append(str(Path(__file__).parents[1] / "accuracy"))
@@ -244,8 +244,8 @@ def test_real_pushes_come_out_better(logs):
     """free_12harm, seed 1: half of what the tuned smoother is off without; measured .51."""
     from planted_pushes import planted
 
-    from vftcli.observers.auto_tuning import tune_to_spectra
     from vftcli.observers.spectra import spectra_of
+    from vftcli.observers.tuning import tune_to_spectra
     from vftcli.readers.library import Library
     from vftcli.readers.reader import ReadChoice
     from vftcli.robots.run import RunSamples

@@ -21,7 +21,7 @@ from made_urdfs import (
 
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.writing import robot_toml
+from vftcli.robots.profile import robot_toml
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.remarks import Remark

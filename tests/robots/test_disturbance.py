@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from vftcli.robots.disturbance import (
+from vftcli.robots.terms import (
     disturbance_blocks,
     disturbance_impulse,
     disturbance_stretches,

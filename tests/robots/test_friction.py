@@ -20,7 +20,7 @@ from vftcli.robots.friction import (
     sigmoid,
     steady_torque,
 )
-from vftcli.robots.writing import robot_toml
+from vftcli.robots.profile import robot_toml
 from vftcli.signals.errors import ParameterError, RobotError
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vftcli.robots.arm import MOST, BodyTree, TreeJoint
 from vftcli.robots.chain import Body
-from vftcli.robots.tree import MOST, BodyTree, TreeJoint
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose, rotation_about
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from vftcli.robots import PROFILES, JointFriction, Payload, load_robot
-from vftcli.robots.writing import lines_of, robot_toml, value_text
+from vftcli.robots.profile import robot_toml
+from vftcli.robots.robot_file import lines_of, value_text
 from vftcli.signals.errors import RobotError
 
 CHAIN = ("rotation", "translation", "mass", "com", "inertia", "rotor_inertia", "gravity")

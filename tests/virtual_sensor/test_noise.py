@@ -8,9 +8,9 @@ from made_runs import samples_of
 from scipy.optimize import minimize
 
 from vftcli.robots import load_robot
-from vftcli.robots.disturbance import Blocks
 from vftcli.robots.friction import REST_SHARE, dry_torques
 from vftcli.robots.run import RunSamples
+from vftcli.robots.terms import Blocks
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.rest import NEAR_REST
 from vftcli.virtual_sensor.model_error import (

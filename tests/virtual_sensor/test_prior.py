@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.virtual_sensor.model_error import TorqueNoise
 from vftcli.virtual_sensor.smoother import GRID, LEVER, BlockModel, WrenchPrior, gated

@@ -11,9 +11,9 @@ from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.disturbance import Blocks
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms

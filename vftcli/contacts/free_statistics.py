@@ -13,9 +13,9 @@ from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.refinement.whole_log import WholeLogBias
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.friction import NEAR_REST_SHARE, dry_torques
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.least_squares import robust_sd

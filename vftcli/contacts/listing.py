@@ -36,8 +36,8 @@ from vftcli.free_motion.free_load import FreeLoad
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.disturbance import disturbance_blocks
 from vftcli.robots.run import Run
+from vftcli.robots.terms import disturbance_blocks
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording

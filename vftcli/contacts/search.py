@@ -31,8 +31,8 @@ from vftcli.contacts.windows import (
     learn_prior,
     smooth_lanes,
 )
-from vftcli.robots.disturbance import Blocks, disturbance_blocks
 from vftcli.robots.run import Run
+from vftcli.robots.terms import Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import SPIKE
 from vftcli.signals.series import covered, intervals, runs_of

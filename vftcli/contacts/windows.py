@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.places import ContactPlace
-from vftcli.robots.disturbance import Blocks
+from vftcli.robots.terms import Blocks
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import (
     SPIKE,

@@ -23,8 +23,8 @@ from vftcli.identification.result import (
 )
 from vftcli.identification.targets import targets_method
 from vftcli.identification.training import Training, prepare_training
+from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
-from vftcli.robots.writing import robot_document
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 
 #: Name at the command line → method; without a name the first two are chosen between.

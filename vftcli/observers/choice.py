@@ -34,9 +34,9 @@ def source_of(source: str | Path) -> "str | Path | Goal":
     if text in {PAPER_GAINS, LOG_GAINS}:
         return text
     if text.startswith(("delay=", "bandwidth=")):
-        from vftcli.observers.tuning import parse_target
+        from vftcli.observers.tuning import parse_goal
 
-        return parse_target(text)
+        return parse_goal(text, allowed=("delay", "bandwidth"))
     if text.startswith("false-alarms="):
         raise ParameterError(
             f"--gains {text}: vftcli identify --method gains writes a file for this goal; give its "
@@ -195,7 +195,7 @@ class ObserverChoice(Choice):
 
     def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
         """Run one of the observers over a log, from where it is to start."""
-        from vftcli.observers.lead import estimate_from_rest
+        from vftcli.observers.observer import estimate_from_rest
 
         return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
 

@@ -16,7 +16,7 @@ References:
     Int. J. Control 18(1), 1973, for the form used here.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -80,14 +80,8 @@ class KalmanSmoother(Shown):
         # In units of ω_n: x⁴ + c x² + 1 = √2 with c = Q_p/√(Q_τR) = 4ζ² − 2.
         c = 4.0 * causal.zeta**2 - 2.0
         x = np.sqrt(0.5 * (-c + np.sqrt(c**2 + 4.0 * (np.sqrt(2.0) - 1.0))))
-        return Tuning(
-            omega_n=causal.omega_n,
-            zeta=causal.zeta,
-            delay=np.zeros(joints),
-            bandwidth=causal.omega_n * x / (2.0 * np.pi),
-            dc_gain=causal.dc_gain,
-            parameter_count=causal.parameter_count,
-        )
+        bandwidth = causal.omega_n * x / (2.0 * np.pi)
+        return replace(causal, delay=np.zeros(joints), bandwidth=bandwidth)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Two-sided gain in the middle of a log: real, no delay. (F, n)"""

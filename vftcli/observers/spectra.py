@@ -30,9 +30,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.robots.disturbance import disturbance_stretches
 from vftcli.robots.friction import HELD
 from vftcli.robots.run import RunSamples
+from vftcli.robots.terms import disturbance_stretches
 from vftcli.signals.arrays import Array, Mask, handed_over, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.filters import welch

@@ -261,7 +261,7 @@ def build_rts(setup: Setup, _: str) -> Built:
 
 def build_auto(setup: Setup, name: str) -> Built:
     """An observer with the log's gains, else with those set by hand, as densities."""
-    from vftcli.observers.auto_tuning import AutoTuned, tune_to_spectra
+    from vftcli.observers.tuning import AutoTuned, tune_to_spectra
 
     if (spectra := setup.shown.under(name)) is not None:
         return tune_to_spectra(name, spectra), ()

@@ -1,33 +1,42 @@
-"""Gains for a goal: least error, one delay or bandwidth, few false alarms."""
+"""Gains for a goal: least error by a log's spectra, one delay or bandwidth, few false alarms.
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
-from typing import Any, NamedTuple, cast
+A Kalman filter's ω_n trades the external torque that its lag leaves out against the noise that
+passes. Both follow from the spectra of the log's free and loaded part, without a guess:
+
+    ω_n = argmin ∫ |1 − H(ω_n)|² S_τ + |H(ω_n)|² S_n df,  joint by joint, ζ = 1/√2
+
+with the filter's exact complex response H, or the smoother's real one.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 
-from vftcli.observers.auto_tuning import (
-    Curve,
-    Kind,
-    bound_remarks,
-    error_curve,
-    expected_error,
-    kalman_filter,
-    kalman_smoother,
-    natural_frequencies,
-    noise_level,
-)
-from vftcli.observers.observer import Complex, Observer
+from vftcli.observers.observer import Complex, Observer, Tuning
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
+from vftcli.observers.smoother import KalmanSmoother
 from vftcli.observers.spectra import Spectra
-from vftcli.observers.table import Setup
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.parsing import numbers
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import Remark, Where, fact, warning
+from vftcli.signals.shown import Shown
 
-#: Kalman filter and smoother, of which R and Q_τ follow from the natural frequencies.
-KALMAN: dict[str, Kind] = {"kfo-zoh": kalman_filter, "kfo-rts": kalman_smoother}
+if TYPE_CHECKING:
+    from vftcli.observers.table import Setup
+
+SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
+#: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
+#: passes 1/(1 + (ω/ω_n)⁴). A joint without a push may be pushed next. [rad/s]
+SLOWEST_BEST = 9.0
+FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
+TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
+LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
+#: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
+FINEST = 1e-6
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
 #: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
 GOALS = {
@@ -45,6 +54,137 @@ KNOBS: dict[type, tuple[str, float, float]] = {
 }
 
 
+def momentum(rate: Array) -> Observer:
+    """A momentum observer. Its response is the filtered dynamics observer's too."""
+    return MomentumObserver(gain=rate)
+
+
+def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
+    """Kalman observer of ω_n at ζ = 1/√2: Q_τ = R ω_n⁴, Q_p = 0. (n,)"""
+    density = np.broadcast_to(np.asarray(r, dtype=np.float64), omega_n.shape)
+    return KalmanObserver(
+        discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
+    )
+
+
+def kalman_smoother(omega_n: Array, r: Array | float = 1.0) -> KalmanSmoother:
+    """Smoother of these ω_n at ζ = 1/√2. (n,) [rad/s]"""
+    return KalmanSmoother(filter=kalman_filter(omega_n, r))
+
+
+#: Natural frequencies (n,) [rad/s], and R if not 1 → observer.
+Kind = Callable[..., Observer]
+#: Name of an observer that takes its gains from a log → what is tuned.
+KINDS: dict[str, Kind] = {
+    "best": kalman_smoother,
+    "kfo-auto": kalman_filter,
+    "rts-auto": kalman_smoother,
+}
+#: Kalman filter and smoother, of which R and Q_τ follow from the natural frequencies.
+KALMAN: dict[str, Kind] = {"kfo-zoh": kalman_filter, "kfo-rts": kalman_smoother}
+
+
+class Curve(NamedTuple):
+    """Expected error of a kind of filter by its natural frequency."""
+
+    omega_n: Array  #: Natural frequencies tried. (G,) [rad/s]
+    rmse: Array  #: Expected error. (G, n) [N·m]
+
+    @property
+    def best(self) -> Array:
+        """The best natural frequency. (n,) [rad/s]"""
+        return np.asarray(self.omega_n[np.argmin(self.rmse, axis=0)])
+
+    @property
+    def least(self) -> Array:
+        """The expected error at the best. (n,) [N·m]"""
+        return np.asarray(self.rmse.min(axis=0))
+
+
+def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
+    """Natural frequencies to try at a sample time. (G,) [rad/s]"""
+    found: Array = np.geomspace(SLOWEST, FASTEST / step, TRIED)
+    return np.asarray(found[found >= min(slowest, found[-1])])
+
+
+def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve:
+    """Expected errors of natural frequencies, and the best."""
+    omega_n = natural_frequencies(spectra.step, slowest)
+    # Each natural frequency is a joint of one observer: one call gives all responses.
+    response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
+    missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
+    passed = (np.abs(response) ** 2).T @ spectra.noise
+    return Curve(omega_n, np.asarray(np.sqrt((missed + passed) * spectra.width)))
+
+
+def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
+    """A warning on joints (n,) at a bound of the natural frequencies tried (G,), if any. [rad/s]
+
+    At the slowest the spectra do not separate external torque from noise; at the fastest, not
+    noise from external torque.
+    """
+    found = []
+    reached = {"slowest": (rate <= grid[0], grid[0]), "fastest": (rate >= grid[-1], grid[-1])}
+    for end, (joints, bound) in reached.items():
+        if joints.any():
+            where = Where(name, tuple(int(j) + 1 for j in np.flatnonzero(joints)))
+            found.append(warning(f"gain-at-{end}", where, rate_rad_s=float(bound)))
+    return tuple(found)
+
+
+def noise_level(omega_n: Array, spectra: Spectra) -> Array:
+    """R at which the innovations have the variance the filter expects. (n,)
+
+    Gains depend on Q/R alone; R scales the covariance. The innovation is the estimate's jump,
+    ν = (τ̂ᵗ − τ̂ᵗ⁻¹)/L₂, so its variance follows from S_d. That may be zero, or too small where few
+    impacts extrapolate S_d, and no filter runs on R = 0: R is at least `LEAST_SHARE` of S_n's R and
+    the noise of `FINEST`, a torque that is constant over a sample.
+    """
+    n, unit = len(omega_n), kalman_filter(omega_n)
+    settled = unit.steady(spectra.step, n)
+    response = unit.frequency_response(spectra.frequency, spectra.step, n)
+    jump = 2.0 * np.sin(np.pi * spectra.frequency * spectra.step)[:, None]
+    share = (np.abs(response) * jump / settled.l2) ** 2
+    both, noise = (
+        np.sum(share * density, axis=0) * spectra.width
+        for density in (spectra.loaded, spectra.free)
+    )
+    scale = np.maximum(both, LEAST_SHARE**2 * noise) / settled.S
+    return np.asarray(np.maximum(scale, FINEST**2 * spectra.step**3))
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class AutoTuned(Shown):
+    """An observer with gains from the log, or set by hand."""
+
+    name: str  #: Command-line name.
+    observer: Observer  #: The observer.
+    #: The expected error; None for set gains.
+    curve: Curve | None = field(default=None, repr=False)
+
+    def estimate(self, terms: DynamicsTerms) -> ExternalTorque:
+        """Estimate of a log; joints without a number are not finite."""
+        with np.errstate(all="ignore"):
+            return replace(self.observer.estimate(terms), name=self.name)
+
+    def tuning(self, step: float, joints: int) -> Tuning:
+        """Meaning of the gains at a sample time; none to set if the log set them. [s]"""
+        meaning = self.observer.tuning(step, joints)
+        return replace(meaning, parameter_count=0) if self.curve is not None else meaning
+
+    def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
+        """Complex gain from torque to estimate at `frequency` [Hz]. (F, n)"""
+        return self.observer.frequency_response(frequency, step, joints)
+
+
+def tune_to_spectra(name: str, spectra: Spectra) -> AutoTuned:
+    """The observer `name` with the spectra's natural frequencies."""
+    found = error_curve(KINDS[name], spectra, SLOWEST_BEST if name == "best" else SLOWEST)
+    best = frozen(found.best)
+    observer = KINDS[name](best, noise_level(best, spectra))
+    return AutoTuned(name=name, observer=observer, curve=found)
+
+
 class Goal(NamedTuple):
     """A goal of gains."""
 
@@ -54,10 +194,12 @@ class Goal(NamedTuple):
     threshold: Array | None = None
 
 
-def parse_target(text: str, allowed: Iterable[str] = ("delay", "bandwidth")) -> Goal:
-    """Read one of some goals of ``--gains``: ``auto``, the others as ``delay=S``."""
+def parse_goal(
+    text: str, threshold: str | None = None, allowed: Iterable[str] = tuple(GOALS)
+) -> Goal:
+    """What ``--gains`` asks for, of some `GOALS`, and ``alarm.threshold``, positive. [N·m]"""
     name, equals, number = text.partition("=")
-    name = name.strip()
+    name, level = name.strip(), None
     try:
         value = float(number)
     except ValueError:
@@ -65,11 +207,22 @@ def parse_target(text: str, allowed: Iterable[str] = ("delay", "bandwidth")) -> 
     if name not in allowed or not (0.0 < value < np.inf if name != "auto" else not equals):
         forms = " or ".join(GOALS[each] for each in allowed)
         raise ParameterError(f"--gains {text!r} is not {forms}, a positive number")
-    return Goal(name, value)
+    if threshold is not None:
+        level = np.array(numbers(threshold) or [np.nan])
+        if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
+            raise ParameterError(
+                f"alarm.threshold={threshold} is not a positive number or one a joint [N·m]"
+            )
+    if name == "false-alarms" and level is None:
+        raise ParameterError(
+            "--gains false-alarms needs to know what raises an alarm: add --set "
+            "alarm.threshold=N·m, one number or one a joint"
+        )
+    return Goal(name, value, level)
 
 
 def match_observers(
-    observers: Sequence[Observer], goal: Goal, setup: Setup
+    observers: Sequence[Observer], goal: Goal, setup: "Setup"
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
     """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
 
@@ -154,29 +307,6 @@ class Tuned(NamedTuple):
         return {key: value for key, value in self._asdict().items() if key != "running"}
 
 
-def parse_goal(text: str, threshold: str | None = None) -> Goal:
-    """What ``--gains`` asks for, any of `GOALS`, and ``alarm.threshold``, positive. [N·m]"""
-    goal = parse_target(text, GOALS)
-    level = None
-    if threshold is not None:
-        level = np.array(numbers(threshold) or [np.nan])
-        if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
-            raise ParameterError(
-                f"alarm.threshold={threshold} is not a positive number or one a joint [N·m]"
-            )
-    if goal.name == "false-alarms" and level is None:
-        raise ParameterError(
-            "--gains false-alarms needs to know what raises an alarm: add --set "
-            "alarm.threshold=N·m, one number or one a joint"
-        )
-    return goal._replace(threshold=level)
-
-
-def momentum(rate: Array) -> Observer:
-    """A momentum observer. Its response is the filtered dynamics observer's too."""
-    return MomentumObserver(gain=rate)
-
-
 def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     """Gains of FDO, GMO, KFO and smoother for a goal, one line an observer.
 
@@ -191,8 +321,8 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
     shared = float(np.min(first_order))
     if goal.name == "auto":
-        grid = natural_frequencies(step)
-        shared = float(grid[np.argmin(expected_error(momentum, grid, spectra).mean(axis=1))])
+        curve = error_curve(momentum, spectra)
+        shared = float(curve.omega_n[np.argmin(curve.rmse.mean(axis=1))])
     lines: dict[str, tuple[Observer, Array, dict[str, Any]]] = {
         "fdo": (FilteredDynamicsObserver(omega=shared), np.full(n, shared), {"omega": shared}),
         "gmo": (momentum(first_order), first_order, {"gain": first_order.tolist()}),
@@ -235,20 +365,20 @@ def bounds_reached(tuned: Sequence[Tuned], spectra: Spectra, goal: Goal) -> tupl
 
 def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
     """The rate of each joint that reaches the goal. (n,) [rad/s]"""
-    grid = natural_frequencies(spectra.step)
+    n, step = spectra.joints, spectra.step
     if goal.name == "false-alarms" and goal.threshold is not None:
-        few = few_alarms(kind, grid, spectra, goal.threshold, goal.value)
+        curve = error_curve(kind, spectra)
+        few = few_alarms(kind, curve.omega_n, spectra, goal.threshold, goal.value)
         # The fastest that still raises few alarms: of the run of rates that do, its last.
-        fastest = len(grid) - 1 - np.argmax(few[::-1], axis=0)
-        best = np.argmin(expected_error(kind, grid, spectra), axis=0)
-        return np.asarray(grid[np.where(few[best, np.arange(spectra.joints)], best, fastest)])
+        fastest = curve.omega_n[len(few) - 1 - np.argmax(few[::-1], axis=0)]
+        best_is_one = few[np.argmin(curve.rmse, axis=0), np.arange(n)]
+        return np.where(best_is_one, curve.best, fastest)
     if goal.name == "bandwidth" and kind is kalman_smoother:
-        fraction = float(kalman_smoother(np.ones(1)).tuning(spectra.step, 1).bandwidth[0])
-        return np.full(spectra.joints, goal.value / fraction)
+        fraction = float(kalman_smoother(np.ones(1)).tuning(step, 1).bandwidth[0])
+        return np.full(n, goal.value / fraction)
     if goal.name == "auto" or kind is kalman_smoother:
-        return np.asarray(grid[np.argmin(expected_error(kind, grid, spectra), axis=0)])
-    n, start = spectra.joints, kind(np.full(spectra.joints, 10.0))
-    return np.array(tune(start, goal, spectra.step, n).tuning(spectra.step, n).omega_n)
+        return error_curve(kind, spectra).best
+    return tune(kind(np.full(n, 10.0)), goal, step, n).tuning(step, n).omega_n
 
 
 def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
@@ -256,8 +386,7 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
     response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
     columns = range(len(grid))
     few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])
-    never = np.flatnonzero(~np.any(few, axis=0))
-    if len(never):
+    if len(never := np.flatnonzero(~np.any(few, axis=0))):
         read = np.sqrt(np.sum(spectra.noise, axis=0) * spectra.width)
         listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
         raise ParameterError(

@@ -12,7 +12,7 @@ from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
-from vftcli.observers.tuning import Tuned, tuning_curves
+from vftcli.observers.tuning import Curve, Tuned, tuning_curves
 from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
@@ -41,7 +41,7 @@ from vftcli.outputs.plots import (
     plots_of,
 )
 from vftcli.outputs.rmse_tables import block, logs_of
-from vftcli.robots.writing import lines_of
+from vftcli.robots.robot_file import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import check_known
@@ -50,7 +50,6 @@ if TYPE_CHECKING:
     import polars as pl
     from matplotlib.figure import Figure
 
-    from vftcli.observers.auto_tuning import Curve
     from vftcli.signals.arrays import Array
 
 #: Every figure that a log may have.

@@ -30,7 +30,7 @@ from vftcli.outputs.run_record import (
     robot_record,
     seal,
 )
-from vftcli.robots.writing import robot_toml
+from vftcli.robots.profile import robot_toml
 from vftcli.signals.errors import OutputError
 
 IDENTIFICATION_FIGURES = ("torque", "residuals")  #: Names of its figures.

@@ -9,7 +9,7 @@ from vftcli.contacts.threshold_check import ThresholdDetection
 from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.quantity import DASH, counted, significant
-from vftcli.robots.writing import lines_of
+from vftcli.robots.robot_file import lines_of
 
 #: A threshold in a call is a multiple of a hundredth: no robot tells less of a newton-metre.
 SHARES = 100

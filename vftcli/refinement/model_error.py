@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.robots.chain import Chain
-from vftcli.robots.disturbance import GAP
 from vftcli.robots.friction import dry_friction, steady_torque
 from vftcli.robots.kernels import CHUNK, momentum_terms
 from vftcli.robots.regressor import (
@@ -26,6 +25,7 @@ from vftcli.robots.regressor import (
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.robots.running_friction import play
+from vftcli.robots.terms import GAP
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.observers.auto_tuning import AutoTuned, Curve, bound_remarks
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.observer import Complex, Observer, Tuning
 from vftcli.observers.spectra import (
@@ -24,6 +23,7 @@ from vftcli.observers.spectra import (
     free_error,
 )
 from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.tuning import AutoTuned, Curve, bound_remarks
 from vftcli.refinement.baseline import Baseline, Baselines, FreeReading, free_reading
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.model_error import error_columns, friction_alone, smooth_motion

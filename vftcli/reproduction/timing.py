@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.auto_tuning import tune_to_spectra
 from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.spectra import Spectra, spectra_of
 from vftcli.observers.table import BEST, PAPER
+from vftcli.observers.tuning import tune_to_spectra
 from vftcli.reproduction.paper import AS_PRINTED, CORRECTED, PAPERS, RunResult
 from vftcli.robots import Robot, load_robot
 from vftcli.robots.run import Run, RunSamples

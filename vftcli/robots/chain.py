@@ -131,6 +131,9 @@ class Body(NamedTuple):
         return Body(self.mass, R @ self.com + r, R @ self.inertia @ R.T)
 
 
+NO_BODY = Body(0.0, np.zeros(3), np.zeros((3, 3)))  #: That of a link without mass.
+
+
 def merge_bodies(bodies: Sequence[Body]) -> Body:
     """One body of those that are joined rigidly, all in one frame (parallel axes)."""
     mass = float(sum(body.mass for body in bodies))

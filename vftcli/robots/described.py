@@ -21,10 +21,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from vftcli.robots.arm import BASE, LumpedArm, shortened
+from vftcli.robots.arm import BASE, BodyTree, LumpedArm, shortened
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.mjcf import mjcf_tree
 from vftcli.robots.profile import assemble, column
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
@@ -36,8 +35,7 @@ from vftcli.robots.robot_file import (
     robot_text,
     weightless,
 )
-from vftcli.robots.tree import BodyTree
-from vftcli.robots.urdf import urdf_tree
+from vftcli.robots.urdf import mjcf_tree, urdf_tree
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import did_you_mean, is_finite, shown

@@ -1,4 +1,4 @@
-"""Robot files: TOML, schema 1, read and checked, every complaint with the line that is wrong."""
+"""Robot files, TOML of schema 1: read and checked, and written so that the same robot is read."""
 
 import itertools
 import math
@@ -11,7 +11,7 @@ import numpy as np
 from vftcli.robots.chain import CONVENTIONS, Body, Chain, Payload, kinematics, symmetric, unphysical
 from vftcli.robots.friction import FRICTION_MODELS, PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section, weightless
+from vftcli.robots.robot_file import RobotFile, Section, is_table, lines_of, weightless
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import (
     NUMBER,
@@ -25,12 +25,14 @@ from vftcli.signals.parsing import (
     several,
     shown,
 )
-from vftcli.signals.pose import Pose, rpy_matrix
+from vftcli.signals.pose import Pose, rpy_angles, rpy_matrix
 from vftcli.signals.remarks import fact
 
 SCHEMA = 1
 UPRIGHT = (0.0, 0.0, -9.81)
 ORIGIN = (0.0, 0.0, 0.0)
+
+Table = dict[str, Any]
 
 
 def load_profile(path: Path) -> Robot:
@@ -277,3 +279,89 @@ def columns(
 ) -> dict[str, Array]:
     """The fields of a record, each a number a joint, by keys that begin with a prefix."""
     return {name: column(joints, prefix + name) for name in kind.__dataclass_fields__}
+
+
+AGREES = 1e-12  #: Relative difference below which a number of the file is taken to be unchanged.
+
+
+def robot_toml(robot: Robot, heading: Sequence[str] = ()) -> str:
+    """The robot as the text of a robot file, its words kept."""
+    comments = "".join(f"# {line}\n" for line in heading)
+    return comments + "".join(lines_of(robot_document(robot)))
+
+
+def robot_document(robot: Robot) -> Table:
+    """The tables of a robot's file, brought up to date. Schema 1."""
+    old = dict(robot.document)
+    if old.get("convention") not in CONVENTIONS:
+        old = xyz_rpy_document(robot)
+    tables = [dict(table) for table in old["joints"]]
+    update_inertials(tables, old, robot.chain)
+    for j, table in enumerate(tables):
+        table["rotor_inertia"] = float(robot.chain.rotor_inertia[j])
+        if robot.torque_constant is not None:
+            table["torque_constant"] = float(robot.torque_constant[j])
+        table.pop("friction", None)
+        if robot.friction and (friction := robot.friction[j].table):
+            table["friction"] = friction
+    document = {**old, "schema": SCHEMA, "name": robot.name, "title": robot.title or robot.name}
+    document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
+    document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
+    return {key: value for key, value in document.items() if value != {}}
+
+
+def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Chain) -> None:
+    """Put the chain's inertials into the joint tables, in their frames."""
+    _, frames, _ = kinematics(document["convention"], tables, document)
+    for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
+        R = frame.rotation
+        tensor = R.T @ chain.inertia[j] @ R
+        values = {
+            "mass": np.array(chain.mass[j]),
+            "com": R.T @ (chain.com[j] - frame.translation),
+            "inertia": tensor[np.triu_indices(3)],
+        }
+        for key, value in values.items():
+            scale = float(np.max(np.abs(value), initial=1e-12))
+            before = table.get(key)
+            if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
+                table[key] = value.tolist()
+
+
+def payload_tables(robot: Robot) -> Table:
+    """The ``[payload]`` section: what is mounted, and the loads that can be named."""
+    old = robot.document.get("payload", {})
+    tables = {} if robot.payload is None else kept_or_new(old, robot.payload)
+    for name, load in robot.payloads.items():
+        tables[name] = kept_or_new(old.get(name, {}), load)
+    return tables
+
+
+def kept_or_new(old: Table, payload: Payload) -> Table:
+    """The file's own section if it says the same mass, else a new one in flange axes."""
+    if old.get("mass") == payload.mass:
+        return {key: value for key, value in old.items() if not is_table(value)}
+    tensor = payload.inertia[np.triu_indices(3)].tolist()
+    return {"mass": payload.mass, "com": payload.com.tolist(), "inertia": tensor}
+
+
+def xyz_rpy_document(robot: Robot) -> Table:
+    """A document for a robot that came from a URDF: its chain, stated as xyz and rpy."""
+    chain = robot.chain
+    joints: list[Table] = []
+    figures = {**vars(robot.limits), **{f"noise_{k}": v for k, v in vars(robot.noise).items()}}
+    for j, name in enumerate(chain.names):
+        rpy = list(rpy_angles(chain.rotation[j]))
+        known = {key: float(of[j]) for key, of in figures.items() if math.isfinite(of[j])}
+        joints.append({"name": name, "xyz": chain.translation[j].tolist(), "rpy": rpy, **known})
+        if name in robot.endless:
+            joints[-1]["endless"] = True
+    # Which arm of a description it is and what is locked is settled: the chain is the arm's.
+    settled = {"joints", "tip", "lock"}
+    return {
+        **{key: value for key, value in robot.document.items() if key not in settled},
+        "convention": "xyz-rpy",
+        "ee_xyz": chain.flange_translation.tolist(),
+        "ee_rpy": list(rpy_angles(chain.flange_rotation)),
+        "joints": joints,
+    }

@@ -189,7 +189,7 @@ class Robot(Shown):
         """
         # The writers are several floors up; the robot itself knows nothing of them.
         write = import_module("vftcli.outputs.files").write_text
-        write(Path(file), import_module("vftcli.robots.writing").robot_toml(self), force)
+        write(Path(file), import_module("vftcli.robots.profile").robot_toml(self), force)
 
     def with_payload(self, payload: str | Payload | None) -> "Robot":
         """The robot with a load on its flange: a name from the file, a Payload, or None."""

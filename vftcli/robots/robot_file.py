@@ -1,4 +1,6 @@
-"""The text of a robot file, its tables and bounds, every complaint with the line that is wrong.
+"""The text of a robot file and its tables: read, bounds checked, written.
+
+Every complaint names the line that is wrong.
 
 Numbers beyond the bounds are a slip of the pen or of the unit. The bounds are wide on purpose, an
 order of magnitude or more beyond the largest arm built (2.3 t payload, 12 t of its own, 4.7 m
@@ -6,9 +8,11 @@ reach) and beyond any motion an arm can make: a file inside them may still be wr
 them cannot be right. A torque computed from numbers inside them is finite.
 """
 
+import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from datetime import date, time
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
@@ -244,3 +248,63 @@ def robot_text(path: Path, what: str = "robot file") -> str:
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text"
         raise RobotError(f"{path}: cannot be read as a {what} ({reason})") from None
+
+
+def lines_of(document: Mapping[str, Any], path: tuple[str, ...] = ()) -> Iterator[str]:
+    """The lines of a table: values, then tables, then arrays of tables."""
+    for key, value in document.items():
+        if not is_table(value) and not is_tables(value):
+            yield f"{bare(key)} = {value_text(value, '.'.join((*path, key)))}\n"
+    for key, value in document.items():
+        here = (*path, key)
+        name = ".".join(map(bare, here))
+        if is_table(value):
+            if any(not is_table(v) and not is_tables(v) for v in value.values()):
+                yield f"\n[{name}]\n" if path != ("joints",) else f"[{name}]\n"
+            yield from lines_of(value, here)
+        elif is_tables(value):
+            for table in value:
+                yield f"\n[[{name}]]\n"
+                yield from lines_of(table, here)
+
+
+def is_table(value: object) -> bool:
+    """Whether a value is a table."""
+    return isinstance(value, Mapping)
+
+
+def is_tables(value: object) -> bool:
+    """Whether a value is a list of tables, which may not be empty."""
+    return isinstance(value, list | tuple) and bool(value) and all(map(is_table, value))
+
+
+def bare(key: str) -> str:
+    """A key as TOML writes it: bare where it may be, else quoted."""
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else quoted(key)
+
+
+def quoted(text: str) -> str:
+    """A string in TOML's double quotes, with the escapes that these need."""
+    out = json.dumps(text, ensure_ascii=False)
+    return "".join(c if c.isprintable() else f"\\U{ord(c):08x}" for c in out)
+
+
+def value_text(value: Any, key: str) -> str:  # noqa: ANN401 - whatever TOML can hold
+    """A value as TOML; floats with as many digits as tell them apart."""
+    match value:
+        case str():
+            return quoted(value)
+        case int():  # true and false too
+            return json.dumps(value)
+        case float():
+            return repr(value) if math.isfinite(value) else str(value)
+        case list() | tuple():
+            return f"[{', '.join(value_text(item, key) for item in value)}]"
+        case Mapping():
+            pairs = (f"{bare(name)} = {value_text(item, key)}" for name, item in value.items())
+            return f"{{{', '.join(pairs)}}}"
+        case date() | time():  # a datetime is a date
+            return value.isoformat()
+        case np.ndarray() | np.generic():
+            return value_text(value.tolist(), key)
+    raise RobotError(f"{key}: a robot file cannot hold a {type(value).__name__}")

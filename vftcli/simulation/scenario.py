@@ -7,7 +7,7 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from vftcli.robots.writing import lines_of
+from vftcli.robots.robot_file import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import (
     LIST,

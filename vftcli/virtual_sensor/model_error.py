@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.friction import (
     CREEP_SHARE,
     PUSHED_SHARE,
@@ -32,6 +31,7 @@ from vftcli.robots.friction import (
 )
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import RunSamples
+from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask, median
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.linear_model import SPIKE, LinearModel, filtered

@@ -11,9 +11,9 @@ from vftcli.free_motion.free_load import FreeLoad, without_load
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.observers.observer import Observer
 from vftcli.robots.chain import link_poses
-from vftcli.robots.disturbance import disturbance_impulse
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import disturbance_impulse
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque

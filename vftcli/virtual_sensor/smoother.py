@@ -15,8 +15,8 @@ import numpy as np
 
 from vftcli.free_motion.free_load import FreeLoad
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.disturbance import TIE, Blocks, disturbance_blocks
 from vftcli.robots.run import Run, RunSamples
+from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
 from vftcli.signals.arrays import Array, Mask, is_uniform, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed

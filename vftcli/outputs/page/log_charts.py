@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.observers.auto_tuning import Curve
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
+from vftcli.observers.tuning import Curve
 from vftcli.outputs.charts import (
     REFERENCE,
     Chart,
