@@ -22,7 +22,7 @@ from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.parsing import numbers
-from vftcli.signals.remarks import Remark, Where, fact, warning
+from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.shown import Shown
 
 if TYPE_CHECKING:
@@ -35,8 +35,7 @@ SLOWEST_BEST = 9.0
 FASTEST = 2.0  #: Largest natural frequency to try, times the sample time. [rad]
 TRIED = 96  #: Natural frequencies to try, evenly in logarithm.
 LEAST_SHARE = 1e-3  #: Least R as a share of the noise in the free part. [1]
-#: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
-FINEST = 1e-6
+FINEST = 1e-6  #: Least torque of R: single precision keeps 1e-5 of 100 N·m. [N·m]
 HALVINGS = 70  #: Bisections of a gain's logarithm: its last digits are those of float64.
 #: Name of a goal → how a user writes it. A delay is that behind a slow ramp, a bandwidth at −3 dB.
 GOALS = {
@@ -45,8 +44,7 @@ GOALS = {
     "bandwidth": "bandwidth=HZ",
     "false-alarms": "false-alarms=PER_HOUR",
 }
-#: Observer → the parameter that is moved, the least value and the largest. [rad/s], [1/s] or Q_τ,
-#: the one number that moves a Kalman filter's ω_n alone.
+#: Observer → the parameter that moves its ω_n alone, the least value and the largest.
 KNOBS: dict[type, tuple[str, float, float]] = {
     FilteredDynamicsObserver: ("omega", 1e-3, 1e6),
     MomentumObserver: ("gain", 1e-3, 1e6),
@@ -55,7 +53,7 @@ KNOBS: dict[type, tuple[str, float, float]] = {
 
 
 def momentum(rate: Array) -> Observer:
-    """A momentum observer. Its response is the filtered dynamics observer's too."""
+    """A momentum observer, of the filtered dynamics observer's response."""
     return MomentumObserver(gain=rate)
 
 
@@ -123,13 +121,13 @@ def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
     At the slowest the spectra do not separate external torque from noise; at the fastest, not
     noise from external torque.
     """
-    found = []
-    reached = {"slowest": (rate <= grid[0], grid[0]), "fastest": (rate >= grid[-1], grid[-1])}
-    for end, (joints, bound) in reached.items():
-        if joints.any():
-            where = Where(name, tuple(int(j) + 1 for j in np.flatnonzero(joints)))
-            found.append(warning(f"gain-at-{end}", where, rate_rad_s=float(bound)))
-    return tuple(found)
+    low, high = float(grid[0]), float(grid[-1])
+    reached = (("slowest", rate <= low, low), ("fastest", rate >= high, high))
+    return tuple(
+        warning(f"gain-at-{end}", on_joints(joints)._replace(about=name), rate_rad_s=bound)
+        for end, joints, bound in reached
+        if joints.any()
+    )
 
 
 def noise_level(omega_n: Array, spectra: Spectra) -> Array:
@@ -170,7 +168,7 @@ class AutoTuned(Shown):
     def tuning(self, step: float, joints: int) -> Tuning:
         """Meaning of the gains at a sample time; none to set if the log set them. [s]"""
         meaning = self.observer.tuning(step, joints)
-        return replace(meaning, parameter_count=0) if self.curve is not None else meaning
+        return meaning if self.curve is None else replace(meaning, parameter_count=0)
 
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Complex gain from torque to estimate at `frequency` [Hz]. (F, n)"""
@@ -199,11 +197,8 @@ def parse_goal(
 ) -> Goal:
     """What ``--gains`` asks for, of some `GOALS`, and ``alarm.threshold``, positive. [N·m]"""
     name, equals, number = text.partition("=")
-    name, level = name.strip(), None
-    try:
-        value = float(number)
-    except ValueError:
-        value = float("nan")
+    name, level, values = name.strip(), None, numbers(number) or ()
+    value = values[0] if len(values) == 1 else float("nan")
     if name not in allowed or not (0.0 < value < np.inf if name != "auto" else not equals):
         forms = " or ".join(GOALS[each] for each in allowed)
         raise ParameterError(f"--gains {text!r} is not {forms}, a positive number")
@@ -224,10 +219,9 @@ def parse_goal(
 def match_observers(
     observers: Sequence[Observer], goal: Goal, setup: "Setup"
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
-    """Re-tune observers to one delay or −3 dB bandwidth per joint, with remarks on it.
+    """Observers with one delay behind a slow ramp, or −3 dB bandwidth, and remarks on it.
 
-    A Kalman filter keeps R and Q_p and moves Q_τ. Delay is that behind a slow ramp, 1/K or L₁/L₂ −
-    Ts/2; bandwidth is where the exact response has fallen to 1/√2 of that to a constant.
+    A Kalman filter keeps R and Q_p and moves Q_τ.
     """
     if setup.as_printed:
         raise ParameterError(
@@ -235,14 +229,12 @@ def match_observers(
             "--gains or --as-printed away"
         )
     tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
-    remarks = [
-        fact("delay-matched", delay_s=goal.value)
-        if goal.name == "delay"
-        else fact("bandwidth-matched", bandwidth_Hz=goal.value)
-    ]
+    remarks: tuple[Remark, ...] = (fact("bandwidth-matched", bandwidth_Hz=goal.value),)
+    if goal.name == "delay":
+        remarks = (fact("delay-matched", delay_s=goal.value),)
     if {"fdo", "gmo"} <= {observer.name for observer in tuned}:
-        remarks.append(fact("first-order-observers-alike"))
-    return tuned, tuple(remarks)
+        remarks += (fact("first-order-observers-alike"),)
+    return tuned, remarks
 
 
 def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
@@ -270,12 +262,10 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
 
     rising = goal.name == "bandwidth"
     a, b = (np.full(joints, np.log(limit)) for limit in (low, high))
-    ends = excess(a), excess(b)
-    if not np.all((np.minimum(*ends) <= 0.0) & (np.maximum(*ends) >= 0.0)):
+    if not np.all(excess(a) * excess(b) <= 0.0):
         unit, limit = "s", f"a delay of more than half a sample ({0.5 * step:g} s)"
         if rising:
-            unit = "Hz"
-            limit = f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)"
+            unit, limit = "Hz", f"a bandwidth well below half the sample rate ({0.5 / step:.4g} Hz)"
         raise ParameterError(
             f"no gain gives {observer.name} a {goal.name} of {goal.value:g} {unit} at "
             f"{1.0 / step:.4g} Hz; choose {limit}"
@@ -335,17 +325,11 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     tuned = []
     for name, (observer, rate, gains) in lines.items():
         response = observer.frequency_response(spectra.frequency, step, n)
-        line = Tuned(
-            observer=name,
-            section="kfo" if name == "kfo-zoh" else name,
-            gains=gains,
-            rate=rate,
-            delay=np.asarray(observer.tuning(step, n).delay),
-            rmse=np.sqrt(spectra.missed(response) + spectra.passed(response)),
-            alarms=None if threshold is None else alarms(response, spectra, threshold),
-            running=observer,
-        )
-        tuned.append(line)
+        rmse = np.sqrt(spectra.missed(response) + spectra.passed(response))
+        power = np.abs(response) ** 2 * spectra.noise * spectra.width
+        alarms = None if threshold is None else crossings(power, spectra.frequency, threshold)
+        section, delay = "kfo" if name == "kfo-zoh" else name, observer.tuning(step, n).delay
+        tuned.append(Tuned(name, section, gains, rate, delay, rmse, alarms, observer))
     return tuple(tuned)
 
 
@@ -384,10 +368,11 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
 def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most: float) -> Mask:
     """Whether a rate raises at most so many false alarms an hour. (G, n)"""
     response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
-    columns = range(len(grid))
-    few = np.array([alarms(response[:, [g]], spectra, threshold) <= most for g in columns])
+    noise = spectra.noise * spectra.width
+    powers = (np.abs(column[:, None]) ** 2 * noise for column in response.T)
+    few = np.array([crossings(one, spectra.frequency, threshold) <= most for one in powers])
     if len(never := np.flatnonzero(~np.any(few, axis=0))):
-        read = np.sqrt(np.sum(spectra.noise, axis=0) * spectra.width)
+        read = np.sqrt(np.sum(noise, axis=0))
         listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
         raise ParameterError(
             f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
@@ -395,12 +380,6 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
             "the bias"
         )
     return few
-
-
-def alarms(response: Complex, spectra: Spectra, threshold: Array) -> Array:
-    """Expected false alarms an hour beyond a threshold [N·m], of H (F, n) or (F, 1). (n,)"""
-    power = np.abs(response) ** 2 * spectra.noise * spectra.width
-    return crossings(power, spectra.frequency, threshold)
 
 
 def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
