@@ -150,7 +150,7 @@ class Analysis(Shown):
 
     def free_log(self, name: str | None = None) -> "FreeLog":
         """The log with what nobody touched, as an observer has it; for None as the model does."""
-        from vftcli.free_motion.free_load import without_load
+        from vftcli.free_motion.free_motion import without_load
         from vftcli.virtual_sensor.sensing import FreeLog, as_modelled
 
         if self.refinement is None:

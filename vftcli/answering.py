@@ -66,7 +66,8 @@ def free_thresholds(
     logs: Sequence[Opened], choice: AnalysisChoice, rate: float, *, anyway: bool
 ) -> FreeThresholds:
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
-    from vftcli.contacts.thresholds import compared_signals, find_thresholds
+    from vftcli.contacts.threshold_check import compared_signals
+    from vftcli.contacts.thresholds import find_thresholds
 
     models, opened = Runs(), choice.library.open_logs(logs, choice.read)
     runs = [modelled(*prepared(log, choice), choice, models) for log in opened]
@@ -93,7 +94,7 @@ def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
     Raises:
         ParameterError: If it shows contact plainly, unless it shall be used `anyway`.
     """
-    from vftcli.contacts.tail import SETTLING
+    from vftcli.contacts.thresholds import SETTLING
     from vftcli.evaluation.references import PLAIN, touches
 
     known = touches(run) if set(EFFORTS) & set(run.recording.signals) else ()

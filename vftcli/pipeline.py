@@ -373,14 +373,14 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     """Compare the estimates with a reference, where one is asked for."""
     if choice.reference is None:
         return analysis
-    from vftcli.evaluation import judgement
+    from vftcli.evaluation import references
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
     told = known_contacts(analysis, choice) if choice.reference.contacts else None
-    found = judgement.judge(analysis.motion, analysis.estimates, sensed, choice.reference, told)
+    found = references.judge(analysis.motion, analysis.estimates, sensed, choice.reference, told)
     if sensed is None:
         found = found._replace(virtual_sensor=analysis.virtual_sensor)
     remarks = analysis.remarks
     if choice.observers.of_robot_file:
-        remarks = judgement.with_measured_gap(remarks, found.errors, analysis.tunings)
+        remarks = references.with_measured_gap(remarks, found.errors, analysis.tunings)
     return replace(analysis, **found._asdict(), remarks=remarks)

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.contacts.thresholds import compared_signals
+from vftcli.contacts.threshold_check import compared_signals
 from vftcli.observers.paper import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.errors import RobotError
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 FIXTURES = Path(__file__).parent.parent.parent / "fixtures"
 

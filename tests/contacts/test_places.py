@@ -3,21 +3,21 @@
 import numpy as np
 import pytest
 
-from vftcli.contacts.places import (
+from vftcli.contacts.windows import (
     arm_parts,
     link_jacobian,
     places,
     point_fits,
 )
 from vftcli.robots import load_robot
-from vftcli.robots.chain import flange_jacobian
+from vftcli.robots.chain import flange_jacobian, link_poses
 
 Q = np.array([0.3, -1.2, 1.6, -1.9, -1.4, 0.5])
 
 
 def test_the_end_of_the_last_link_is_the_flange() -> None:
     chain = load_robot("ur5").chain
-    end = link_jacobian(chain, Q[None], 6, 1.0)
+    end = link_jacobian(link_poses(chain, Q[None]), 6, 1.0)
     np.testing.assert_allclose(end, flange_jacobian(chain, Q[None]), atol=1e-14)
     np.testing.assert_allclose(places(chain, Q[None])[0].jacobian, end, atol=1e-14)
 
@@ -33,7 +33,9 @@ def test_a_points_jacobian_is_how_it_moves(link: int) -> None:
     frame = pin.Frame("point", link, pin.SE3(np.eye(3), half), pin.FrameType.OP_FRAME)
     number = model.addFrame(frame)
     exact = pin.computeFrameJacobian(model, model.createData(), Q, number, pin.LOCAL_WORLD_ALIGNED)
-    np.testing.assert_allclose(link_jacobian(robot.chain, Q[None], link, 0.5)[0], exact, atol=1e-12)
+    np.testing.assert_allclose(
+        link_jacobian(link_poses(robot.chain, Q[None]), link, 0.5)[0], exact, atol=1e-12
+    )
 
 
 def test_joints_behind_a_place_do_not_feel_it() -> None:
@@ -54,7 +56,7 @@ def test_a_force_on_the_forearm_is_told_from_one_on_the_flange() -> None:
     chain = load_robot("ur5").chain
     force = np.array([20.0, -40.0, 30.0])
     for link, share in ((3, 0.5), (6, 1.0)):
-        torque = link_jacobian(chain, Q[None], link, share)[0, :3].T @ force
+        torque = link_jacobian(link_poses(chain, Q[None]), link, share)[0, :3].T @ force
         fits = point_fits(chain, Q, torque, np.full(6, 0.05))
         assert fits[0].misfit < 1.0
         # The prior of 100 N draws by (sd over lever over 100)², a millionth.

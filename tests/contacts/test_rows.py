@@ -8,18 +8,17 @@ from contact_logs import FIXTURES, motion
 from test_error_process import blocks, drawn, noise
 
 from vftcli.contacts.contact_list import ContactList
-from vftcli.contacts.places import PointFit
 from vftcli.contacts.rows import (
     ContactLocation,
     force_course,
-    from_flange,
     quiet_error,
     sensor_force,
     vendor_force,
 )
+from vftcli.contacts.windows import PointFit
 from vftcli.readers import read
 from vftcli.robots import load_robot
-from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
@@ -66,14 +65,6 @@ def test_a_sensors_force_needs_no_frame() -> None:
     assert sensor_force(still(), 0.5) is None
     # A field that the log's writer left at zero measures nothing.
     assert sensor_force(still(wrench=0.0 * wrench), 0.5) is None
-
-
-def test_a_points_arm_leads_from_the_flange() -> None:
-    run = still()
-    q = run.recording.q[0]
-    fit = PointFit(link=3, share=0.0, misfit=0.0, score=0.0, force=np.ones(3), band=1.0)
-    frames = link_poses(run.robot.chain, q[None]).translation[0]
-    np.testing.assert_allclose(from_flange(run.robot.chain, q, fit), frames[2] - frames[-1])
 
 
 def test_a_row_on_a_link_has_its_moment_about_the_flange() -> None:

@@ -7,7 +7,6 @@ from test_error_process import B
 from vftcli.contacts.search import quiet_pauses, split_at_turns, split_run
 from vftcli.contacts.windows import (
     START,
-    BlockLog,
     WindowWrench,
     contact_lanes,
     learn_prior,
@@ -15,6 +14,7 @@ from vftcli.contacts.windows import (
 )
 from vftcli.robots.terms import Blocks
 from vftcli.virtual_sensor.model_error import TorqueNoise, error_process
+from vftcli.virtual_sensor.smoother import BlockLog
 
 
 def wrench(size: list[float], sd: float) -> WindowWrench:

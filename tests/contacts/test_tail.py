@@ -7,7 +7,7 @@ per hour, for a large x at 36 000 e^−x: the level of a rate r is ln(36 000/r).
 import numpy as np
 import pytest
 
-from vftcli.contacts.tail import BLOCK, SETTLING, block_maxima, events, tail_of
+from vftcli.contacts.thresholds import BLOCK, SETTLING, block_maxima, events, tail_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 

@@ -5,14 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.contacts.thresholds import (
-    ComparedSignals,
-    Thresholds,
-    counted_alarms,
-    find_thresholds,
-    left_out,
-    worst_of,
-)
+from vftcli.contacts.threshold_check import counted_alarms, left_out
+from vftcli.contacts.thresholds import ComparedSignals, Thresholds, find_thresholds, worst_of
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source

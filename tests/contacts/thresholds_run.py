@@ -18,14 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.contacts.tail import BLOCK, SETTLING
-from vftcli.contacts.thresholds import (
-    ComparedSignals,
-    CountedAlarms,
-    compared_signals,
-    counted_alarms,
-    find_thresholds,
-)
+from vftcli.contacts.threshold_check import CountedAlarms, compared_signals, counted_alarms
+from vftcli.contacts.thresholds import BLOCK, SETTLING, ComparedSignals, find_thresholds
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run

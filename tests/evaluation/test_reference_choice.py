@@ -7,9 +7,8 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import references
-from vftcli.evaluation.judgement import reference_wrench
 from vftcli.evaluation.reference_choice import NAMES, ReferenceChoice
-from vftcli.evaluation.references import REFERENCES, make_reference
+from vftcli.evaluation.references import REFERENCES, make_reference, reference_wrench
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot
@@ -17,7 +16,7 @@ from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.recording import Recording
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 ROBOT = load_robot("ur5")
 T = 0.01 * np.arange(300)

@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.choice import FreeChoice
-from vftcli.free_motion.free_load import FreeLoad, columns, free_load, weigh
-from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, columns, free_load, weigh
 from vftcli.observers.tuning import tune_to_spectra
 from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
@@ -124,7 +123,7 @@ def test_what_lies_far_from_a_piece_is_not_heard(
     """e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 of signals up to 100 N·m, forward and back."""
     piece = RunSamples(Run(recording=log, robot=ROBOT), (log.t > 8) & (log.t < 9))
     near = columns(piece)
-    monkeypatch.setattr("vftcli.free_motion.free_load.HEARD", 100.0)
+    monkeypatch.setattr("vftcli.free_motion.free_motion.HEARD", 100.0)
     whole = columns(piece)
     assert near is not None
     assert whole is not None

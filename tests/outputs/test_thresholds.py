@@ -9,9 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.contacts.tail import tail_of
-from vftcli.contacts.threshold_check import CheckedContact, ThresholdDetection
-from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
+from vftcli.contacts.threshold_check import CheckedContact, CountedAlarms, ThresholdDetection
+from vftcli.contacts.thresholds import SignalThreshold, Thresholds, tail_of
 from vftcli.outputs.grid import terminal
 from vftcli.outputs.run_record import jsonable
 from vftcli.outputs.thresholds import (

@@ -8,7 +8,7 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.judgement import with_measured_gap
+from vftcli.evaluation.references import with_measured_gap
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
 from vftcli.refinement.refine import (

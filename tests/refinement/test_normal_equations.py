@@ -1,5 +1,7 @@
 """The normal equations against dense matrices, and the choice of loads against all of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from known_errors import drawn_error, shortened, ur10e, wrong_run
@@ -10,7 +12,7 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows, slow_loads, solve
+from vftcli.refinement.robust_fit import Rows, slow_loads
 
 JOINTS, STRIDE = 4, 10
 
@@ -63,8 +65,7 @@ def by_hand(A, d, weight, sd):
 def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
     """The group of loads is the one with the least objective and twice its columns."""
     A, P, sizes = dense(rows), rows.unknowns, rows.loads.sizes
-    every = np.ones(len(rows.d), dtype=bool)
-    found = solve(rows.all_sums(weight, every, [])[0], P, sizes, scale)
+    found = rows.solution(rows.sums(weight)[0], scale)
     costs, solutions = [], []
     for size in sizes:
         sd = np.concatenate([np.full(P, scale), np.ones(size)])
@@ -80,7 +81,8 @@ def test_the_solution_is_that_of_the_dense_matrix(rows, weight, scale):
 
 def test_the_model_alone_is_solved_alike(rows, weight):
     A, P = dense(rows), rows.unknowns
-    found = solve(rows.model_sums(weight), P, (0,))
+    alone = replace(rows, loads=rows.loads.none)
+    found = alone.solution(alone.sums(weight)[0])
     u, _ = by_hand(A[:, :, :P], rows.d, weight, np.ones(P))
     np.testing.assert_allclose(found.model, u, atol=1e-6)
     torque = np.einsum("tnp,p->tn", A[:, :, :P], u)
@@ -90,11 +92,12 @@ def test_the_model_alone_is_solved_alike(rows, weight):
 
 def test_the_spread_is_that_of_the_inverse(rows, weight):
     """diag(A N⁻¹ Aᵀ) with the loads' columns in N."""
-    A, P, sizes = dense(rows), rows.unknowns, rows.loads.sizes
-    every = np.ones(len(rows.d), dtype=bool)
-    found = solve(rows.all_sums(weight, every, [])[0], P, sizes[-1:], 0.3)
+    P, found = rows.unknowns, rows.solution(rows.sums(weight)[0], 0.3)
+    used = len(found.loads)
+    assert used > 0
+    A = dense(rows)[:, :, : P + used]
     flat = A.reshape(-1, A.shape[-1])
-    prior = np.concatenate([np.full(P, 0.3), np.ones(sizes[-1])]) ** -2.0
+    prior = np.concatenate([np.full(P, 0.3), np.ones(used)]) ** -2.0
     N = flat.T @ (flat * weight.ravel()[:, None]) + np.diag(prior)
     covariance = np.linalg.inv(N)[:P, :P]
     expected = np.sqrt(np.einsum("tnp,pq,tnq->tn", A[:, :, :P], covariance, A[:, :, :P]))
@@ -107,7 +110,7 @@ def test_sums_over_parts_are_sums_over_their_samples(rows, weight):
     taken = np.random.default_rng(6).uniform(size=samples) > 0.3
     places = np.arange(samples)
     parts = [(places >= 20) & (places < 90), (places >= 80) & (places < 200)]
-    whole, *sums = rows.all_sums(weight, taken, parts)
+    whole, *sums = rows.sums(weight, taken, parts)
     A = dense(rows)
     for part, found in zip(parts, sums, strict=True):
         kept = part & taken
@@ -126,6 +129,4 @@ def test_no_load_is_believed_where_there_is_none(rows):
     """Noise of a tenth of the scale gains less than two a column."""
     quiet = Rows(columns=rows.columns, loads=rows.loads,
                  d=np.random.default_rng(8).normal(0.0, 0.1, rows.d.shape))  # fmt: skip
-    every = np.ones(len(rows.d), dtype=bool)
-    sums = quiet.all_sums(np.ones(rows.d.shape), every, [])[0]
-    assert len(solve(sums, quiet.unknowns, quiet.loads.sizes).loads) == 0
+    assert len(quiet.solution(quiet.sums(np.ones(rows.d.shape))[0]).loads) == 0

@@ -10,14 +10,15 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows, slow_loads
 from vftcli.refinement.robust_fit import (
     LEAST_SCALE,
     LEAST_TORQUE,
+    Rows,
     first_fit,
     fit_robustly,
     free_samples,
     largest_around,
+    slow_loads,
 )
 from vftcli.signals.filters import zero_phase
 
@@ -61,7 +62,7 @@ def test_contacts_are_found_and_motion_is_not_called_contact(pushed):
 def test_the_error_is_fitted_as_if_nobody_had_pushed(pushed):
     """White noise of .3 N·m is .1 behind 6 Hz; less than a third of the error is left."""
     fit = fit_robustly(pushed, STRIDE * STEP, DRY)
-    found = fit.solved(pushed.all_sums(fit.weight, fit.free, [])[0])
+    found = pushed.solution(pushed.sums(fit.weight, fit.free)[0])
     left = pushed.d + pushed.modelled(found.model)
     rms = np.sqrt(np.mean(left[fit.free] ** 2, axis=0))
     before = np.sqrt(np.mean(pushed.d[fit.free] ** 2, axis=0))

@@ -3,42 +3,40 @@
 import numpy as np
 import pinocchio as pin
 import pytest
-from known_errors import motion
+from known_errors import motion, shortened, ur10e
 
-from vftcli.refinement.normal_equations import (
+from vftcli.refinement.robust_fit import (
     FORCE,
     MOMENT,
-    force_torque,
-    points_along,
     slow_loads,
 )
 from vftcli.robots import load_robot
 
 
-@pytest.mark.parametrize("name", ["ur5", "panda"])
-@pytest.mark.parametrize("joint", [2, 3])
-def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joint):
-    """J of the point on the link before, by Pinocchio: a frame there, in world axes."""
+@pytest.mark.parametrize(("name", "joints"), [("ur5", (2, 3)), ("panda", (3, 4))])
+def test_a_force_along_the_arm_is_felt_by_the_joints_before_it(name, joints):
+    """J of elbow and wrist on the links before, by Pinocchio: frames there, in world axes.
+
+    Joints from 0; of seven the axis of 5 passes where 6 is.
+    """
     robot = load_robot(name)
-    model = robot.model.copy()
-    point = pin.SE3(np.eye(3), robot.chain.translation[joint])
-    frame = model.addFrame(pin.Frame("point", joint, point, pin.FrameType.OP_FRAME))
-    data = model.createData()
     q = np.random.default_rng(1).uniform(-2.0, 2.0, (5, robot.joints))
-    for row, found in zip(q, force_torque(robot.chain, q, joint), strict=True):
-        J = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
-        np.testing.assert_allclose(found, J.T, atol=1e-12)
+    loads = slow_loads(robot.chain, np.arange(5.0), q)
+    for k, joint in enumerate(joints):
+        model = robot.model.copy()
+        point = pin.SE3(np.eye(3), robot.chain.translation[joint])
+        frame = model.addFrame(pin.Frame("point", joint, point, pin.FrameType.OP_FRAME))
+        data = model.createData()
+        for row, found in zip(q, loads.torque[:, :, 6 + 3 * k : 9 + 3 * k], strict=True):
+            J = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)[:3]
+            np.testing.assert_allclose(found, -FORCE * J.T, atol=1e-10)
 
 
-def test_the_points_are_elbow_and_wrist():
-    """Joints 3 and 4 of six; of seven 4 and, as its axis passes there, 5 for 6; counted from 0."""
-    assert points_along(6) == (2, 3)
-    assert points_along(7) == (3, 4)
-    panda = load_robot("panda").chain
-    q = motion(np.arange(5.0), 7)[0]
-    at_five, at_six = force_torque(panda, q, 4), force_torque(panda, q, 5)
-    np.testing.assert_allclose(at_five, at_six, atol=1e-12)
-    assert [points_along(n) for n in (1, 2, 3, 4, 5)] == [(), (), (1,), (1,), (2,)]
+@pytest.mark.parametrize(("joints", "points"), [(3, 1), (4, 1), (5, 1), (6, 2)])
+def test_a_short_arm_has_fewer_points(joints, points):
+    q = np.zeros((4, joints))
+    loads = slow_loads(shortened(ur10e(), joints).chain, np.arange(4.0), q)
+    assert loads.torque.shape[2] == 6 + 3 * points
 
 
 @pytest.mark.parametrize(("seconds", "knots"), [(14.0, 1), (16.0, 3), (55.0, 7), (3600.0, 61)])

@@ -12,15 +12,16 @@ from vftcli.refinement.model_error import (
     expected_error,
     smooth_motion,
 )
-from vftcli.refinement.normal_equations import Rows, slow_loads
 from vftcli.refinement.robust_fit import (
     LARGEST,
     SCALES,
     WORTH,
     WORTHLESS,
+    Rows,
     faded,
     fit_robustly,
     guarded,
+    slow_loads,
 )
 from vftcli.signals.rest import MOVES
 

@@ -6,7 +6,7 @@ import pytest
 from vftcli.observers import KalmanObserver
 from vftcli.robots import load_robot
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 STEP = 0.008
 POSE = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2])

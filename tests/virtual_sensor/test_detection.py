@@ -28,7 +28,7 @@ from vftcli.virtual_sensor.detection import (
     true_intervals,
 )
 from vftcli.virtual_sensor.sensor_reading import SensorReading, zero_drift
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 T = np.arange(0.0, 20.0, 0.01)
 

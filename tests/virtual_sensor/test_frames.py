@@ -17,7 +17,7 @@ from vftcli.virtual_sensor.frames import (
     pose_of_numbers,
     read_pose,
 )
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 angle = st.floats(-3.0, 3.0)
 length = st.floats(-1.0, 1.0)

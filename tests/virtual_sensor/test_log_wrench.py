@@ -16,8 +16,7 @@ from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base
-from vftcli.virtual_sensor.log_wrench import logged_wrench, placement
+from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base, logged_wrench, placement
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 UR5 = load_robot("ur5")

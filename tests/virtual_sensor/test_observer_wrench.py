@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.free_motion.choice import FreeChoice
-from vftcli.free_motion.free_load import FreeLoad
-from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log, prepared, read
 from vftcli.readers.reader import ReadChoice
@@ -24,7 +23,7 @@ from vftcli.virtual_sensor.sensing import (
     smooth_all,
 )
 from vftcli.virtual_sensor.sensor_reading import SensorReading
-from vftcli.virtual_sensor.smoother import WrenchPrior, smooth_wrench
+from vftcli.virtual_sensor.smoother import WrenchPrior, deviations, smooth_wrench
 
 CIRCLE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 FREE = FreeChoice.parsed(free=["0.3:4"])
@@ -60,10 +59,11 @@ def test_asked_for_it_is_every_observers_wrench_and_hides_nothing(motion: FreeMo
     sensed = reading("gmo", "fdo", solver="smoother", frame="base")
     assert sensed.solver == "smoother"
     log, (piece,) = motion.log, motion.part.pieces
-    expected = smooth_wrench(log, [piece]).at(log.t)
+    values, covariance = smooth_wrench(log, [piece]).at(log.t)
+    sd = deviations(covariance)
     for wrench in sensed.wrenches:
-        np.testing.assert_allclose(wrench.values, expected.values, atol=1e-12)
-        np.testing.assert_allclose(wrench.sd, expected.sd, atol=1e-12)
+        np.testing.assert_allclose(wrench.values, values, atol=1e-12)
+        np.testing.assert_allclose(wrench.sd, sd, atol=1e-12)
         assert not wrench.hidden.any()
         assert wrench.sigma_min is not None
     assert sensed.smoothed["gmo"] is sensed.smoothed["fdo"]  # the log's, whoever observes it
@@ -118,8 +118,8 @@ def test_a_correction_is_left_out_where_the_log_shows_one_load(
     J = flange_jacobian(log.robot.chain, log.q)
     nothing = np.zeros(len(J), dtype=bool)
     if newtons:
-        pushes = smooth_all(["best"], plain, {}, unloaded=log.t < 4.0)["best"].at(log.t)
-        taken = np.einsum("tij,ti->tj", J, pushes.values)
+        pushes, _ = smooth_all(["best"], plain, {}, unloaded=log.t < 4.0)["best"].at(log.t)
+        taken = np.einsum("tij,ti->tj", J, pushes)
         free = tuple(RunSamples(run.less(taken), inside) for run, inside in plain.free)
         plain = FreeLog(log.less(taken + newtons * J[:, 2]), free)
     own = plain._replace(run=plain.run.less(np.ones_like(J[:, 0])))

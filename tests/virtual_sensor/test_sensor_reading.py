@@ -7,7 +7,7 @@ import pytest
 
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.sensor_reading import Drift, SensorReading, with_reference, zero_drift
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 T = np.arange(0.0, 20.0, 0.01)
 SPAN = (1.0, 3.0)

@@ -25,6 +25,7 @@ from vftcli.virtual_sensor.smoother import (
     BlockModel,
     WrenchPrior,
     block_length,
+    deviations,
     hidden_by_blocks,
     smooth_wrench,
     unlisted,
@@ -82,8 +83,9 @@ def test_pushes_are_followed_in_short_blocks() -> None:
     found = smooth_wrench(simulated(robot, q, push, t), [free])
     assert not found.prior.is_steady
     assert found.seconds == pytest.approx(0.024)
-    moved = found.at(t)
-    inside = np.abs(moved.values - push) <= 1.96 * moved.sd
+    moved, covariance = found.at(t)
+    sd = deviations(covariance)
+    inside = np.abs(moved - push) <= 1.96 * sd
     # widened beyond the model's own 95 %, but 25 N come and go within one sample, 20 times
     assert np.all(inside.mean(axis=0) >= 0.9)
 
@@ -157,12 +159,13 @@ def test_the_band_grows_where_the_pose_is_blind_and_nothing_is_missing() -> None
     push = load(t) * (np.sin(1.3 * t) > 0.3)[:, None]
     free = RunSamples(simulated(robot, q, 0 * push, t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(simulated(robot, q, push, t), [free], prior=WrenchPrior(1, 30))
-    moved = found.at(t)
-    assert np.isfinite(moved.values).all()
-    assert np.isfinite(moved.sd).all()
+    moved, covariance = found.at(t)
+    sd = deviations(covariance)
+    assert np.isfinite(moved).all()
+    assert np.isfinite(sd).all()
     clear = sigma > 2 * LEAST_SIGMA
-    assert np.max(moved.sd[blind].mean(axis=0) / moved.sd[clear].mean(axis=0)) > 2.0
-    inside = np.abs(moved.values - push)[blind] <= 1.96 * moved.sd[blind]
+    assert np.max(sd[blind].mean(axis=0) / sd[clear].mean(axis=0)) > 2.0
+    inside = np.abs(moved - push)[blind] <= 1.96 * sd[blind]
     assert np.all(inside.mean(axis=0) >= 0.9)
 
 
@@ -179,10 +182,11 @@ def test_a_gap_of_the_clock_is_bridged_with_a_band_that_grows() -> None:
     )
     quiet = RunSamples(simulated(robot, q, 0 * load(t), t, seed=2), np.ones(len(t), dtype=bool))
     found = smooth_wrench(run_of(cut, q[there]), [quiet], prior=prior)
-    at = found.at(np.array([5.0, 10.0, 15.0]))
-    assert np.isfinite(at.values).all()
-    assert np.all(at.sd[1] > 1.5 * at.sd[[0, 2]])
-    assert np.all(np.abs(at.values - load(t[:3])) <= 3.0 * at.sd)
+    values, covariance = found.at(np.array([5.0, 10.0, 15.0]))
+    sd = deviations(covariance)
+    assert np.isfinite(values).all()
+    assert np.all(sd[1] > 1.5 * sd[[0, 2]])
+    assert np.all(np.abs(values - load(t[:3])) <= 3.0 * sd)
 
 
 def test_a_log_of_one_sample_leaves_the_prior() -> None:
@@ -235,12 +239,13 @@ def test_a_circle_under_pushes_reads_its_truth() -> None:
     path = FIXTURES / "ur5_circle.csv"
     recording, robot = Library([path]).open(path, ReadChoice()), load_robot("ur5")
     run, t = Run(recording=recording, robot=robot), recording.t
-    moved = smooth_wrench(run, [RunSamples(run, (t > 0.3) & (t < 4.0))]).at(t)
+    moved, covariance = smooth_wrench(run, [RunSamples(run, (t > 0.3) & (t < 4.0))]).at(t)
+    sd = deviations(covariance)
     table = pl.read_parquet(f"{path}.truth.parquet")
     truth = table.select([f"wrench/{axis}" for axis in AXES]).to_numpy()
-    error = moved.values - truth
+    error = moved - truth
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= [4.6, 3.9, 1.8, 0.75, 0.55, 0.2])
-    assert np.all(np.mean(np.abs(error) <= 1.96 * moved.sd, axis=0) >= 0.93)
+    assert np.all(np.mean(np.abs(error) <= 1.96 * sd, axis=0) >= 0.93)
 
 
 def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
@@ -256,11 +261,12 @@ def test_a_real_payload_is_read_in_every_pose(logs: Path) -> None:
     run, other = (Run(recording=recording, robot=robot) for recording in (log, free))
     found = smooth_wrench(run, [RunSamples(other, np.ones(free.samples, dtype=bool))])
     assert found.prior.is_steady
-    moved = found.at(log.t)
-    error = moved.values[:, :3] - [0.0, 0.0, -27.52]
+    moved, covariance = found.at(log.t)
+    sd = deviations(covariance)
+    error = moved[:, :3] - [0.0, 0.0, -27.52]
     assert np.all(np.sqrt(np.mean(error**2, axis=0)) <= 4.0)
     assert np.all(np.abs(error.mean(axis=0)) <= 1.5)
-    assert np.all(np.mean(np.abs(error) <= 1.96 * moved.sd[:, :3], axis=0) >= 0.88)
+    assert np.all(np.mean(np.abs(error) <= 1.96 * sd[:, :3], axis=0) >= 0.88)
 
 
 def test_blocks_hide_a_share_of_a_bend_and_drives_one_of_the_reading() -> None:

@@ -13,11 +13,11 @@ from vftcli.virtual_sensor.solvers import (
     PRIOR,
     SCALE,
     SOLVERS,
+    VirtualSensor,
     decompose,
     null_space,
     wrench_of,
 )
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
 
 REGULAR = np.array([0.3, -1.2, 1.4, -1.7, -1.5, 0.2])
 """A UR5 pose far from every singularity. [rad]"""
@@ -204,7 +204,7 @@ def test_chunks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
     q = poses("panda", samples=50)
     tau = np.random.default_rng(1).normal(size=q.shape)
     whole = told("panda", q, tau)
-    monkeypatch.setattr("vftcli.virtual_sensor.virtual_sensor.CHUNK", 7)
+    monkeypatch.setattr("vftcli.virtual_sensor.solvers.CHUNK", 7)
     pieces = told("panda", q, tau)
     np.testing.assert_array_equal(pieces.values, whole.values)
 

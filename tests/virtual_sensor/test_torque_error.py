@@ -17,13 +17,13 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
-from vftcli.virtual_sensor.sensor_reading import SensorReading
-from vftcli.virtual_sensor.torque_error import (
+from vftcli.virtual_sensor.sensing import (
     from_free_part,
     given_error,
     missed_torque,
     torque_error,
 )
+from vftcli.virtual_sensor.sensor_reading import SensorReading
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
 T = np.arange(0.0, 40.0, 0.01)

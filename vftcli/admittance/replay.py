@@ -43,9 +43,9 @@ from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import median_step
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER, WrenchChoice
-from vftcli.virtual_sensor.log_wrench import logged_wrench
+from vftcli.virtual_sensor.frames import logged_wrench
 from vftcli.virtual_sensor.sensor_reading import SensorReading, without_zero
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 #: A step in which W rises by more than this share of its value at the phase's start is told.
 RISE = 1e-12

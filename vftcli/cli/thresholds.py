@@ -41,8 +41,8 @@ def contact_thresholds(
     """
     from vftcli.answering import free_thresholds, modelled
     from vftcli.cli.console import say, say_json, say_recording, say_robots
-    from vftcli.contacts.threshold_check import check_contacts
-    from vftcli.contacts.thresholds import check_alike, compared_signals, left_out
+    from vftcli.contacts.threshold_check import check_contacts, compared_signals, left_out
+    from vftcli.contacts.thresholds import check_alike
     from vftcli.outputs.examination import health_record
     from vftcli.outputs.thresholds import thresholds_record, thresholds_text
     from vftcli.pipeline import prepared

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vftcli.contacts.free_statistics import Basis
-    from vftcli.contacts.places import ArmPart
+    from vftcli.contacts.windows import ArmPart
     from vftcli.virtual_sensor.smoother import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.

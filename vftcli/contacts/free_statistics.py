@@ -6,9 +6,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.windows import BlockLog, Lane, smooth_lanes, window_of
-from vftcli.free_motion.free_load import FreeLoad, free_load, without_load
-from vftcli.free_motion.free_motion import FreeMotion, FreePart
+from vftcli.contacts.windows import smooth_lanes, window_of
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers import MomentumObserver
 from vftcli.observers.spectra import looks_free, spectra_of
 from vftcli.refinement.whole_log import WholeLogBias
@@ -30,7 +29,7 @@ from vftcli.virtual_sensor.model_error import (
     infer_noise,
     learn_noise,
 )
-from vftcli.virtual_sensor.smoother import WrenchPrior
+from vftcli.virtual_sensor.smoother import BlockLog, Lane, WrenchPrior
 
 #: Length of a block [s]; on a clock with steps that differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5

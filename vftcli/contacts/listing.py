@@ -23,7 +23,6 @@ from vftcli.contacts.free_statistics import (
     observed,
 )
 from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
-from vftcli.contacts.places import places
 from vftcli.contacts.rows import (
     BENT_SHORT,
     NORMAL,
@@ -31,9 +30,8 @@ from vftcli.contacts.rows import (
     ContactMeasurement,
 )
 from vftcli.contacts.search import Candidates, search
-from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, BlockLog, BlockSpan
-from vftcli.free_motion.free_load import FreeLoad
-from vftcli.free_motion.free_motion import FreeMotion
+from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
@@ -45,6 +43,7 @@ from vftcli.signals.remarks import Remark, Where, caution
 from vftcli.signals.rest import MOVES, faster
 from vftcli.signals.series import covered
 from vftcli.virtual_sensor.model_error import UNSEEN_SHARE, error_process
+from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
 SHORTEST = 0.5  #: No contact can be told in a log shorter than this. [s]

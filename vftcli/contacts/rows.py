@@ -9,30 +9,28 @@ import numpy as np
 
 from vftcli.contacts.contact_list import SURE_NATS, WIDE, Contact, ForceCourse
 from vftcli.contacts.free_statistics import FreeStatistics, PseudoContactTest, self_test
-from vftcli.contacts.places import (
+from vftcli.contacts.search import Candidates
+from vftcli.contacts.windows import (
     MORE_THAN_A_FORCE,
     ArmPart,
     PointFit,
-    arm_parts,
-    from_flange,
-    link_jacobian,
-    point_fits,
-)
-from vftcli.contacts.search import Candidates
-from vftcli.contacts.windows import (
-    BlockLog,
     WindowWrench,
+    arm_parts,
     contact_lanes,
     learn_prior,
+    link_jacobian,
+    point_fits,
+    points_on,
     smooth_lanes,
 )
+from vftcli.robots.chain import link_poses
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
 from vftcli.signals.series import covered, median_step
 from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, error_process
-from vftcli.virtual_sensor.smoother import BENT, WrenchPrior, hidden_by_blocks
+from vftcli.virtual_sensor.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
 #: What the model's own standard deviations of force and moment are multiplied by: the error of the
 #: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
@@ -167,10 +165,13 @@ class ContactMeasurement:
     def rows(self, locations: Sequence[ContactLocation] | None = None) -> list[Contact]:
         """The contacts, in the order of time, numbered; their places may be known better."""
         runs, J = self.found.runs, self.found.places[0].jacobian
-        chain, q, wrenches = self.run.robot.loaded_chain, self.log.blocks.q, [*self.wrenches]
+        wrenches, poses = (
+            [*self.wrenches],
+            link_poses(self.run.robot.loaded_chain, self.log.blocks.q),
+        )
         locations = self.locations if locations is None else locations
         moved = {
-            i: link_jacobian(chain, q, where.fits[0].link, where.fits[0].share)
+            i: link_jacobian(poses, where.fits[0].link, where.fits[0].share)
             for i, where in enumerate(locations)
             if not where.on_wrist
         }
@@ -235,9 +236,9 @@ class ContactMeasurement:
         J, at = jacobian[peak], float(blocks.t[peak])
         wrench, force = values.copy(), inside.values[:, :3]
         if on_link:
-            chain = self.run.robot.loaded_chain
-            lever = from_flange(chain, blocks.q[peak], location.fits[0])
-            wrench[3:] += np.cross(lever, values[:3])
+            poses, fit = link_poses(self.run.robot.loaded_chain, blocks.q[[peak]]), location.fits[0]
+            lever = points_on(poses, fit.link, fit.share) - poses.translation[:, -1]
+            wrench[3:] += np.cross(lever[0], values[:3])
         return Contact(
             number=number + 1,
             start=start,

@@ -20,15 +20,14 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.contacts.free_statistics import GAIN, beyond_threshold
-from vftcli.contacts.places import ContactPlace, places
 from vftcli.contacts.windows import (
     START,
-    BlockLog,
-    BlockSpan,
+    ContactPlace,
     WindowWrench,
     contact_lanes,
     evidence,
     learn_prior,
+    places,
     smooth_lanes,
 )
 from vftcli.robots.run import Run
@@ -43,7 +42,7 @@ from vftcli.virtual_sensor.model_error import (
     spiked_white,
     steps,
 )
-from vftcli.virtual_sensor.smoother import WrenchPrior
+from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, WrenchPrior
 
 #: A torque that stays beyond the threshold for longer than this beside a contact is part of it: the
 #: observer's lag is over, friction has turned. [s]

@@ -1,4 +1,8 @@
-"""Contacts of a log that thresholds would have detected: when, by what, and how hard they were."""
+"""Logs beside thresholds: what a robot compares with them, false alarms, contacts detected.
+
+A robot compares its own estimate with the thresholds it is given, so that one is taken where the
+log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a robot needs it.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,12 +10,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.tail import SETTLING, events
-from vftcli.contacts.thresholds import ComparedSignals, Thresholds, worst_of
+from vftcli.contacts.thresholds import (
+    LONG_ENOUGH,
+    SETTLING,
+    ComparedSignals,
+    Thresholds,
+    events,
+    find_thresholds,
+    worst_of,
+)
+from vftcli.observers.paper import MomentumObserver
+from vftcli.robots.run import Run
+from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.wrench import AXES, Wrench
+from vftcli.signals.wrench import AXES, POINTS, Wrench
 from vftcli.virtual_sensor.detection import (
     EARLY,
     TRUE_TORQUE,
@@ -19,6 +33,43 @@ from vftcli.virtual_sensor.detection import (
     match_contacts,
     true_intervals,
 )
+from vftcli.virtual_sensor.solvers import VirtualSensor
+
+GAIN = 10.0  #: Of the momentum observer. [1/s]
+
+
+def compared_signals(run: Run) -> ComparedSignals:
+    """What a robot would compare along a log.
+
+    The wrench is the log's own where the robot made it; one in sensor axes is an instrument's,
+    which no threshold of the robot sees. Else it is that of the torque, by least squares in base
+    axes about the flange point.
+    """
+    # The robot's own estimate asks for no model, which else would check.
+    check_joints(run.recording, run.robot)
+    recording, vendor = run.recording, run.recording.tau_ext
+    of_vendor = vendor is not None and bool(np.any(vendor))
+    if vendor is not None and of_vendor:
+        torque = ExternalTorque(name="tau_ext", t=recording.t, tau=vendor)
+    else:
+        torque = MomentumObserver(gain=GAIN).estimate(run.terms)
+    stated, own = recording.wrench_frame, recording.wrench
+    logged = own is not None and bool(np.any(own)) and stated is not None
+    if own is not None and stated is not None and logged and stated.axes != "sensor":
+        wrench, frame = own, f"{stated.axes} axes at {POINTS.get(stated.point, stated.point)}"
+    elif recording.joints >= 6:
+        solved = VirtualSensor(frame="base").wrench(torque, recording.q, run.robot.chain)
+        wrench, frame, logged = solved.known, "base axes at the flange point", False
+    else:
+        wrench, frame, logged = np.zeros((recording.samples, 0)), "", False
+    return ComparedSignals(
+        recording=recording,
+        torque=torque.tau,
+        wrench=wrench,
+        of_vendor=of_vendor,
+        logged_wrench=logged,
+        frame=frame,
+    )
 
 
 class CheckedContact(NamedTuple):
@@ -131,3 +182,41 @@ def checked(
     delay, by = begun[0] if begun else (float("nan"), "")
     above = not by and any(alarm.start < contact.start <= alarm.stop for _, alarm in alarms)
     return CheckedContact(*contact, peak, delay, by, above)
+
+
+class CountedAlarms(NamedTuple):
+    """False alarms of one free log, at thresholds learned without it."""
+
+    log: str  #: The log.
+    hours: float  #: Its length without the settling. [h]
+    due: float  #: The false alarms of any joint that the rate allows in that time.
+    joints: tuple[int, ...]  #: Those of every joint alone.
+    any_joint: int  #: Those of all joints together.
+    any_axis: int  #: Those of all axes together.
+
+
+def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:
+    """How often a log passes thresholds."""
+    t, joints = signals.t, thresholds.level("joints", signals)
+    hours = max(signals.recording.duration - SETTLING, 0.0) / 3600.0
+    return CountedAlarms(
+        log=signals.recording.name,
+        hours=hours,
+        due=hours * thresholds.rate,
+        joints=tuple(len(events(t, column)) for column in joints.T),
+        any_joint=len(events(t, worst_of(joints))),
+        any_axis=len(events(t, worst_of(thresholds.level("axes", signals)))),
+    )
+
+
+def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
+    """Every free log at the thresholds of the others: what a new day would have brought.
+
+    None where there is one log alone, or the others are all too short.
+    """
+    found = []
+    for k, signals in enumerate(free):
+        others = [*free[:k], *free[k + 1 :]]
+        if any(one.recording.duration >= LONG_ENOUGH for one in others):
+            found.append(counted_alarms(signals, find_thresholds(others, rate)))
+    return tuple(found)

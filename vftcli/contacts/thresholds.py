@@ -1,7 +1,8 @@
 """Thresholds from motion that nobody touched, at a stated rate of false alarms.
 
-A robot compares its own estimate with the thresholds it is given, so that one is taken where the
-log has it. Where it has none, a momentum observer of 10 1/s runs: causal, as a robot needs it.
+The largest maxima of 1 s blocks of a signal lie beyond a level u at λ per hour, by e on average,
+and a level x beyond u is passed at the rate λ exp(−(x − u)/e). A tail that bends (generalised
+Pareto) has one number more to learn from few maxima, and its rare levels came out too low.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,34 +11,117 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.tail import (
-    AN_HOUR,
-    BLOCK,
-    ENOUGH,
-    LEAST_READINGS,
-    SETTLING,
-    SHARE,
-    Tail,
-    block_maxima,
-    events,
-    tail_of,
-)
-from vftcli.observers.paper import MomentumObserver
-from vftcli.robots.run import Run
-from vftcli.robots.terms import check_joints
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.shown import Shown, joined
-from vftcli.signals.wrench import AXES, POINTS, unit_of
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.signals.wrench import AXES, unit_of
 
 if TYPE_CHECKING:
     import polars as pl
 
-GAIN = 10.0  #: Of the momentum observer. [1/s]
+
+from vftcli.signals.series import median_step
+from vftcli.virtual_sensor.detection import ContactInterval, contact_intervals
+
+SETTLING = 2.0  #: Left out at the start of every log: observers rise from zero. [s]
+BLOCK = 1.0  #: Length of the blocks of which maxima are used. [s]
+APART = 0.5  #: Passages closer than this are one event. [s]
+KNOWN = 0.5  #: A block counts if at least this share of its samples is known.
+ENOUGH = 5  #: Maxima beyond the level that tell a tail; below four its interval has no lower end.
+#: Readings in a tail: at least so many where there are, more an hour, of so many blocks one.
+LEAST_READINGS, AN_HOUR, SHARE = 30, 60.0, 5
+NORMAL = 1.96  #: Half width of a normal's 95 % in standard deviations.
+
+
+def block_maxima(t: Array, level: Array) -> Array:
+    """The largest value of every known 1 s block, the settling left out, NaN ignored. (B,)"""
+    used = t >= t[0] + SETTLING
+    if np.count_nonzero(used) < 2:
+        return np.zeros(0)
+    t, level = t[used], level[used]
+    number = np.floor((t - t[0]) / BLOCK).astype(np.intp)
+    first = np.flatnonzero(np.diff(number, prepend=-1))
+    known = np.add.reduceat(np.isfinite(level).astype(np.intp), first)
+    maxima = np.maximum.reduceat(np.where(np.isfinite(level), level, -np.inf), first)
+    found: Array = maxima[known * median_step(t) >= KNOWN * BLOCK]
+    return found
+
+
+def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
+    """When a level (T,) exceeds 1, the settling left out; NaN, where it is not known, does not."""
+    above = (np.nan_to_num(level, nan=0.0) > 1.0) & (t >= t[0] + SETTLING)
+    return contact_intervals(t, above, gap=APART)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tail:
+    """The exponential tail of one signal of one log."""
+
+    maxima: Array  #: The block maxima, largest first. (B,)
+    count: int  #: How many of them, k, lie beyond `start`.
+
+    def __post_init__(self) -> None:
+        seal(self, "maxima")
+
+    @property
+    def start(self) -> float:
+        """u: where the tail begins. [the signal's unit]"""
+        return float(self.maxima[self.count])
+
+    @property
+    def excess(self) -> float:
+        """e: mean distance from `start` of the maxima beyond it. [the signal's unit]"""
+        return float(np.mean(self.maxima[: self.count])) - self.start
+
+    @property
+    def hours(self) -> float:
+        """Length of the known blocks. [h]"""
+        return len(self.maxima) * BLOCK / 3600.0
+
+    @property
+    def rate(self) -> float:
+        """λ: how often the signal passes `start`. [1/h]"""
+        return self.count / self.hours
+
+    def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
+        """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
+
+        They are those of e, (1 ± 1.96/√k) e, the lower one u at the least. What happens more often
+        than λ is no matter of the tail: of m times in all it is the m-th largest maximum, of m its
+        95 %, m ± 1.96 √m.
+        """
+        if rate <= self.rate:
+            step = self.excess * float(np.log(self.rate / rate))
+            spread = float(NORMAL / np.sqrt(self.count) * step)
+            value = self.start + step
+            return value, (max(value - spread, self.start), value + spread)
+        due = rate * self.hours
+        if due > 0.5 * len(self.maxima):
+            most = 0.5 * 3600.0 / BLOCK
+            raise ParameterError(
+                f"a rate of {rate:.4g} false alarms per hour of one signal is no alarm's: at most "
+                f"{most:.4g} can be told from maxima of {BLOCK:g} s"
+            )
+        ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
+        places = np.clip(np.rint(ranks).astype(np.intp), 1, len(self.maxima)) - 1
+        value, low, high = (float(x) for x in self.maxima[places])
+        return value, (low, high)
+
+
+def tail_of(maxima: Array) -> Tail | None:
+    """The tail of block maxima (B,), None where there are fewer than five of them.
+
+    k = min(max(30, 60 an hour), B/5) of them are taken for the tail.
+    """
+    hours = len(maxima) * BLOCK / 3600.0
+    count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
+    if count < 1:
+        return None
+    return Tail(maxima=np.sort(maxima)[::-1], count=count)
+
+
 #: A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates.
 DUE = 3.0
 LEAST = 1e-9  #: What stands for a threshold of zero, so that a level can be told. [N·m, N]
@@ -72,40 +156,6 @@ class ComparedSignals:
         """Size of the force, no column without a wrench. (T, 1) [N]"""
         size: Array = np.linalg.norm(self.wrench[:, :3], axis=1, keepdims=True)
         return size[:, : self.wrench.shape[1]]
-
-
-def compared_signals(run: Run) -> ComparedSignals:
-    """What a robot would compare along a log.
-
-    The wrench is the log's own where the robot made it; one in sensor axes is an instrument's,
-    which no threshold of the robot sees. Else it is that of the torque, by least squares in base
-    axes about the flange point.
-    """
-    # The robot's own estimate asks for no model, which else would check.
-    check_joints(run.recording, run.robot)
-    recording, vendor = run.recording, run.recording.tau_ext
-    of_vendor = vendor is not None and bool(np.any(vendor))
-    if vendor is not None and of_vendor:
-        torque = ExternalTorque(name="tau_ext", t=recording.t, tau=vendor)
-    else:
-        torque = MomentumObserver(gain=GAIN).estimate(run.terms)
-    stated, own = recording.wrench_frame, recording.wrench
-    logged = own is not None and bool(np.any(own)) and stated is not None
-    if own is not None and stated is not None and logged and stated.axes != "sensor":
-        wrench, frame = own, f"{stated.axes} axes at {POINTS.get(stated.point, stated.point)}"
-    elif recording.joints >= 6:
-        solved = VirtualSensor(frame="base").wrench(torque, recording.q, run.robot.chain)
-        wrench, frame, logged = solved.known, "base axes at the flange point", False
-    else:
-        wrench, frame, logged = np.zeros((recording.samples, 0)), "", False
-    return ComparedSignals(
-        recording=recording,
-        torque=torque.tau,
-        wrench=wrench,
-        of_vendor=of_vendor,
-        logged_wrench=logged,
-        frame=frame,
-    )
 
 
 def check_alike(signals: Sequence[ComparedSignals]) -> None:
@@ -155,7 +205,7 @@ class SignalThreshold(NamedTuple):
     def more_share(self) -> float:
         """How much more of its log's motion would narrow the interval to the value, of its length.
 
-        The width falls with the root of the tail's readings, see `vftcli.contacts.tail.tail_of`.
+        The width falls with the root of the tail's readings, see `tail_of`.
         """
         if self.tail is None or not self.is_wide:
             return 0.0
@@ -328,44 +378,6 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
         if (share := float(np.mean(np.isfinite(signals.wrench[:, 0])))) < SELDOM:
             remarks.append(caution("wrench-seldom-known", where, share=share))
     return remarks
-
-
-class CountedAlarms(NamedTuple):
-    """False alarms of one free log, at thresholds learned without it."""
-
-    log: str  #: The log.
-    hours: float  #: Its length without the settling. [h]
-    due: float  #: The false alarms of any joint that the rate allows in that time.
-    joints: tuple[int, ...]  #: Those of every joint alone.
-    any_joint: int  #: Those of all joints together.
-    any_axis: int  #: Those of all axes together.
-
-
-def counted_alarms(signals: ComparedSignals, thresholds: Thresholds) -> CountedAlarms:
-    """How often a log passes thresholds."""
-    t, joints = signals.t, thresholds.level("joints", signals)
-    hours = max(signals.recording.duration - SETTLING, 0.0) / 3600.0
-    return CountedAlarms(
-        log=signals.recording.name,
-        hours=hours,
-        due=hours * thresholds.rate,
-        joints=tuple(len(events(t, column)) for column in joints.T),
-        any_joint=len(events(t, worst_of(joints))),
-        any_axis=len(events(t, worst_of(thresholds.level("axes", signals)))),
-    )
-
-
-def left_out(free: Sequence[ComparedSignals], rate: float) -> tuple[CountedAlarms, ...]:
-    """Every free log at the thresholds of the others: what a new day would have brought.
-
-    None where there is one log alone, or the others are all too short.
-    """
-    found = []
-    for k, signals in enumerate(free):
-        others = [*free[:k], *free[k + 1 :]]
-        if any(one.recording.duration >= LONG_ENOUGH for one in others):
-            found.append(counted_alarms(signals, find_thresholds(others, rate)))
-    return tuple(found)
 
 
 def worst_of(level: Array) -> Array:

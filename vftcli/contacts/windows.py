@@ -1,8 +1,9 @@
 """Windows of a log in which its contacts are weighed, and their wrench is smoothed.
 
-Outside its contact a wrench is pinned to zero, so that the model error is learned from the quiet
-blocks on both sides of a contact, and the contact is measured against that. What other contacts
-load says nothing of it. The prior of the wrench is learned from the contacts.
+A contact may be at the flange or on a link: joints behind its place do not feel it, and nothing
+else tells where it is. Outside its contact a wrench is pinned to zero, so that the model error is
+learned from the quiet blocks on both sides of a contact, and the contact is measured against that.
+What other contacts load says nothing of it. The prior of the wrench is learned from the contacts.
 
 Evidence is how much better a contact explains a stretch of log than nothing does, place by place:
 around every candidate the likelihood of the disturbance is taken under "nothing", under a wrench at
@@ -12,29 +13,133 @@ the arm is how far its best place is ahead of the best of every other part.
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from vftcli.contacts.places import ContactPlace
-from vftcli.robots.terms import Blocks
-from vftcli.signals.arrays import Array, Mask
-from vftcli.signals.linear_model import (
-    SPIKE,
-    LinearModel,
-    beside_errors,
-    log_likelihood,
-    smoothed,
-)
+from vftcli.robots.chain import Chain, LinkPoses, link_poses
+from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.linear_model import SPIKE, LinearModel, log_likelihood, smoothed
 from vftcli.signals.series import covered
-from vftcli.virtual_sensor.model_error import (
-    UNKNOWN,
-    ErrorProcess,
-    error_model,
-    innovations,
-    steps,
-)
-from vftcli.virtual_sensor.smoother import WrenchPrior
+from vftcli.virtual_sensor.model_error import UNKNOWN, ErrorProcess, error_model, innovations
+from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan, Lane, WrenchPrior, assembled
+
+ArmPart = Literal["wrist", "forearm", "upper arm", "cannot tell"]  #: A part of the arm.
+POINTS = 10  #: Points along each link that a force is tried at.
+#: The first link that is tried: on link 1 a force loads one joint, as friction does.
+FIRST_LINK = 2
+#: Lever of the moment that a contact's force may have about the flange or a link's middle. [m]
+LEAST_LEVER = 0.1
+FORCE_PRIOR = 100.0  #: Standard deviation that a force is given beforehand. [N]
+ALIKE = 4.0  #: Points with a score within this of the best one's fit as well.
+#: χ² of the best point beyond which a contact is more than a force at a point.
+MORE_THAN_A_FORCE = 20.0
+
+
+class ContactPlace(NamedTuple):
+    """A place at which a contact is weighed."""
+
+    link: int  #: Number of the link; 0 for the flange.
+    lever: float  #: Standard deviation of the moment over that of the force. [m]
+    #: J of its point along the log; columns of joints that do not move it are zero. (K, 6, n)
+    jacobian: Array
+
+
+def places(chain: Chain, q: Array) -> list[ContactPlace]:
+    """The flange, and the middle of every link from the second on, at q (K, n)."""
+    poses, n = link_poses(chain, q), chain.joints
+    found = [ContactPlace(0, LEAST_LEVER, link_jacobian(poses, n, 1.0))]
+    for link in range(FIRST_LINK, n + 1):
+        span = poses.translation[0, link] - poses.translation[0, link - 1]
+        lever = max(LEAST_LEVER, 0.5 * float(np.linalg.norm(span)))
+        found.append(ContactPlace(link, lever, link_jacobian(poses, link, 0.5)))
+    return found
+
+
+def points_on(poses: LinkPoses, link: Indices | int, share: Array | float) -> Array:
+    """Points along links, from their joints (0) to the next (1), in base axes. (K, …, 3) [m]"""
+    start, end = poses.translation[:, link - 1], poses.translation[:, link]
+    return np.asarray(start + share * (end - start))
+
+
+def link_jacobian(poses: LinkPoses, link: int, share: float) -> Array:
+    """Jacobian of a point along a link, in base axes. (K, 6, n)"""
+    axes = poses.rotation[:, :-1, :, 2]
+    arms = points_on(poses, link, share)[:, None, :] - poses.translation[:, :-1]
+    J = np.concatenate([np.cross(axes, arms), axes], axis=2).transpose(0, 2, 1)
+    J[:, :, link:] = 0.0
+    return J
+
+
+def arm_parts(joints: int) -> dict[int, ArmPart]:
+    """Link → part of the arm, 0 the flange: what cannot be told from the flange is the wrist.
+
+    Of six joints links 4 to 6 are the wrist and link 3 the forearm; of seven joints links 6 and 7,
+    and 4 and 5. What comes before is the upper arm.
+    """
+    forearm, wrist = (3, 4) if joints <= 6 else (4, 6)
+    found: dict[int, ArmPart] = {0: "wrist"}
+    for link in range(1, joints + 1):
+        found[link] = "wrist" if link >= wrist else "forearm"
+        if link < forearm:
+            found[link] = "upper arm"
+    return found
+
+
+class PointFit(NamedTuple):
+    """A force at a point of a link, as it explains a torque."""
+
+    link: int  #: The link, from 1; the last one's end is the flange.
+    share: float  #: Where along the link, from its joint (0) to the next (1).
+    misfit: float  #: χ² of the torque that is left.
+    score: float  #: χ² and what the size of the force costs.
+    force: Array  #: The force in base axes. (3,) [N]
+    band: float  #: Half width of the 95 % band of its size. [N]
+
+    @property
+    def size(self) -> float:
+        """|F|. [N]"""
+        return float(np.linalg.norm(self.force))
+
+
+def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFit]:
+    """A force at each of the points of the links that fit within `ALIKE`, the best first.
+
+    `POINTS` a link are tried, from `FIRST_LINK` on.
+
+    F = (AᵀA + I/σ²)⁻¹Aᵀ(τ/sd), A the rows of the point's Jacobian over sd: joints behind the point
+    count with a prediction of zero, which is what tells the place.
+    """
+    poses, n = link_poses(chain, q[None]), chain.joints
+    links = np.repeat(np.arange(FIRST_LINK, n + 1), POINTS)
+    along = np.tile(np.arange(1, POINTS + 1) / POINTS, n + 1 - FIRST_LINK)
+    points = points_on(poses, links, along[:, None])[0]
+    axes, origins = poses.rotation[0, :-1, :, 2], poses.translation[0, :-1]
+    rows = np.cross(axes[None], points[:, None] - origins[None])
+    rows[np.arange(n)[None] >= links[:, None]] = 0.0
+    A, y = rows / sd[:, None], torque / sd
+    precision = A.swapaxes(1, 2) @ A + np.eye(3) / FORCE_PRIOR**2
+    covariance = np.linalg.inv(precision)
+    forces = (covariance @ (A.swapaxes(1, 2) @ y)[..., None])[..., 0]
+    misfit = np.sum((y - (A @ forces[..., None])[..., 0]) ** 2, axis=1)
+    score = misfit + np.sum(forces**2, axis=1) / FORCE_PRIOR**2
+    sizes = np.maximum(np.linalg.norm(forces, axis=1), 1e-12)
+    u = forces / sizes[:, None]
+    bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
+    least = float(score.min()) + ALIKE
+    order = np.argsort(score, kind="stable")[: np.count_nonzero(score <= least)]
+    return [
+        PointFit(
+            link=int(links[i]),
+            share=float(along[i]),
+            misfit=float(misfit[i]),
+            score=float(score[i]),
+            force=forces[i],
+            band=float(bands[i]),
+        )
+        for i in order
+    ]
+
 
 MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
 NEAR = 0.4  #: How far it reaches where only the prior is learned. [s]
@@ -54,24 +159,6 @@ SIZES = 1.0, 3.0  #: Multiples of the standard deviation that are tried.
 #: A candidate that lasts longer than the first may be a wrench that stays, as a load's, with the
 #: second as its correlation time: one that wanders would have to pay for every block. [s]
 LASTING, STEADY_TIME = 1.5, 100.0
-BlockSpan = tuple[int, int]  #: Number of the first block, and of the one behind the last.
-
-
-class BlockLog(NamedTuple):
-    """A log in blocks, with its model error."""
-
-    blocks: Blocks  #: The blocks.
-    process: ErrorProcess  #: b along them.
-
-
-class Lane(NamedTuple):
-    """One hypothesis on one window."""
-
-    window: BlockSpan  #: Which blocks.
-    gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
-    hidden: Mask  #: Blocks of the log that say nothing. (K,)
-    jacobian: Array  #: J along the log. (K, 6, n)
-    prior: WrenchPrior | None  #: How the wrench may move; None where nothing touches.
 
 
 class WindowWrench(NamedTuple):
@@ -132,32 +219,6 @@ def batches(lanes: Sequence[Lane]) -> Iterator[list[int]]:
         batch.append(number)
     if batch:
         yield batch
-
-
-def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
-    """Lanes side by side; shorter ones end in blocks that say nothing."""
-    n, step = log.blocks.d.shape[1], steps(log.blocks)
-    longest = max(lane.window[1] - lane.window[0] for lane in lanes)
-    shape = (longest, len(lanes))
-    d, jacobian = np.zeros((*shape, n)), np.zeros((*shape, 6, n))
-    white, decay = np.full((*shape, n), UNKNOWN), np.ones((*shape, 6 + n))
-    added = np.zeros((*shape, 6 + n))
-    decay[:, :, :6] = 0.0
-    for i, lane in enumerate(lanes):
-        span = slice(*lane.window)
-        count = span.stop - span.start
-        d[:count, i] = log.blocks.d[span]
-        white[:count, i] = np.where(lane.hidden[span, None], UNKNOWN, log.process.white[span])
-        decay[:count, i, 6:] = log.process.decay[span]
-        added[:count, i, 6:] = log.process.added[span]
-        # A window begins with what b is like anywhere, not with what it was before.
-        added[0, i, 6:] /= np.maximum(1.0 - decay[0, i, 6:] ** 2, 1e-9)
-        decay[0, i, 6:] = 0.0
-        if lane.prior is not None:
-            jacobian[:count, i] = lane.jacobian[span]
-            process = lane.prior.process(lane.gate[span], step[span])
-            decay[:count, i, :6], added[:count, i, :6] = process
-    return LinearModel(d, beside_errors(jacobian), white, decay, added)
 
 
 def smooth_lanes(log: BlockLog, lanes: Sequence[Lane]) -> list[WindowWrench]:

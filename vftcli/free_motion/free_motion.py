@@ -1,4 +1,13 @@
-"""Contact-free motion beside a log: its own spans and cycles, other runs."""
+"""Motion that nobody touched beside a log: its own spans and cycles, other runs; its load.
+
+A payload that the model lacks pulls in the free part too. Taken for noise it makes every tuned
+gain slow and every band wide; it is an external torque, and stays in the estimates. The free
+part's disturbance is fitted with a load's weight, its friction beside it,
+
+    d = J_Fᵀ(q) [m g; m c × g] + a tanh(q̇/v₀) + o,
+
+with friction and offset held to what a model usually misses of them.
+"""
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,6 +29,18 @@ if TYPE_CHECKING:
     from vftcli.free_motion.alignment import Alignment
     from vftcli.free_motion.cycles import Cycles, FreeCycles, Period
     from vftcli.free_motion.paired_runs import Pairing
+
+from collections.abc import Sequence
+
+from vftcli.robots.chain import Chain
+from vftcli.robots.friction import dry_friction
+from vftcli.robots.regressor import load_regressor, load_wrench
+from vftcli.robots.terms import gain_sd
+from vftcli.signals.arrays import Array, Indices, handed_over, seal
+from vftcli.signals.errors import ClockError
+from vftcli.signals.filters import derivative, zero_phase
+from vftcli.signals.remarks import caution
+from vftcli.signals.series import median_step
 
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
@@ -194,3 +215,140 @@ class FreeMotion(Shown):
                 f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
             )
         return inside
+
+
+LEAST = 0.4  #: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
+SURE = 4.0  #: Standard deviations that it has to be.
+PARTLY = 0.8  #: Share of the free part's disturbance that it may leave at most.
+CUTOFF = 6.0  #: Where the disturbance is low-passed before it is weighed. [Hz]
+#: Of what lies farther away the filter lets e^(−2π 6 Hz · sin(π/8) · 2 s) = 3e-13 through. [s]
+HEARD = 2.0
+RATE = 30.0  #: RunSamples a second that are weighed.
+#: Time over which the model's errors resemble one another: so much counts as one sample. [s]
+MEMORY = 0.3
+SIGN_SPEED = 0.02  #: Velocity over which the sign of friction turns. [rad/s]
+PASSES = 4  #: Fits, each with the joints' errors that the last one left.
+WIDE = (20.0, 5.0, 5.0, 5.0)  #: Standard deviations of a load's mass and first moment. [kg, kg·m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class FreeLoad:
+    """A load in the free part."""
+
+    mass: float  #: Its mass. [kg]
+    moment: Array  #: Mass times its centre, in flange axes. (3,) [kg·m]
+    sd: float  #: Standard deviation of the mass. [kg]
+    moment_sd: Array  #: That of the moment. (3,) [kg·m]
+    share: float  #: What is left of the free part's disturbance with it.
+
+    def __post_init__(self) -> None:
+        seal(self, "moment", "moment_sd")
+
+    @property
+    def remark(self) -> Remark:
+        """The free part's load, and its remedy."""
+        left = 100.0 * self.share
+        return caution("free-part-loaded", load_kg=self.mass, sd_kg=self.sd, left_percent=left)
+
+    @property
+    def weights(self) -> Array:
+        """Mass and moment. (4,) [kg, kg·m]"""
+        return np.concatenate([[self.mass], self.moment])
+
+    def torque(self, run: Run) -> Array:
+        """External joint torque of its weight along a recording. (T, n) [N·m]"""
+        return handed_over(load_regressor(run.robot.chain, run.q) @ self.weights)
+
+    def wrench(self, chain: Chain, q: Array) -> tuple[Array, Array]:
+        """Wrench of its weight at positions (N, n) [rad], and its covariance. (N, 6), (N, 6, 6)
+
+        In base axes, the moment about the flange point. [N, N·m]
+        """
+        each = load_wrench(chain, q)
+        spread = each * np.concatenate([[self.sd], self.moment_sd])
+        return each @ self.weights, spread @ spread.swapaxes(1, 2)
+
+
+def without_load(run: Run, load: FreeLoad | None) -> Run:
+    """A run without a load, μ ← μ + τ_load; itself where there is none."""
+    return run if load is None else run.less(load.torque(run))
+
+
+def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
+    """The load behind much of the free part's disturbance, or None."""
+    parts = [part for piece in pieces if (part := columns(piece)) is not None]
+    if not parts:
+        return None
+    robot = pieces[0].run.robot
+    d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
+    if len(d) < 2 * A.shape[2] or not np.any(d):
+        return None
+    friction = dry_friction(robot.friction, robot.joints)
+    prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
+    weights, sd, loaded = weigh(d, A, prior)
+    _, _, bare = weigh(d, A[:, :, 4:], prior[4:])
+    moved = bare > 0.0  # a simulation without noise leaves nothing on a joint at rest
+    share = float(np.sqrt(np.mean((loaded[moved] / bare[moved]) ** 2)))
+    mass = float(weights[0])
+    if mass < max(LEAST, SURE * float(sd[0])) or share > PARTLY:
+        return None
+    whole = np.hypot(sd[:4], gain_sd(pieces[0].run.recording, robot) * weights[:4])
+    return FreeLoad(
+        mass=mass,
+        moment=weights[1:4].copy(),
+        sd=float(whole[0]),
+        moment_sd=whole[1:],
+        share=share,
+    )
+
+
+def weighed(piece: RunSamples) -> Indices:
+    """The samples of a piece that are weighed. (S,)"""
+    step = median_step(piece.run.t)
+    return np.flatnonzero(piece.inside)[:: max(1, int(1.0 / (RATE * step)))]
+
+
+def columns(piece: RunSamples) -> tuple[Array, Array] | None:
+    """Disturbance and its columns, None of a short piece. (S, n) [N·m], (S, n, 4 + 2n)"""
+    run, inside = piece.run, np.flatnonzero(piece.inside)
+    if inside.size == 0:
+        return None
+    n, j = run.robot.joints, np.arange(run.robot.joints)
+    # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
+    near = round(HEARD / median_step(run.t))
+    first, stop = max(0, int(inside[0]) - near), int(inside[-1]) + near + 1
+    series = (run.t, run.terms.p, run.terms.mu, run.q, run.dq)
+    t, p, mu, q, dq = (values[first:stop] for values in series)
+    try:
+        smooth = zero_phase(t, np.hstack([derivative(t, p) - mu, dq]), CUTOFF)
+    except (ClockError, ValueError):
+        return None
+    used = weighed(piece) - first
+    A = np.zeros((len(used), n, 4 + 2 * n))
+    A[:, :, :4] = load_regressor(run.robot.chain, q[used])
+    A[:, j, 4 + j] = np.tanh(smooth[used][:, n:] / SIGN_SPEED)
+    A[:, j, 4 + n + j] = 1.0
+    return smooth[used][:, :n], A
+
+
+def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
+    """Weights of columns (m,), their standard deviations, and the rms that is left (n,) [N·m].
+
+    Regularised least squares, each joint weighed by what the fit leaves of it.
+
+    Args:
+        d: Disturbance. (S, n) [N·m]
+        A: Columns. (S, n, m)
+        prior: Standard deviations of their weights about zero. (m,)
+    """
+    together = max(1.0, MEMORY * RATE)
+    spread = np.sqrt(np.mean(d**2, axis=0)) + 1e-6
+    for _ in range(PASSES):
+        scaled = A / spread[:, None]
+        gram = np.einsum("sjm,sjk->mk", scaled, scaled) / together + np.diag(prior**-2)
+        right = np.einsum("sjm,sj->m", scaled, d / spread) / together
+        covariance = np.linalg.inv(gram)
+        weights = covariance @ right
+        left = np.sqrt(np.mean((d - A @ weights) ** 2, axis=0))
+        spread = np.maximum(left, 1e-3 * np.max(left) + 1e-6)
+    return weights, np.sqrt(np.diag(covariance)), left

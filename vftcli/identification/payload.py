@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_load import LEAST, PARTLY, SURE, columns, weighed
+from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, weighed
 from vftcli.identification.processing import (
     STATIC,
     PreparedLog,
@@ -289,7 +289,7 @@ def resting_poses(recording: Recording, robot: Robot) -> tuple[Array, Array]:
 def payload_from_motion(recordings: Sequence[Recording], robot: Robot) -> LoadFit:
     """A load from motion, by torque beyond the robot's own weight.
 
-    The columns of `vftcli.free_motion.free_load` hold only a load's weight. A second weighing
+    The columns of `vftcli.free_motion.free_motion` hold only a load's weight. A second weighing
     carries the load found, so that its inertia does not count as weight.
     """
     names = names_of(recordings)

@@ -51,7 +51,7 @@ from vftcli.signals.progress import steps
 from vftcli.signals.remarks import sentence
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import SMOOTHER
-from vftcli.virtual_sensor.virtual_sensor import ForceArrow, VirtualSensor
+from vftcli.virtual_sensor.solvers import ForceArrow, VirtualSensor
 
 #: Stretches of a long log of which a plot keeps the lowest and highest samples of its lines.
 STRETCHES = 5000

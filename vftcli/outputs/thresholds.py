@@ -5,8 +5,8 @@ from itertools import product
 from math import ceil, isnan
 from typing import Any
 
-from vftcli.contacts.threshold_check import ThresholdDetection
-from vftcli.contacts.thresholds import CountedAlarms, SignalThreshold, Thresholds
+from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
+from vftcli.contacts.thresholds import SignalThreshold, Thresholds
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of

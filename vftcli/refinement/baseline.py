@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_load import FreeLoad, free_load, without_load
-from vftcli.free_motion.free_motion import FreeMotion, FreePart
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, FreePart, free_load, without_load
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import Spectra, looks_free, spectra_of
 from vftcli.observers.table import BEST, LogSpectra
@@ -20,11 +19,10 @@ from vftcli.observers.tuning import Goal, tune_all
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.robots.run import Run, RunSamples
-from vftcli.signals.arrays import Array, Mask, frozen_mask
+from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError, VftError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.rest import standing
 
 STANDS = 0.5  #: Stiction limits a joint at rest in more than this share of the samples.
 
@@ -37,7 +35,6 @@ class Baseline:
     part: FreePart | None = None  #: Its free part, None where there is none.
     #: Spectra of the raw disturbance, None where the free part is too short or not free.
     spectra: Spectra | None = None
-    standing: Mask  #: Where a joint rests. (T, n)
     #: Why there is no free part, or are no spectra; None where there are both.
     missing: Remark | None = None
     #: A load that the free part carries and the model lacks, None where none shows.
@@ -51,9 +48,6 @@ class Baseline:
     #: Its parts in use, those not in use, and the substitute for a free part.
     on_correction: tuple[Remark, ...] = ()
     _made: dict[Run, Run] = field(init=False, repr=False, compare=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "standing", frozen_mask(self.standing))
 
     def of(self, run: Run) -> Run:
         """The log or one of its free runs, as the observers have it. Made once.
@@ -112,7 +106,7 @@ class Baseline:
     @property
     def stuck(self) -> Mask:
         """Joints that stand in most samples, where stiction decides. (n,)"""
-        return np.asarray(self.standing.mean(axis=0) > STANDS)
+        return np.asarray(self.motion.log.standing.mean(axis=0) > STANDS)
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
@@ -126,8 +120,7 @@ class Baseline:
 def baseline_of(motion: FreeMotion) -> Baseline:
     """Find the free part of a log and its spectra, or say why there are none."""
     log = motion.log
-    stands = standing(log.t, log.dq)
-    bare = Baseline(motion=motion, standing=stands)
+    bare = Baseline(motion=motion)
     try:
         part = motion.part
     except ReferenceTorqueError as error:

@@ -28,7 +28,7 @@ from vftcli.refinement.baseline import Baseline, Baselines, FreeReading, free_re
 from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.refinement.whole_log import stride_of
-from vftcli.robots.friction import HELD, ONE_STOP, dry_friction
+from vftcli.robots.friction import HELD, ONE_STOP
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
@@ -60,7 +60,7 @@ def with_band(found: Baseline, reading: FreeReading) -> ExternalTorque:
         sd = stated_band(found, reading)
     else:
         return estimate
-    return replace(estimate, error_sd=handed_over(sd), moving=~found.standing)
+    return replace(estimate, error_sd=handed_over(sd), moving=~run.standing)
 
 
 def stated_band(found: Baseline, reading: FreeReading) -> Array:
@@ -72,9 +72,8 @@ def stated_band(found: Baseline, reading: FreeReading) -> Array:
     gaps, a moving joint has `UNSEEN` of its dry friction.
     """
     run = found.motion.log
-    friction = dry_friction(run.robot.friction, reading.estimate.joints)
-    nothing = np.zeros_like(friction)
-    called = fitted_error(found, reading, friction)
+    friction, nothing = run.dry_friction, np.zeros_like(run.dry_friction)
+    called = fitted_error(found, reading)
     if called is not None:
         return error_band(called, nothing, run.rests, found.correction_sd)
     held = FreeError(nothing, (HELD * friction) ** 2, unseen=nothing > 0.0)
@@ -95,9 +94,8 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     Samples that a fitted bias calls free speak too, as a stated part is short and often at rest:
     the larger of both counts.
     """
-    friction = dry_friction(found.motion.log.robot.friction, reading.estimate.joints)
-    stated = free_error(reading.samples, reading.resting, friction)
-    called = fitted_error(found, reading, friction)
+    stated = free_error(reading.samples, reading.resting, found.motion.log.dry_friction)
+    called = fitted_error(found, reading)
     if called is None:
         return stated
     if found.by_fit:  # the free part is these samples, and the loads in them are no error
@@ -107,7 +105,7 @@ def known_error(found: Baseline, reading: FreeReading) -> FreeError:
     return FreeError(moving, resting, unseen=stated.unseen & called.unseen)
 
 
-def fitted_error(found: Baseline, reading: FreeReading, friction: Array) -> FreeError | None:
+def fitted_error(found: Baseline, reading: FreeReading) -> FreeError | None:
     """Readings in the correction fit's free samples; None in too few.
 
     Slow loads that the fit believes in are no error of who reads them, nor is a load that the free
@@ -120,7 +118,7 @@ def fitted_error(found: Baseline, reading: FreeReading, friction: Array) -> Free
         tau = tau - off.load
     elif found.load is not None:
         tau = tau - found.load.torque(run)
-    return free_error(tau[off.free], run.rests[off.free], friction)
+    return free_error(tau[off.free], run.rests[off.free], run.dry_friction)
 
 
 def band_remarks(found: Baseline) -> list[Remark]:
@@ -159,14 +157,14 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     velocity = np.concatenate([piece.run.dq[piece.inside] for piece in found.pieces])
     by_friction = (read - noise) * friction_share(velocity, reading.samples)
-    robot = found.motion.log.robot
-    hidden = ONE_STOP * dry_friction(robot.friction, robot.joints)
+    log = found.motion.log
+    hidden = ONE_STOP * log.dry_friction
     squares = {
         "noise": noise,
         "friction": by_friction,
         "model": read - noise - by_friction,
         "bandwidth": spectra.missed(response),
-        STICTION: hidden**2 * found.standing.mean(axis=0),
+        STICTION: hidden**2 * log.standing.mean(axis=0),
     }
     parts = {cause: np.sqrt(value) for cause, value in squares.items()}
     return Budget(reading.observer.name, parts)

@@ -22,8 +22,15 @@ from vftcli.refinement.model_error import (
     usual_friction,
     without_waits,
 )
-from vftcli.refinement.normal_equations import Rows, slow_loads
-from vftcli.refinement.robust_fit import Guarded, WholeLogFit, faded, fit_robustly, guarded
+from vftcli.refinement.robust_fit import (
+    Guarded,
+    Rows,
+    WholeLogFit,
+    faded,
+    fit_robustly,
+    guarded,
+    slow_loads,
+)
 from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
 from vftcli.signals.external_torque import DynamicsTerms

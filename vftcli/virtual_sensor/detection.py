@@ -16,7 +16,7 @@ from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.series import intervals, runs_of
 from vftcli.virtual_sensor.sensor_reading import SETTLING, SensorReading
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 #: A contact ends where the score falls below this share of its threshold, 1: hysteresis.
 LEAVE = 0.6

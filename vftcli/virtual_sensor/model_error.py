@@ -306,6 +306,22 @@ class ErrorProcess(NamedTuple):
         return self._replace(white=np.where(hidden[:, None], UNKNOWN, self.white))
 
 
+def steady_process(
+    noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None, starts: Mask | None = None
+) -> ErrorProcess:
+    """B along a log without stops and spikes; joints that start (K, n) let go of it faster.
+
+    In the `touched` blocks (K,) a contact may re-settle stiction at rest.
+    """
+    variance, time = noise.stationary(blocks, touched)
+    if starts is not None:
+        time = np.where(starts, np.minimum(time, START_TIME), time)
+    decay = np.exp(-steps(blocks)[:, None] / time)
+    decay[0] = 0.0
+    white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
+    return ErrorProcess(decay, variance * (1.0 - decay**2), white, np.zeros(decay.shape))
+
+
 def error_process(noise: TorqueNoise, blocks: Blocks, touched: Mask | None = None) -> ErrorProcess:
     """B along a log; in the `touched` blocks (K,) a contact may re-settle stiction at rest."""
     rests, length = blocks.rests, float(np.median(blocks.length))
@@ -314,21 +330,16 @@ def error_process(noise: TorqueNoise, blocks: Blocks, touched: Mask | None = Non
     total = np.vstack([np.zeros((1, rests.shape[1])), np.cumsum(~rests, axis=0)])
     first = np.maximum(k - count, 0)
     moved = (total[:-1] - total[first]) / np.maximum(k - first, 1)[:, None]
-    variance, time = noise.stationary(blocks, touched)
-    time = np.where(~rests & (moved < 1.0), np.minimum(time, START_TIME), time)
-    decay = np.exp(-steps(blocks)[:, None] / time)
-    added = variance * (1.0 - decay**2)
+    process = steady_process(noise, blocks, touched, ~rests & (moved < 1.0))
     stops = rests & ~np.vstack([np.ones((1, rests.shape[1]), bool), rests[:-1]]) & (moved > 0.5)
-    decay[stops] = STOP_DECAY
-    anew = np.broadcast_to((STOP_SHARE * noise.dry) ** 2, variance.shape)
-    added[stops] = anew[stops]
-    decay[0] = 0.0
-    added[0] = variance[0] + np.where(rests[0], anew[0], 0.0)
-    white = np.where(blocks.known[:, None], noise.white, UNKNOWN)
+    process.decay[stops] = STOP_DECAY
+    anew = np.broadcast_to((STOP_SHARE * noise.dry) ** 2, rests.shape)
+    process.added[stops] = anew[stops]
+    process.added[0] += np.where(rests[0], anew[0], 0.0)
     # 12.5 blocks of 24 ms: the clock's last digit decides nothing.
     reach = max(round(SPIKE_REACH / length - TIE), 1)
     spikes = np.where(near(~rests, reach), SPIKES_MOVING, SPIKES_RESTING)
-    return ErrorProcess(decay, added, white, spikes)
+    return process._replace(spikes=spikes)
 
 
 def error_model(d: Array, process: ErrorProcess) -> LinearModel:

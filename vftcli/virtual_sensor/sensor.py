@@ -17,9 +17,8 @@ from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.series import bridge_unknown, resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
-from vftcli.virtual_sensor.frames import Mounting
-from vftcli.virtual_sensor.log_wrench import UNSTATED
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.frames import UNSTATED, Mounting
+from vftcli.virtual_sensor.solvers import VirtualSensor
 
 #: Second to first singular value of the forces below which they lie on one line.
 LEAST_DIRECTIONS = 0.02

@@ -17,8 +17,7 @@ from vftcli.signals.shown import Shown
 from vftcli.signals.wrench import AXES, Wrench, unit_of
 from vftcli.virtual_sensor.choice import SMOOTHER, ZeroChoice
 from vftcli.virtual_sensor.smoother import SmoothedWrench
-from vftcli.virtual_sensor.solvers import SCALE
-from vftcli.virtual_sensor.virtual_sensor import VirtualSensor
+from vftcli.virtual_sensor.solvers import SCALE, VirtualSensor
 
 #: The threshold of the null-space torque is so far above the largest value of the free part.
 MARGIN = 1.25

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_load import FreeLoad
+from vftcli.free_motion.free_motion import FreeLoad
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import TIE, Blocks, disturbance_blocks
@@ -22,7 +22,14 @@ from vftcli.signals.errors import RobotError
 from vftcli.signals.linear_model import LinearModel, beside_errors, log_likelihood, smoothed
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import covered, median_step, resample_columns, runs_of
-from vftcli.virtual_sensor.model_error import TorqueNoise, steps, torque_noise
+from vftcli.virtual_sensor.model_error import (
+    UNKNOWN,
+    ErrorProcess,
+    TorqueNoise,
+    steady_process,
+    steps,
+    torque_noise,
+)
 
 COARSE = 0.1  #: Length of a block for steady loads, and for the choice of the prior. [s]
 #: Length of a block where the wrench moves [s]; on an uneven clock it holds so many samples.
@@ -81,6 +88,59 @@ class WrenchPrior(NamedTuple):
 GRID = tuple(WrenchPrior(time, force) for time in TIMES for force in FORCES)
 
 
+BlockSpan = tuple[int, int]  #: Number of the first block, and of the one behind the last.
+
+
+class BlockLog(NamedTuple):
+    """A log in blocks, with its model error."""
+
+    blocks: Blocks  #: The blocks.
+    process: ErrorProcess  #: b along them.
+
+
+class Lane(NamedTuple):
+    """One hypothesis on one window."""
+
+    window: BlockSpan  #: Which blocks.
+    gate: Mask  #: Blocks of the log in which the wrench may differ from zero. (K,)
+    hidden: Mask  #: Blocks of the log that say nothing. (K,)
+    jacobian: Array  #: J along the log. (K, 6, n)
+    prior: WrenchPrior | None  #: How the wrench may move; None where nothing touches.
+
+
+def assembled(log: BlockLog, lanes: Sequence[Lane]) -> LinearModel:
+    """Wrench w and model error b of lanes side by side: d = Jᵀw + b + noise. (K, L, 6 + n)
+
+    Shorter lanes end in blocks that say nothing. Outside its gate the wrench is pinned to zero; the
+    first block inside starts it with the prior's own variance, independent of before.
+    """
+    n, step, process = log.blocks.d.shape[1], steps(log.blocks), log.process
+    longest = max(lane.window[1] - lane.window[0] for lane in lanes)
+    # What is the same in all lanes is there once: of a long log G priors would have no room.
+    alike = all(a is b for lane in lanes for a, b in zip(lane[:4], lanes[0][:4], strict=True))
+    each = 1 if alike else len(lanes)
+    d, jacobian = np.zeros((longest, each, n)), np.zeros((longest, each, 6, n))
+    white = np.full((longest, each, n), UNKNOWN)
+    decay, added = np.ones((longest, len(lanes), 6 + n)), np.zeros((longest, len(lanes), 6 + n))
+    decay[:, :, :6] = 0.0
+    for i, lane in enumerate(lanes):
+        span = slice(*lane.window)
+        own = slice(span.stop - span.start), i
+        decay[*own, 6:], added[*own, 6:] = process.decay[span], process.added[span]
+        # A window begins with what b is like anywhere, not with what it was before.
+        added[0, i, 6:] /= np.maximum(1.0 - decay[0, i, 6:] ** 2, 1e-9)
+        decay[0, i, 6:] = 0.0
+        if lane.prior is not None:
+            moves = lane.prior.process(lane.gate[span], step[span])
+            decay[*own, :6], added[*own, :6] = moves
+        if i < each:
+            d[own] = log.blocks.d[span]
+            white[own] = np.where(lane.hidden[span, None], UNKNOWN, process.white[span])
+            if lane.prior is not None:
+                jacobian[own] = lane.jacobian[span]
+    return LinearModel(d, beside_errors(jacobian), white, decay, added)
+
+
 class BlockModel(NamedTuple):
     """A log in blocks of one length, with its noise and its gate."""
 
@@ -90,31 +150,13 @@ class BlockModel(NamedTuple):
     inside: Mask  #: Blocks in which there may be a wrench. (K,)
 
     def under(self, priors: Sequence[WrenchPrior]) -> LinearModel:
-        """Wrench w and model error b under each of G priors: d = Jᵀw + b + noise. (K, G, 6 + n)
-
-        Outside the gate the wrench is pinned to zero; the first block inside starts it with the
-        prior's own variance, independent of before. So does the log's first block the model error.
-        """
-        blocks, inside = self.blocks, self.inside
-        count, n = blocks.d.shape
-        decay, added = (np.zeros((count, len(priors), 6 + n)) for _ in range(2))
-        step = steps(blocks)
-        for g, prior in enumerate(priors):
-            decay[:, g, :6], added[:, g, :6] = prior.process(inside, step)
+        """The model of the whole log under each of G priors. (K, G, 6 + n)"""
         # Where the whole log may be touched nothing tells a push from what it re-settles.
-        variance, time = self.noise.stationary(blocks, None if inside.all() else inside)
-        kept = np.exp(-step[:, None] / time)
-        kept[0] = 0.0
-        decay[:, :, 6:] = kept[:, None, :]
-        added[:, :, 6:] = (variance * (1.0 - kept**2))[:, None, :]
-        known = blocks.known[:, None, None]
-        return LinearModel(
-            d=np.where(known, blocks.d[:, None], 0.0),
-            observation=(beside_errors(self.jacobian) * known)[:, None],
-            white=np.where(known, self.noise.white, 1.0),
-            decay=decay,
-            added=added,
-        )
+        touched = None if self.inside.all() else self.inside
+        process = steady_process(self.noise, self.blocks, touched)
+        lane = Lane((0, len(self.inside)), self.inside, ~self.blocks.known, self.jacobian, None)
+        lanes = [lane._replace(prior=prior) for prior in priors]
+        return assembled(BlockLog(self.blocks, process), lanes)
 
 
 def block_model(
@@ -152,18 +194,6 @@ def block_length(t: Array, *, fine: bool) -> float:
     if fine:
         length = min(COARSE, max(FINE, step if is_uniform(t) else JITTERED * step))
     return max(length, float(t[-1] - t[0]) / MOST_BLOCKS)
-
-
-class MovedWrench(NamedTuple):
-    """A wrench at some times."""
-
-    values: Array  #: (T, 6) [N, N·m]
-    covariance: Array  #: (T, 6, 6)
-
-    @property
-    def sd(self) -> Array:
-        """Standard deviation. (T, 6) [N, N·m]"""
-        return deviations(self.covariance)
 
 
 def deviations(covariance: Array) -> Array:
@@ -206,13 +236,10 @@ class SmoothedWrench:
         block = np.searchsorted(self.t + 0.5 * self.seconds, t)
         return ~self.inside[np.minimum(block, len(self.t) - 1)]
 
-    def at(self, t: Array) -> MovedWrench:
+    def at(self, t: Array) -> tuple[Array, Array]:
         """Values and covariance at other times, straight between blocks. (T, 6), (T, 6, 6)"""
-        flat = self.covariance.reshape(len(self.t), 36)
-        return MovedWrench(
-            resample_columns(t, self.t, self.values),
-            resample_columns(t, self.t, flat).reshape(-1, 6, 6),
-        )
+        flat = resample_columns(t, self.t, self.covariance.reshape(len(self.t), 36))
+        return resample_columns(t, self.t, self.values), flat.reshape(-1, 6, 6)
 
     @property
     def record(self) -> dict[str, object]:
@@ -281,15 +308,15 @@ def smooth_wrench(
     seconds = block_length(run.t, fine=not prior.is_steady)
     model = block_model(run, free, gate, seconds)
     mean, covariance = smoothed(LinearModel(*(series[:, 0] for series in model.under([prior]))))
-    own, inside = covariance[:, :6, :6], model.inside
+    values, own, inside = mean[:, :6], covariance[:, :6, :6], model.inside
     if gate is not None:
         own = np.where(inside[:, None, None], own, unlisted(model, prior))
     spread = own * np.outer(WIDENED, WIDENED)
     if gate is not None:
-        spread = spread + inside[:, None, None] * hidden_by_blocks(mean[:, :6])
+        spread = spread + inside[:, None, None] * hidden_by_blocks(values)
     return SmoothedWrench(
         t=model.blocks.t,
-        values=mean[:, :6],
+        values=values,
         covariance=spread,
         inside=inside,
         seconds=seconds,
@@ -354,11 +381,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
 def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
     """Variance of the model error `count` blocks after the last one that shows it. (K, n)
 
-    Args:
-        quiet: Its variance in a block that shows it; the log's start has v. (K, n)
-        v: What it tends to. (K, n)
-        kept: Share of its variance that is kept from the block before. (K, n)
-        count: How many blocks show nothing of it.
+    There it is `quiet`, at the log's start v, to which it tends as each block keeps a share of it.
     """
     blocks = np.arange(len(v))
     found = np.where((blocks >= count)[:, None], quiet[np.maximum(blocks - count, 0)], v)
