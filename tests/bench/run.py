@@ -40,7 +40,9 @@ from vftcli.reproduction.timing import (
     dense_kalman_loop,
     estimate_tuned,
     first_order_loops,
+    jittering,
     one_core,
+    rnea_loop,
     simd,
 )
 from vftcli.robots import Robot, load_robot
@@ -64,17 +66,8 @@ RATIOS = {
 }
 """Name → what is over what."""
 
-JITTER = 0.05
-"""How far the steps of the jittering clock stray, of their mean. [1]"""
-
 FILLED = "output_double_register"
 """Columns that fill the wide log and that no command reads begin so."""
-
-
-def jittering(motion: Recording) -> Recording:
-    """The same motion on a clock that jitters by 5 %, seed 1."""
-    strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
-    return replace(motion, t=motion.t + 0.5 * strayed)
 
 
 def driven(motion: Recording, robot: Robot) -> tuple[Recording, Array]:
@@ -177,13 +170,6 @@ def core_ratios(robot: Robot, samples: int, rounds: int) -> dict[str, float]:
         "complete_over_core": timings.median("complete") / core_s,
         "best_over_observers": timings.median(BEST) / sum(map(timings.median, PAPER)),
     }
-
-
-def rnea_loop(model: Any, q: Array, dq: Array) -> None:
-    """One bare `pin.rnea` call a sample, one term, nothing else."""
-    data, zero = model.createData(), np.zeros(model.nv)
-    for k in range(len(q)):
-        pin.rnea(model, data, q[k], dq[k], zero)
 
 
 def analytic_script(model: Any, recording: Recording, kalman: KalmanObserver) -> None:

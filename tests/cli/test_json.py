@@ -39,7 +39,13 @@ RESULTS: dict[tuple[object, ...], str] = {
     ("admit", OTHER, *SHORT): "rows",
     ("admit", "--release", "x=0.3", "--robot", "ur5"): "rows",
     ("simulate", "ur5-circle", "--set", "duration=1", "-o", "out.csv"): "scenario seed files",
-    ("bench", "--set", "bench.samples=2000", "--set", "bench.rounds=1"): "observers dynamics",
+    (
+        "bench",
+        "--set",
+        "bench.samples=2000",
+        "--set",
+        "bench.rounds=1",
+    ): "observers dynamics ratios",
 }
 
 

@@ -1,5 +1,7 @@
 """The benchmark: what it measures, and the keys that scripts read."""
 
+from importlib.util import find_spec
+
 import pytest
 
 from vftcli.reproduction.timing import Timings, benchmark, simd
@@ -19,3 +21,6 @@ def test_the_keys_that_scripts_read() -> None:
     assert {"total_s", "per_sample_us"} <= set(found["observers"][0])
     assert found["complete_log"][-1]["name"] == "wrench smoother"
     assert found["simd"] == simd()
+    names = ["core_over_rnea_loop", "core_over_rnea_loop_jittering"]
+    assert list(found["ratios"]) == (names if find_spec("pinocchio") else [])
+    assert all(ratio > 0.0 for ratio in found["ratios"].values())

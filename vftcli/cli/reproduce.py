@@ -102,3 +102,6 @@ def bench(
         return
     echo(title)
     echo(grid.terminal(bench_grid(result)))
+    if ratios := [f"{ratio:.2f}" for ratio in result["ratios"].values()]:
+        echo(f"Dynamics with four observers take {ratios[0]} of the time of a loop of pin.rnea,")
+        echo(f"{ratios[1]} on a clock that jitters by 5 %.")

@@ -8,7 +8,7 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -25,6 +25,7 @@ from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import dynamics_terms, literal_momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import DynamicsTerms
+from vftcli.signals.packages import installed, needed
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.smoother import smooth_wrench
 
@@ -34,6 +35,10 @@ FREE_SECONDS = 8.0
 TUNED = ("kfo-auto", "rts-auto")  #: Observers that are timed with their tuning.
 SMOOTHER = "wrench smoother"  #: Name of the smoother of the whole log's wrench.
 LOOKING_BACK = (BEST, "kfo-rts", *TUNED)  #: Observers that need a complete log.
+RNEA = "rnea loop"  #: Name of the yardstick, a loop of Pinocchio's `rnea` over the samples.
+#: What is over a loop of Pinocchio's `rnea`: dynamics and four observers, on two clocks.
+RATIOS = ("core_over_rnea_loop", "core_over_rnea_loop_jittering")
+JITTER = 0.05  #: How far the steps of the jittering clock stray, of their mean. [1]
 #: Line of the paper's Table II → its total times over 30 060 samples on its laptop. [s]
 PRINTED = {line.key: line.number for line in PAPERS["huang2025"].items["table2"].lines}
 #: Samples the paper's way runs over, one after another; its time is scaled to all samples.
@@ -89,6 +94,20 @@ def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
     return Recording(t=t, q=q, dq=dq, current=current, torque=current)
 
 
+def jittering(motion: Recording) -> Recording:
+    """The same motion on a clock that jitters by 5 %, seed 1."""
+    strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
+    return replace(motion, t=motion.t + 0.5 * strayed)
+
+
+def rnea_loop(model: Any, q: Array, dq: Array) -> None:  # noqa: ANN401 - Pinocchio is untyped
+    """One bare `pin.rnea` call a sample, one term, nothing else."""
+    pin = needed("pinocchio", "the ratios of vftcli bench")
+    data, zero = model.createData(), np.zeros(model.nv)
+    for k in range(len(q)):
+        pin.rnea(model, data, q[k], dq[k], zero)
+
+
 def simd() -> str:
     """The widest instructions that NumPy found on this machine, as it names them."""
     found = np.show_config(mode="dicts") or {}
@@ -101,7 +120,9 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     Returns:
         ``observers``: rows (name, total_s, per_sample_us, paper_s), dynamics included in none;
         ``dynamics``: the batched terms; ``complete_log``: the spectra and the observers that need
-        a complete log, with their tuning but for ``best``; and what was run.
+        a complete log, with their tuning but for ``best``; ``ratios``: dynamics and four observers
+        over a loop of `pin.rnea`, on an even and a jittering clock, where Pinocchio is installed;
+        and what was run.
     """
     robot, timings = load_robot(robot_name), Timings()
     recording = circle(robot, samples)
@@ -110,9 +131,18 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
     free = recording.t < FREE_SECONDS
     part = [RunSamples(run, free)]
     spectra = partial(spectra_of, RunSamples(run, ~free), part)
+    logs = (recording, jittering(recording)) if installed("pinocchio") else ()
+    cores = dict(zip(RATIOS, logs, strict=False))
     with one_core():
         terms, found = run.terms, spectra()
+
+        def core(log: Recording) -> None:
+            own = dynamics_terms(log, robot)
+            for observer in observers[: len(PAPER)]:
+                observer.estimate(own)
+
         work: dict[str, Callable[[], object]] = {
+            **{name: partial(core, log) for name, log in cores.items()},
             "dynamics": partial(dynamics_terms, recording, robot),
             **{observer.name: partial(observer.estimate, terms) for observer in observers},
             "spectra": spectra,
@@ -120,6 +150,8 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
             **({SMOOTHER: partial(smooth_wrench, run, part)} if robot.joints >= 6 else {}),
             **{name: partial(estimate_tuned, name, terms, found) for name in TUNED},
         }
+        if cores:
+            work[RNEA] = partial(rnea_loop, robot.model, recording.q, recording.require("dq"))
         for call in work.values():  # once unmeasured
             call()
         for _ in range(rounds):
@@ -140,6 +172,7 @@ def benchmark(robot_name: str = "ur5", samples: int = SAMPLES, rounds: int = 7) 
             if name in timings.seconds
         ],
         "dynamics": timings.row("dynamics", samples),
+        "ratios": {name: timings.median(name) / timings.median(RNEA) for name in cores},
     }
 
 
