@@ -6,20 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification.processing import CUTOFF, PreparedLog
-from vftcli.identification.training import Training, prepare_training
+from vftcli.identification.training import CUTOFF, PreparedLog, Training, prepare_training
 from vftcli.robots import JointFriction, Robot, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 from vftcli.signals.recording import Recording
 
+UR5 = load_robot("ur5")
 
-def prepared_log(t, q=None, dq=None, ddq=None, tau=None, usable=None, **signals) -> PreparedLog:
+
+def prepared_log(
+    t, q=None, dq=None, ddq=None, tau=None, weights=None, load=None, warmth=None, **signals
+) -> PreparedLog:
     """A prepared log of exactly these signals; what is not given is zero."""
     shape = next(x for x in (q, dq, ddq, tau) if x is not None).shape
     q, dq, ddq, tau = (np.zeros(shape) if x is None else x for x in (q, dq, ddq, tau))
-    return PreparedLog(
+    log = PreparedLog(
         recording=Recording(t=t, q=q, dq=dq, torque=tau, **signals),
+        robot=UR5,
         cutoff=CUTOFF,
         kept=np.arange(len(t)),
         t=t,
@@ -27,8 +31,10 @@ def prepared_log(t, q=None, dq=None, ddq=None, tau=None, usable=None, **signals)
         dq=dq,
         ddq=ddq,
         tau=tau,
-        usable=np.ones(shape, dtype=bool) if usable is None else usable,
+        weights=np.ones(shape) if weights is None else weights,
     )
+    vars(log).update(load=np.zeros(shape) if load is None else load, warmth=warmth)
+    return log
 
 
 @pytest.fixture

@@ -52,7 +52,7 @@ def test_a_push_is_left_out_of_the_fit(recording):
     data = prepare_training([pushed], UR5)
     found, fits, (remark,) = fit_without_contacts(data, strict=False)
     assert remark.code == "suspected-contacts"
-    t, weights = data.logs[0].motion.t, found.logs[0].weights
+    t, weights = data.logs[0].t, found.logs[0].weights
     np.testing.assert_array_equal(weights[(t > 5) & (t < 6)], 0.0)
     assert weights[(t < 4.5) | (t > 6.5)].all()
     # the samples closer than the margin, steps of 24 ms
@@ -112,9 +112,11 @@ def test_what_dry_friction_can_hold_near_standstill_is_no_contact(prepared):
 
 
 def test_samples_that_tell_nothing_are_no_contact(prepared):
-    motion = prepared(T, dq=np.full((len(T), 3), 0.5), usable=np.abs(T - 4.25)[:, None] > [[0.3]])
-    usable = np.repeat(motion.usable, 3, axis=1)
-    motion = prepared(T, dq=motion.dq, usable=usable)
+    motion = prepared(
+        T,
+        dq=np.full((len(T), 3), 0.5),
+        weights=np.repeat(np.abs(T - 4.25)[:, None] > 0.3, 3, axis=1) * 1.0,
+    )
     assert not find_contacts(motion, touched(0.5, 50.0), np.zeros((len(T), 3)))
 
 
@@ -146,7 +148,7 @@ def test_neighbours_are_joined_and_the_larger_one_names_them(prepared):
 def test_the_worst_explained_heavy_joint_is_named(data):
     """Shares of the torque's mean square that the fit leaves; its variance is what counts."""
     (log,), residuals = data.logs, [0.9, 0.2, 0.04, 0.9, 0.9, 0.9]
-    tau = log.motion.tau
+    tau = log.tau
     fits = [
         SimpleNamespace(fit=SimpleNamespace(residual=np.sqrt(share) * tau[:, j]))
         for j, share in enumerate(residuals)

@@ -14,7 +14,7 @@ from vftcli.identification.friction_fit import (
     non_negative_fit,
     tellable_terms,
 )
-from vftcli.identification.training import FrictionColumns, Shape, term_values
+from vftcli.identification.shapes import Shape, term_values
 
 LIMIT = 1.2
 """Speed up to which friction may not fall: 5 − 2·2 v = 0 lies above it, at 1.25. [rad/s]"""
@@ -27,17 +27,16 @@ def equations(prepared, truth, noise=0.05, load=5.0, reverses=True, limit=LIMIT)
     if not reverses:
         dq = np.abs(dq) + 0.05
     loads = load * (1 + np.cos(2 * np.pi * 0.03 * t))
-    motion = prepared(t, dq=dq[:, None])
-    columns = FrictionColumns(motion, loads[:, None])
+    log = prepared(t, dq=dq[:, None], load=loads[:, None])
     shape = Shape(tuple(truth), 0.03, 0.1, 0.2)
-    y = columns.joint(0, shape) @ np.array(list(truth.values()))
+    y = log.friction(0, shape) @ np.array(list(truth.values()))
     y = y + noise * np.random.default_rng(0).standard_normal(len(t))
     return JointData(
         joint=0,
         y=y,
         fixed=np.zeros((len(t), 0)),
         weights=np.ones(len(t)),
-        sources=[columns],
+        logs=[log],
         load_spread=float(np.std(loads)),
         reverses=reverses,
         speed_limit=limit,
@@ -139,17 +138,16 @@ def reversing(prepared, dry, presliding, length=1e-3, seed=0):
     """40 s of slow reversals; tanh and play rub beside viscous friction, noise of .05 N·m."""
     t = np.arange(0, 40, 0.02)
     q = 0.05 * np.sin(2 * np.pi * 0.2 * t) + 0.01 * np.sin(2 * np.pi * 0.57 * t)
-    motion = prepared(t, q=q[:, None], dq=np.gradient(q, t)[:, None])
-    columns = FrictionColumns(motion, np.zeros((len(t), 1)))
+    log = prepared(t, q=q[:, None], dq=np.gradient(q, t)[:, None])
     shape = Shape(("coulomb", "viscous", "presliding"), 0.003, presliding_length=length)
-    y = columns.joint(0, shape) @ np.array([dry, 5.0, presliding])
+    y = log.friction(0, shape) @ np.array([dry, 5.0, presliding])
     y = y + 0.05 * np.random.default_rng(seed).standard_normal(len(t))
     data = JointData(
         joint=0,
         y=y,
         fixed=np.zeros((len(t), 0)),
         weights=np.ones(len(t)),
-        sources=[columns],
+        logs=[log],
         load_spread=0.0,
         reverses=True,
         speed_limit=LIMIT,
@@ -181,10 +179,8 @@ def test_presliding_and_sign_share_one_dry_torque(prepared):
 
 def test_whole_logs_are_left_out_where_the_joint_moves_in_several(prepared):
     data = equations(prepared, {"coulomb": 3.0, "viscous": 5.0})
-    still = prepared(np.arange(0, 2, 0.02), dq=np.zeros((100, 1)))
-    resting = FrictionColumns(still, np.zeros((100, 1)))
-    moving = data.sources[0]
-    samples = moving.motion.samples
-    both = data._replace(sources=[moving, resting, moving])
-    assert [len(part) for part in both.parts] == [samples, samples]
-    assert len(data._replace(sources=[moving, resting]).parts) == 5
+    resting = prepared(np.arange(0, 2, 0.02), dq=np.zeros((100, 1)))
+    moving = data.logs[0]
+    both = data._replace(logs=[moving, resting, moving])
+    assert [len(part) for part in both.parts] == [moving.samples, moving.samples]
+    assert len(data._replace(logs=[moving, resting]).parts) == 5

@@ -8,8 +8,8 @@ import pytest
 
 from vftcli.identification import Task, identify
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
-from vftcli.identification.processing import gravity_torque, prepare
 from vftcli.identification.result import repeated_share
+from vftcli.identification.training import gravity_torque, prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.regressor import chain_parameters, torque_regressor

@@ -6,18 +6,17 @@ import pytest
 from vftcli.identification.links import (
     DOUBTFUL,
     Grouping,
-    ParameterColumns,
     Triangles,
     base_parameters,
     group_parameters,
-    joint_sigma,
     least_change,
     residuals,
     stack,
     triangle,
     triangulate,
 )
-from vftcli.identification.training import FrictionColumns, Shape, TrainingLog
+from vftcli.identification.shapes import Shape
+from vftcli.identification.training import ParameterColumns, PreparedLog
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor
 
@@ -26,7 +25,7 @@ LAYOUT = ParameterColumns(CHAIN, True, (Shape(("coulomb", "viscous")), *(Shape((
 
 
 def test_columns_are_inertias_then_rotors_then_friction():
-    assert (LAYOUT.inertial, LAYOUT.rotors, LAYOUT.size) == (60, 6, 73)
+    assert (LAYOUT.inertial, LAYOUT.rotor_places, LAYOUT.size) == (60, slice(60, 66), 73)
     assert LAYOUT.frictions == (slice(66, 68), *(slice(k, k + 1) for k in range(68, 73)))
     assert LAYOUT.names[:2] == ("m1", "mx1")
     assert LAYOUT.names[60:] == (
@@ -35,22 +34,19 @@ def test_columns_are_inertias_then_rotors_then_friction():
         *(f"viscous{j}" for j in range(2, 7)),
     )
     without = LAYOUT._replace(rotor=False)
-    assert (without.rotors, without.size) == (0, 67)
+    assert (without.rotor_places, without.size) == (slice(60, 60), 67)
 
 
 @pytest.fixture
-def log(prepared, sines) -> TrainingLog:
+def log(prepared, sines) -> PreparedLog:
     """Six seconds of a UR5 with rotors and friction, some noise, the first second unweighted."""
     t, q, dq, ddq = sines(seconds=6.0, seed=4)
-    motion = prepared(t, q=q, dq=dq, ddq=ddq)
-    columns = FrictionColumns(motion, np.zeros(q.shape))
     rng = np.random.default_rng(5)
-    blank = TrainingLog(motion, columns, None, None, None)
-    tau = LAYOUT.rows(blank, slice(0, len(t))) @ planted()
+    tau = LAYOUT.rows(prepared(t, q=q, dq=dq, ddq=ddq), slice(0, len(t))) @ planted()
     tau = tau + rng.standard_normal(q.shape) * [0.5, 0.5, 0.5, 0.1, 0.1, 0.1]
     weights = np.ones(q.shape)
     weights[t < 1.0] = 0.0
-    return blank._replace(motion=prepared(t, q=q, dq=dq, ddq=ddq, tau=tau), weights=weights)
+    return prepared(t, q=q, dq=dq, ddq=ddq, tau=tau, weights=weights)
 
 
 def planted():
@@ -61,10 +57,10 @@ def planted():
 def test_rows_are_the_equation_of_motion(log):
     x = planted()
     rows = LAYOUT.rows(log, slice(100, 140))
-    rigid = torque_regressor(CHAIN, log.motion.q, log.motion.dq, log.motion.ddq)[100:140] @ x[:60]
-    rotors = log.motion.ddq[100:140] * (1.0 + np.arange(6))
+    rigid = torque_regressor(CHAIN, log.q, log.dq, log.ddq)[100:140] @ x[:60]
+    rotors = log.ddq[100:140] * (1.0 + np.arange(6))
     friction = [
-        log.columns.joint(j, shape)[100:140] @ x[place]
+        log.friction(j, shape)[100:140] @ x[place]
         for j, (shape, place) in enumerate(zip(LAYOUT.shapes, LAYOUT.frictions, strict=True))
     ]
     np.testing.assert_allclose(rows @ x, rigid + rotors + np.transpose(friction), atol=1e-10)
@@ -74,21 +70,18 @@ def test_residuals_are_what_x_does_not_explain(log):
     left = residuals(LAYOUT, log, planted())
     # 750 samples: a standard deviation to 2.6 %
     np.testing.assert_allclose(np.std(left, axis=0), [0.5, 0.5, 0.5, 0.1, 0.1, 0.1], rtol=0.1)
-    sigma = joint_sigma([log], [left])
-    np.testing.assert_allclose(sigma, [0.5, 0.5, 0.5, 0.1, 0.1, 0.1], rtol=0.15)
-    loud = left.copy()
-    loud[log.weights[:, 0] == 0] = 1e6  # samples of no weight do not count
-    np.testing.assert_array_equal(joint_sigma([log], [loud]), sigma)
 
 
 def test_triangles_are_the_weighted_equations(log):
     left = residuals(LAYOUT, log, planted())
-    sigma = np.array([0.5, 0.5, 0.5, 0.1, 0.1, 0.1])
-    triangles = triangulate(LAYOUT, [log], left=[left], sigma=sigma)
+    used = left[log.weights[:, 0] > 0]
+    sigma = 1.4826 * np.median(np.abs(used), axis=0)
+    left[log.weights[:, 0] == 0] = 1e6  # samples of no weight do not count
+    triangles = triangulate(LAYOUT, [log], left=[left])
     z = np.abs(left / sigma)
     weights = log.weights * np.where(z > 2.5, 2.5 / np.maximum(z, 2.5), 1.0)
     A = LAYOUT.rows(log, slice(0, len(left)))
-    rows = np.concatenate([A, log.motion.tau[:, :, None]], axis=2)
+    rows = np.concatenate([A, log.tau[:, :, None]], axis=2)
     rows = (rows * (np.sqrt(weights) / sigma)[:, :, None]).reshape(-1, LAYOUT.size + 1)
     R, right = triangles.joined()
     np.testing.assert_allclose(R.T @ R, rows[:, :-1].T @ rows[:, :-1], rtol=1e-9, atol=1e-9)
@@ -101,7 +94,7 @@ def test_triangles_are_the_weighted_equations(log):
 
 
 def test_one_stretch_can_be_left_out(log):
-    triangles = triangulate(LAYOUT, [log], [residuals(LAYOUT, log, planted())], np.ones(6))
+    triangles = triangulate(LAYOUT, [log], [residuals(LAYOUT, log, planted())])
     whole, most = triangles.joined()[0], triangles.joined(leave_out=2)[0]
     part = triangles.parts[2][:, :-1]
     np.testing.assert_allclose(whole.T @ whole, most.T @ most + part.T @ part, atol=1e-6)
@@ -212,13 +205,10 @@ def excited(prepared, sines) -> tuple[Triangles, np.ndarray, np.ndarray]:
     layout = ParameterColumns(chain, False, (Shape(("coulomb", "viscous")),) * 6)
     start = np.concatenate([chain_parameters(chain), np.tile([5.0, 8.0], 6)])
     true = start * (1.0 + 0.1 * np.random.default_rng(2).standard_normal(len(start)))
-    empty = prepared(t, q=q, dq=dq, ddq=ddq)
-    columns = FrictionColumns(empty, np.zeros(q.shape))
-    blank = TrainingLog(empty, columns, np.ones(q.shape), None, None)
-    tau = layout.rows(blank, slice(0, len(t))) @ true
+    tau = layout.rows(prepared(t, q=q, dq=dq, ddq=ddq), slice(0, len(t))) @ true
     noise = 0.1 * np.random.default_rng(3).standard_normal(q.shape)
-    motion = prepared(t, q=q, dq=dq, ddq=ddq, tau=tau + noise)
-    return stack(layout, [blank._replace(motion=motion)], start), start, true
+    log = prepared(t, q=q, dq=dq, ddq=ddq, tau=tau + noise)
+    return stack(layout, [log], start), start, true
 
 
 def test_estimates_lie_within_their_spread(excited):

@@ -19,7 +19,7 @@ from vftcli.identification.payload import (
     payload_from_poses,
     resting_poses,
 )
-from vftcli.identification.processing import gravity_torque
+from vftcli.identification.training import gravity_torque
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError

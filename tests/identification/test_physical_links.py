@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from vftcli.identification.links import ParameterColumns, Triangles, triangle
-from vftcli.identification.physical_links import (
+from vftcli.identification.links import (
     Problem,
+    Triangles,
     is_physical,
     nearest_physical_links,
     predicts_best_unpulled,
@@ -13,8 +13,10 @@ from vftcli.identification.physical_links import (
     solve,
     starting_point,
     thicken_links,
+    triangle,
 )
-from vftcli.identification.training import Shape
+from vftcli.identification.shapes import Shape
+from vftcli.identification.training import ParameterColumns
 from vftcli.robots import load_robot
 from vftcli.robots.regressor import chain_parameters, torque_regressor, with_parameters
 

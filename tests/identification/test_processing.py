@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.identification import Task
-from vftcli.identification.processing import (
+from vftcli.identification.training import (
     gravity_torque,
     prepare,
     settings_record,

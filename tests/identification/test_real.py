@@ -8,8 +8,8 @@ import pytest
 
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
-from vftcli.identification.processing import prepare
 from vftcli.identification.result import REPEATED, repeated_share
+from vftcli.identification.training import prepare
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot

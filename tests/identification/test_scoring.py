@@ -6,7 +6,6 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.identification.processing import predicted_torque, rigid_torque, root_mean_square
 from vftcli.identification.result import (
     Trace,
     apparent_load,
@@ -15,6 +14,7 @@ from vftcli.identification.result import (
     repeated_share,
     score_remarks,
 )
+from vftcli.identification.training import root_mean_square
 from vftcli.robots import Payload, load_robot
 
 UR5 = load_robot("ur5")
@@ -39,7 +39,7 @@ def test_rigid_torque_is_pinocchios_without_rotors(motion):
     data = UR5.model.createData()
     plain = UR5.model.copy()
     plain.armature = np.zeros(6)
-    torque = rigid_torque(UR5, motion)
+    torque = motion.rigid
     for k in (0, 500, -1):
         expected = pin.rnea(plain, data, motion.q[k], motion.dq[k], motion.ddq[k])
         np.testing.assert_allclose(torque[k], expected, atol=1e-9)
@@ -47,9 +47,9 @@ def test_rigid_torque_is_pinocchios_without_rotors(motion):
 
 def test_prediction_adds_rotors_and_filtered_friction(motion):
     rotors = UR5.chain.rotor_inertia * motion.ddq
-    bare = predicted_torque(UR5.without_friction(), motion)
-    np.testing.assert_allclose(bare, rigid_torque(UR5, motion) + rotors, atol=1e-12)
-    friction = predicted_torque(UR5, motion) - bare
+    bare = motion.under(UR5.without_friction()).predicted
+    np.testing.assert_allclose(bare, motion.rigid + rotors, atol=1e-12)
+    friction = motion.predicted - bare
     joint, dq = UR5.friction[0], motion.dq[:, 0]
     first = joint.torques[0]
     law = first * np.tanh(dq / joint.parameters["smoothing"])
@@ -61,21 +61,21 @@ def test_prediction_adds_rotors_and_filtered_friction(motion):
 @pytest.mark.parametrize("mass", [1.5, -0.8])
 def test_a_load_on_the_flange_is_named(motion, mass):
     load = Payload(mass=abs(mass), com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-    effect = rigid_torque(UR5.with_payload(load), motion) - rigid_torque(UR5, motion)
+    effect = motion.under(UR5.with_payload(load)).rigid - motion.rigid
     residual = np.sign(mass) * effect
-    found, share = apparent_load(UR5, motion, residual)
+    found, share = apparent_load(motion, residual)
     # m, m·c alone are fitted; the point mass's own tensor about the last frame is 2e-3 of it
     assert found == pytest.approx(mass, rel=0.02)
     assert share > 0.99
-    (remark,) = held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.01))
+    (remark,) = held_out_remarks(trace(motion, residual), np.full(6, 0.01))
     assert remark.code == "apparent-load"
     assert remark.values["mass_kg"] == found
 
 
 def test_no_remark_where_the_score_is_that_of_the_training(motion):
     residual = np.ones_like(motion.q)
-    assert held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.67)) == []
-    assert held_out_remarks(UR5, trace(motion, residual), np.full(6, 0.66)) != []  # > 1.5 ×
+    assert held_out_remarks(trace(motion, residual), np.full(6, 0.67)) == []
+    assert held_out_remarks(trace(motion, residual), np.full(6, 0.66)) != []  # > 1.5 ×
 
 
 @pytest.mark.parametrize(("sign", "code"), [(1.0, "more-friction"), (-1.0, "less-friction")])
@@ -103,7 +103,7 @@ def test_joints_that_rest_say_nothing(motion, prepared):
     dq[:, 4] = 0.0
     noise = np.random.default_rng(1).standard_normal(dq.shape)
     still = prepared(motion.t, q=motion.q, dq=dq, ddq=motion.ddq)
-    remarks = held_out_remarks(UR5, trace(still, noise), np.full(6, 0.1))
+    remarks = held_out_remarks(trace(still, noise), np.full(6, 0.1))
     assert [r.where.joints for r in remarks if r.code == "resting-joints"] == [(5,)]
     assert sum(r.code == "larger-residual" for r in remarks) == 5
 
@@ -127,14 +127,14 @@ def test_the_share_of_a_repeated_path(prepared, sines):
 @pytest.mark.parametrize(("before", "worse"), [(1.9, True), (2.0, False), (3.0, False)])
 def test_a_model_that_leaves_more_than_the_profile_is_told_of(motion, before, worse):
     left = trace(motion, np.full(motion.q.shape, 2.0), "train")
-    remarks = score_remarks(UR5, [left._replace(before=np.full(6, before))])
+    remarks = score_remarks([left._replace(before=np.full(6, before))])
     told = [r.values["profile_Nm"] for r in remarks if r.code == "worse-than-profile"]
     assert told == pytest.approx([before] if worse else [])
 
 
 def test_a_repeated_log_is_no_test_and_the_training_level_is_said(motion):
     train = trace(motion, np.full(motion.q.shape, 2.0), "train")
-    remarks = score_remarks(UR5, [train, trace(motion, np.full(motion.q.shape, 2.0))])
+    remarks = score_remarks([train, trace(motion, np.full(motion.q.shape, 2.0))])
     assert [r.code for r in remarks] == ["repeated-trajectory", "training-residual"]
     assert remarks[1].values["mean_Nm"] == 2.0
-    assert score_remarks(UR5, []) == []
+    assert score_remarks([]) == []

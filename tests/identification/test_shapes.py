@@ -5,14 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vftcli.identification.training import (
-    BENDS,
-    FrictionColumns,
-    Shape,
-    bent,
-    round_digits,
-    term_values,
-)
+from vftcli.identification.shapes import BENDS, Shape, bent, round_digits, term_values
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.profile import robot_toml
@@ -77,22 +70,21 @@ def test_a_shape_says_its_nonlinear_numbers():
 def test_columns_are_filtered_and_made_once(prepared):
     t = np.arange(0, 4, 0.01)
     dq = 0.5 * np.sin(2 * np.pi * 0.5 * t)[:, None] * [1.0, -1.0]
-    motion = prepared(t, dq=dq)
-    columns = FrictionColumns(motion, np.ones((len(t), 2)))
-    first = columns.column("coulomb", 1, Shape(("coulomb",), 0.01))
-    assert columns.column("coulomb", 1, Shape(("coulomb", "viscous"), 0.01)) is first
-    assert columns.column("coulomb", 1, Shape(("coulomb",), 0.1)) is not first
+    log = prepared(t, dq=dq, load=np.ones((len(t), 2)))
+    first = log.column("coulomb", 1, Shape(("coulomb",), 0.01))
+    assert log.column("coulomb", 1, Shape(("coulomb", "viscous"), 0.01)) is first
+    assert log.column("coulomb", 1, Shape(("coulomb",), 0.1)) is not first
     # viscous friction has no smoothing: whatever the shape's, it is one column
-    viscous = columns.column("viscous", 0, Shape(("viscous",), 0.01))
-    assert columns.column("viscous", 0, Shape(("viscous",), 0.1)) is viscous
-    bent = columns.column("logarithmic", 0, Shape(("logarithmic",), 0.01))
-    assert columns.column("logarithmic", 0, Shape(("logarithmic",), 0.1)) is bent
+    viscous = log.column("viscous", 0, Shape(("viscous",), 0.01))
+    assert log.column("viscous", 0, Shape(("viscous",), 0.1)) is viscous
+    bent = log.column("logarithmic", 0, Shape(("logarithmic",), 0.01))
+    assert log.column("logarithmic", 0, Shape(("logarithmic",), 0.1)) is bent
     steeper = Shape(("logarithmic",), logarithmic_velocity=0.1)
-    assert columns.column("logarithmic", 0, steeper) is not bent
-    both = columns.joint(0, Shape(("coulomb", "viscous"), 0.01))
+    assert log.column("logarithmic", 0, steeper) is not bent
+    both = log.friction(0, Shape(("coulomb", "viscous"), 0.01))
     np.testing.assert_array_equal(both[:, 1], viscous)
-    np.testing.assert_array_equal(both[:, 0], motion.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0])
-    assert columns.joint(0, Shape(())).shape == (len(t), 0)
+    np.testing.assert_array_equal(both[:, 0], log.filtered(np.tanh(dq[:, :1] / 0.01))[:, 0])
+    assert log.friction(0, Shape(())).shape == (len(t), 0)
 
 
 def test_numbers_have_as_many_digits_as_they_mean():
@@ -114,12 +106,11 @@ def test_points_and_presliding_are_the_robot_files_friction(prepared):
     assert (friction.model, friction.speeds, friction.torques) == ("points", BENDS[:2], (3.0, 5.0))
     assert friction.parameters["presliding_length"] == 1e-3
     warmth = np.linspace(1.2, 0.9, len(t))[:, None]
-    motion = prepared(t, q=q, dq=dq)
-    columns = FrictionColumns(motion, np.zeros_like(q), warmth)
+    log = prepared(t, q=q, dq=dq, warmth=warmth)
     expected = RunningFriction((friction,)).torque(q, dq)[:, 0]
     # all but the offset follows the temperature
-    expected = motion.filtered(((expected - 0.4) * warmth[:, 0] + 0.4)[:, None])[:, 0]
-    np.testing.assert_allclose(columns.joint(0, shape) @ values, expected, atol=1e-12)
+    expected = log.filtered(((expected - 0.4) * warmth[:, 0] + 0.4)[:, None])[:, 0]
+    np.testing.assert_allclose(log.friction(0, shape) @ values, expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(("speed", "points"), [(0.1, 0), (0.16, 2), (0.79, 2), (0.81, 3), (2.1, 4)])

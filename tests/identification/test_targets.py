@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from vftcli.identification.shapes import LOGARITHMIC_VELOCITIES
 from vftcli.identification.targets import (
     UNKNOWN,
     WRITTEN,
@@ -23,7 +24,6 @@ from vftcli.identification.targets import (
     target_remarks,
     targets_method,
 )
-from vftcli.identification.training import LOGARITHMIC_VELOCITIES, FrictionColumns
 from vftcli.robots import JointFriction, load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.signals.errors import IdentificationError
@@ -41,11 +41,10 @@ def targets(prepared, sines) -> ControllerTargets:
     rigid = 2.0 * ddq + gravity
     moment = rigid + J * ddq + (GRAVITY - 1.0) * gravity
     friction = 4.0 * np.tanh(dq / 0.01) + 6.0 * dq - 2.0 * dq * np.abs(dq)
-    motion = prepared(t, q=q, dq=dq, ddq=ddq)
-    columns = FrictionColumns(motion, np.abs(gravity))
-    current = (moment + motion.filtered(friction)) / K
+    log = prepared(t, q=q, dq=dq, ddq=ddq, load=np.abs(gravity))
+    current = (moment + log.filtered(friction)) / K
     lead = np.gradient(moment, t, axis=0)
-    return ControllerTargets((columns,), dq, ddq, current, moment, lead, rigid, gravity)
+    return ControllerTargets((log,), dq, ddq, current, moment, lead, rigid, gravity)
 
 
 def test_the_drive_constant_comes_from_currents_that_follow_moments(targets):
@@ -88,7 +87,7 @@ def test_friction_is_read_as_the_points_of_the_controllers_line(targets):
         torques=(4.0, 7.0, 10.0),
     )
     law = friction_torque((truth,), dq, targets.gravity)
-    bent = targets._replace(current=(targets.moment + targets.sources[0].motion.filtered(law)) / K)
+    bent = targets._replace(current=(targets.moment + targets.logs[0].filtered(law)) / K)
     shape, values, sd = controller_friction(0, bent, K)
     assert (shape.model, shape.speeds) == ("points", truth.speeds)
     np.testing.assert_allclose(values, [4.0, 7.0, 10.0, 0.05], rtol=1e-6)
@@ -104,7 +103,7 @@ def guided_log(targets, share=1.0, asked=None):
     arm = SimpleNamespace(friction=UR5.friction[:1], torque_constant=np.array([K]))
     law = friction_torque(arm.friction, targets.dq)
     log = targets._replace(current=(targets.moment + share * law) / K)
-    recording = log.sources[0].motion.recording
+    recording = log.logs[0].recording
     return replace(recording, target_dq=asked), log, arm
 
 
@@ -140,9 +139,9 @@ def resting(prepared, moments, step=1e-3, wobble=0.0):
     moment = np.array(moments)[(t / 1.2).astype(int)]
     swing = np.where(dq[:, 0] > 0, 0.02 * np.sin(40 * t), 0.0)  # shows the current's digits
     current = np.round((moment / K + wobble * np.sin(5 * t) + swing) / step) * step
-    motion = prepared(t, dq=dq, target_current=current[:, None], target_torque=moment[:, None])
+    log = prepared(t, dq=dq, target_current=current[:, None], target_torque=moment[:, None])
     nothing = 0 * dq
-    return ControllerTargets((FrictionColumns(motion, nothing),), dq, *[nothing] * 6)
+    return ControllerTargets((log,), dq, *[nothing] * 6)
 
 
 def test_at_rest_the_constant_is_moment_over_current(prepared):

@@ -16,7 +16,6 @@ from vftcli.identification.methods import (
     initial_columns,
     rotor_number,
     whole_arm,
-    with_links,
     with_vector,
 )
 from vftcli.identification.training import moving_joints, prepare_training
@@ -79,10 +78,10 @@ def test_a_slow_joint_does_not_move(prepared):
 def test_the_equation_of_a_joint_is_torque_less_rigid_body(data):
     given = data_of_joint(data, 1, constant=False)
     (log,) = data.logs
-    np.testing.assert_allclose(given.y, log.motion.tau[:, 1] - log.rigid[:, 1])
-    np.testing.assert_array_equal(given.fixed, log.motion.ddq[:, 1:2])
+    np.testing.assert_allclose(given.y, log.tau[:, 1] - log.rigid[:, 1])
+    np.testing.assert_array_equal(given.fixed, log.ddq[:, 1:2])
     asked = data_of_joint(data, 1, constant=True)
-    np.testing.assert_array_equal(asked.y, log.motion.tau[:, 1])
+    np.testing.assert_array_equal(asked.y, log.tau[:, 1])
     np.testing.assert_array_equal(asked.fixed[:, 1], log.rigid[:, 1])
     behind_gear = replace(data, robot=replace(UR5, torque_source="link_torque"))
     assert data_of_joint(behind_gear, 1, constant=False).fixed.shape[1] == 0
@@ -99,7 +98,7 @@ def test_friction_and_rotor_of_every_joint_are_found(data):
         J = found.fit.values[len(found.shape.terms)]
         assert pytest.approx(UR5.chain.rotor_inertia[j], abs=0.05) == J
     left = all_residuals(data, fits)
-    assert [x.shape for x in left] == [log.motion.tau.shape for log in data.logs]
+    assert [x.shape for x in left] == [log.tau.shape for log in data.logs]
 
 
 @pytest.mark.slow
@@ -108,7 +107,7 @@ def test_residuals_are_cut_apart_log_by_log(recording):
     data = prepare_training(logs, UR5)
     fits = fit_frictions(data)
     first, second = all_residuals(data, fits)
-    assert (len(first), len(second)) == tuple(log.motion.samples for log in data.logs)
+    assert (len(first), len(second)) == tuple(log.samples for log in data.logs)
     whole = fits[3].fit.residual
     np.testing.assert_array_equal(np.concatenate([first[:, 3], second[:, 3]]), whole)
 
@@ -129,7 +128,7 @@ def test_friction_that_pushes_everywhere_is_refused_and_a_little_is_told(data):
         check_friction(0, pushing, data)
     crossing = JointFriction(model="coulomb-viscous", parameters={"coulomb": -2.0, "viscous": 5.0})
     (remark,) = check_friction(2, crossing, data)
-    speed = np.max(np.abs(data.logs[0].motion.dq[:, 2]))
+    speed = np.max(np.abs(data.logs[0].dq[:, 2]))
     assert remark.where.joints == (3,)
     assert remark.values["least_Nm"] == pytest.approx(-2.0 + 0.5 * speed)
     bent = {"coulomb": 1.0, "viscous": 5.0, "quadratic": -1.0}
@@ -217,10 +216,9 @@ def test_a_vector_becomes_a_robot_without_its_payload(data):
     assert robot.payload is None
     assert robot.chain.mass[1] == 9.5
     np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
-    refined = with_links(data, layout, x)
-    motion = data.logs[0].motion
-    Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
-    np.testing.assert_allclose(refined.logs[0].rigid, Y @ x[:60], atol=1e-9)
+    log = data.logs[0]
+    Y = torque_regressor(UR5.chain, log.q, log.dq, log.ddq)
+    np.testing.assert_allclose(log.under(robot).rigid, Y @ x[:60], atol=1e-9)
 
 
 @pytest.mark.slow
@@ -231,7 +229,7 @@ def test_the_whole_arm_says_how_it_was_made(data):
     assert opened.values["count"] == 40
     assert opened.values["undetermined"] == 40 - base.base["determined"][:40].sum()
     # one robot made this log: the model predicts its torque to the noise
-    motion = data.logs[0].motion
+    motion = data.logs[0]
     Y = torque_regressor(UR5.chain, motion.q, motion.dq, motion.ddq)
     change = Y @ (chain_parameters(base.robot.chain) - chain_parameters(UR5.chain))
     assert np.sqrt(np.mean(change[:, 1:3] ** 2)) < 0.2
@@ -243,9 +241,9 @@ def test_too_short_logs_are_refused(data):
     few = np.zeros_like(data.logs[0].weights)
     few.ravel()[: 4 * layout.size - 1] = 1.0
     with pytest.raises(IdentificationError, match="record a longer log"):
-        stack(layout, [data.logs[0]._replace(weights=few)], start)
+        stack(layout, [replace(data.logs[0], weights=few)], start)
     few.ravel()[: 4 * layout.size] = 1.0
-    assert stack(layout, [data.logs[0]._replace(weights=few)], start).layout is layout
+    assert stack(layout, [replace(data.logs[0], weights=few)], start).layout is layout
 
 
 @pytest.mark.slow

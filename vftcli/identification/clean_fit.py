@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, fit_frictions
-from vftcli.identification.links import ParameterColumns, residuals
-from vftcli.identification.processing import PreparedLog
+from vftcli.identification.links import residuals
 from vftcli.identification.result import apparent_load
-from vftcli.identification.training import Shape, Training, TrainingLog
+from vftcli.identification.shapes import Shape
+from vftcli.identification.training import ParameterColumns, PreparedLog, Training
 from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask
@@ -55,11 +55,11 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     fits, remarks = fit_frictions(data), list[Remark]()
     logs = list(data.logs)
     for k, (log, residual) in enumerate(zip(data.logs, all_residuals(data, fits), strict=True)):
-        t, name = log.motion.t, log.motion.recording.name
-        if contacts := find_contacts(log.motion, residual, fitted_dry_friction(log, fits)):
+        t, name = log.t, log.recording.name
+        if contacts := find_contacts(log, residual, fitted_dry_friction(log, fits)):
             touched = [(t > c.start - TOUCH_MARGIN) & (t < c.stop + TOUCH_MARGIN) for c in contacts]
             free = ~np.any(touched, axis=0)
-            logs[k] = log._replace(weights=log.weights * free[:, None])
+            logs[k] = replace(log, weights=log.weights * free[:, None])
             values = {
                 "count": len(contacts),
                 "total_s": sum(c.stop - c.start for c in contacts),
@@ -105,7 +105,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
 
     Near a reversal a joint may stick: only torque above dry friction (M, n) counts.
     """
-    usable = motion.usable
+    usable = motion.weights > 0
     sd = np.array([robust_sd(r[u]) for r, u in zip(residual.T, usable.T, strict=True)])
     # The filter spreads an event at standstill over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.cutoff * median_step(motion.t))))
@@ -125,9 +125,9 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     return found
 
 
-def fitted_dry_friction(log: TrainingLog, fits: Sequence[JointFit | None]) -> Array:
+def fitted_dry_friction(log: PreparedLog, fits: Sequence[JointFit | None]) -> Array:
     """Dry friction of each joint by its fit, with load. (M, n) [N·m]"""
-    load = log.columns.load[log.motion.kept]
+    load = log.load[log.kept]
     out = np.zeros(load.shape)
     for j, fit in enumerate(fits):
         if fit is not None:
@@ -143,15 +143,15 @@ def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
     """
     shapes = tuple(Shape(()) if fit is None else fit.shape for fit in fits)
     layout = ParameterColumns(data.robot.chain, data.rotor, shapes)
-    logs = [log._replace(weights=log.weights * data.moves) for log in data.logs]
+    logs = [replace(log, weights=log.weights * data.moves) for log in data.logs]
     data = replace(data, logs=tuple(logs))
     before = weighted_rms(data, all_residuals(data, fits))
     parts = []
     for log in logs:
-        for span in log.motion.chunks():
+        for span in log.chunks():
             A = layout.rows(log, span).reshape(-1, layout.size)
             weights = (log.weights[span] / np.where(before > 0, before, 1.0) ** 2).ravel()
-            parts.append(normal_equations(A, log.motion.tau[span].ravel(), weights))
+            parts.append(normal_equations(A, log.tau[span].ravel(), weights))
     x = NormalEquations(*(sum(sums) for sums in zip(*parts, strict=True))).solution()
     freed = weighted_rms(data, [residuals(layout, log, x) for log in logs])
     heavy = heavy_joints(data)
@@ -169,7 +169,7 @@ def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
 
 def heavy_joints(data: Training) -> Mask:
     """Joints that move and carry the arm's weight. (n,)"""
-    spread = np.std(np.concatenate([log.columns.load for log in data.logs]), axis=0)
+    spread = np.std(np.concatenate([log.load for log in data.logs]), axis=0)
     heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves
     return heavy
 
@@ -179,10 +179,10 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
     doubts = list[Remark]()
     heavy, robot = np.flatnonzero(heavy_joints(data)), data.robot
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
-        tau, name = log.motion.tau, log.motion.recording.name
+        tau, name = log.tau, log.recording.name
         # Look for a load before friction is fitted: Coulomb friction would absorb
         # some of it.
-        mass, explained = apparent_load(robot, log.motion, tau - (log.rigid + log.losses))
+        mass, explained = apparent_load(log, tau - log.predicted)
         if explained >= LOAD_EXPLAINS and abs(mass) >= UNKNOWN_LOAD:
             load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}
             doubts.append(warning("unknown-load", Where(name), **load))
@@ -203,19 +203,19 @@ def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Rem
     dry = dry_friction(models, data.robot.joints)
     remarks = []
     for log, residual in zip(data.logs, all_residuals(data, fits), strict=True):
-        sign = np.tanh(log.motion.dq / SMOOTHING) * log.weights
+        sign = np.tanh(log.dq / SMOOTHING) * log.weights
         more = np.array(
             [
                 np.sum(sign[part] * residual[part], axis=0)
                 / np.maximum(np.sum(np.abs(sign[part]), axis=0), 1e-9)
-                for part in folds(log.motion.samples, THIRDS)
+                for part in folds(log.samples, THIRDS)
             ]
         )
         fall = more[0] - more[-1]
         falls = np.all(np.diff(more, axis=0) < 0.0, axis=0) & data.moves
         joints = np.flatnonzero(falls & (fall > np.maximum(DRIFT * dry, LEAST)))
         if joints.size:
-            where = Where(log.motion.recording.name, tuple(int(j) + 1 for j in joints))
+            where = Where(log.recording.name, tuple(int(j) + 1 for j in joints))
             values = {"first_Nm": more[0, joints].tolist(), "last_Nm": more[-1, joints].tolist()}
             remarks.append(caution("warm-up", where, **values))
     return remarks

@@ -10,7 +10,6 @@ import polars as pl
 from vftcli.identification.choice import Task
 from vftcli.identification.methods import chosen_method, friction_method, whole_arm
 from vftcli.identification.payload import LoadFit, find_load, names_of
-from vftcli.identification.processing import settings_record
 from vftcli.identification.result import (
     PARAMETERS,
     RESIDUALS,
@@ -22,7 +21,7 @@ from vftcli.identification.result import (
     score_remarks,
 )
 from vftcli.identification.targets import targets_method
-from vftcli.identification.training import Training, prepare_training
+from vftcli.identification.training import Training, prepare_training, settings_record
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
 from vftcli.signals.recording import Recording, refuse_repeated_logs
@@ -74,7 +73,7 @@ def identify(
         for log in some
     ]
     traces = tuple(trace for trace in scored if trace.motion.samples > 1)
-    remarks += score_remarks(new, traces)
+    remarks += score_remarks(traces)
     if load is not None:
         new = new.with_payload(load.payload)
         last, mass, sd = robot.joints - 1, load.payload.mass, load.mass_sd

@@ -5,17 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.identification.processing import root_mean_square
-from vftcli.identification.training import (
+from vftcli.identification.shapes import (
     LOGARITHMIC_VELOCITIES,
     SMOOTHINGS,
     STRIBECK_VELOCITIES,
-    FrictionColumns,
     Shape,
-    Training,
-    TrainingLog,
     bent,
 )
+from vftcli.identification.training import PreparedLog, Training, root_mean_square
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array
@@ -84,7 +81,7 @@ class JointData(NamedTuple):
     #: unknown drive constant. (M, f)
     fixed: Array
     weights: Array  #: 0 for empty samples, 1 elsewhere. (M,)
-    sources: Sequence[FrictionColumns]  #: Friction columns of each log.
+    logs: Sequence[PreparedLog]  #: The logs.
     load_spread: float  #: Spread of the gravity torque. [N·m]
     reverses: bool  #: Whether the joint moves both ways.
     speed_limit: float  #: Its friction may not fall up to this speed. [rad/s]
@@ -95,29 +92,28 @@ class JointData(NamedTuple):
     @property
     def speeds(self) -> list[float]:
         """Speed that the joint exceeds in a hundredth of each log. [rad/s]"""
-        each = (np.abs(source.motion.dq[:, self.joint]) for source in self.sources)
+        each = (np.abs(log.dq[:, self.joint]) for log in self.logs)
         return [float(np.quantile(speed, 0.99)) for speed in each]
 
     @property
     def parts(self) -> list[Array]:
         """The rows that cross-validation leaves out in turn."""
-        lengths = [source.motion.samples for source in self.sources]
+        lengths = [log.samples for log in self.logs]
         return left_out(lengths, [speed > MOVES for speed in self.speeds])
 
     def slow(self, signals: Array) -> Array:
         """Signals in an observer's band, each log by itself. (M, k)"""
-        motions = [source.motion for source in self.sources]
-        cuts = np.cumsum([motion.samples for motion in motions])[:-1]
+        cuts = np.cumsum([log.samples for log in self.logs])[:-1]
         return np.concatenate(
             [
-                low_pass(motion.t, part, LISTENING) if motion.cutoff > LISTENING else part
-                for motion, part in zip(motions, np.split(signals, cuts), strict=True)
+                low_pass(log.t, part, LISTENING) if log.cutoff > LISTENING else part
+                for log, part in zip(self.logs, np.split(signals, cuts), strict=True)
             ]
         )
 
     def columns(self, shape: Shape) -> Array:
         """Friction columns, then the fixed ones. (M, k + f)"""
-        friction = np.concatenate([source.joint(self.joint, shape) for source in self.sources])
+        friction = np.concatenate([log.friction(self.joint, shape) for log in self.logs])
         return np.hstack([friction, self.fixed])
 
     def fit(self, shape: Shape) -> ColumnFit:
@@ -191,28 +187,28 @@ def data_of_joint(data: Training, j: int, constant: bool) -> JointData:
     with the profile's right constant. Else it is subtracted.
     """
 
-    def joined(signal: Callable[[TrainingLog], Array]) -> Array:
+    def joined(signal: Callable[[PreparedLog], Array]) -> Array:
         return np.concatenate([signal(log)[:, j] for log in data.logs])
 
-    torque, rigid = joined(lambda log: log.motion.tau), joined(lambda log: log.rigid)
-    fixed = [joined(lambda log: log.motion.ddq)] * data.rotor + [rigid] * constant
+    torque, rigid = joined(lambda log: log.tau), joined(lambda log: log.rigid)
+    fixed = [joined(lambda log: log.ddq)] * data.rotor + [rigid] * constant
     return JointData(
         joint=j,
         y=torque if constant else torque - rigid,
         fixed=np.reshape(fixed, (-1, len(torque))).T,
         weights=joined(lambda log: log.weights),
-        sources=[log.columns for log in data.logs],
-        load_spread=float(np.std(joined(lambda log: log.columns.load))),
+        logs=data.logs,
+        load_spread=float(np.std(joined(lambda log: log.load))),
         reverses=bool(data.reverses[j]),
         speed_limit=data.top_speed(j),
         torque_limit=float(np.nan_to_num(data.robot.limits.tau_max[j], posinf=0.0)),
-        profile=None if constant else joined(lambda log: log.losses),
+        profile=None if constant else joined(lambda log: log.predicted - log.rigid),
     )
 
 
 def all_residuals(data: Training, fits: Sequence[JointFit | None]) -> list[Array]:
     """Residuals of the friction fits, log by log; zero for held joints. (M, n) each"""
-    ends = np.cumsum([log.motion.samples for log in data.logs])
+    ends = np.cumsum([log.samples for log in data.logs])
     whole = np.zeros((ends[-1], data.robot.joints))
     for j, fit in enumerate(fits):
         if fit is not None:

@@ -1,22 +1,29 @@
-"""The links' parameters by least squares, in combinations that motion shows.
+r"""The links' parameters by least squares: what motion shows, and the nearest physical links.
 
-One vector holds all unknowns: inertial parameters (10 a link), rotor inertias, friction
-coefficients joint by joint. Of the stacked equations only the R factor of their QR decomposition
-is kept, chunk by chunk: memory does not grow with the log. Base parameters are the
-combinations of inertial parameters that any motion shows at all.
+Of the stacked equations only the R factor of their QR decomposition is kept, chunk by chunk:
+memory does not grow with the log. Base parameters are the combinations of inertial parameters that
+any motion shows at all.
+
+A link's ten parameters belong to some mass distribution exactly if its pseudo-inertia
+
+.. math:: P = \begin{bmatrix} \tfrac12 \mathrm{tr}(I)\,1 - I & h \\ h^T & m \end{bmatrix}
+
+is positive definite (P. Wensing, S. Kim, J.-J. Slotine, IEEE RA-L 3(1), 2018). The distance to the
+profile is the log-determinant divergence tr(P₀⁻¹P) − ln det(P₀⁻¹P) − 4 (T. Lee, P. Wensing,
+F. Park, IEEE T-RO 36(1), 2020): it has no units, does not depend on the frame, is convex in the
+parameters, and grows without bound towards the edge, so that Newton's method never leaves the
+physical models and finds the one optimum.
 """
 
-import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import polars as pl
 
 from vftcli.identification.result import BASE
-from vftcli.identification.training import Shape, TrainingLog
-from vftcli.robots.chain import Chain
-from vftcli.robots.regressor import INERTIAL_NAMES, LINK, torque_regressor
+from vftcli.identification.training import ParameterColumns, PreparedLog
+from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
@@ -30,61 +37,18 @@ PROBES = 400  #: Random states for the structure of base parameters.
 RANK_TOLERANCE = 1e-8
 #: Least relative deviation of an undetermined parameter.
 DOUBTFUL = 0.3
-
-
-class ParameterColumns(NamedTuple):
-    """Order of the unknowns in their vector."""
-
-    chain: Chain  #: The arm's geometry.
-    rotor: bool  #: Whether rotor inertias are unknown: with torque measured before the gear.
-    shapes: tuple[Shape, ...]  #: Friction structure of each joint.
-
-    @property
-    def inertial(self) -> int:
-        """Number of inertial unknowns: ten a link, first in the vector."""
-        return LINK * self.chain.joints
-
-    @property
-    def rotors(self) -> int:
-        """Number of rotor inertias, next; 0 with torque measured behind the gear."""
-        return self.chain.joints if self.rotor else 0
-
-    @property
-    def rotor_places(self) -> slice:
-        """Places of the rotor inertias."""
-        return slice(self.inertial, self.inertial + self.rotors)
-
-    @property
-    def frictions(self) -> tuple[slice, ...]:
-        """Places of each joint's friction coefficients, behind the rotors."""
-        edges = np.cumsum([self.rotor_places.stop, *(len(s.terms) for s in self.shapes)])
-        return tuple(slice(int(a), int(b)) for a, b in itertools.pairwise(edges))
-
-    @property
-    def size(self) -> int:
-        """Length of the vector of unknowns."""
-        return int(self.frictions[-1].stop)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """A name for each unknown: m2, mx3, Ixx1, J4, coulomb5 …"""
-        n = self.chain.joints
-        inertial = [f"{name}{j}" for j in range(1, n + 1) for name in INERTIAL_NAMES]
-        rotors = [f"J{j}" for j in range(1, self.rotors + 1)]
-        terms = [f"{t}{j}" for j, s in enumerate(self.shapes, start=1) for t in s.terms]
-        return (*inertial, *rotors, *terms)
-
-    def rows(self, log: TrainingLog, span: slice) -> Array:
-        """Regressor A of a span: A x is every joint's drive torque. (N, n, size)"""
-        n, motion = self.chain.joints, log.motion
-        q, dq, ddq = motion.q[span], motion.dq[span], motion.ddq[span]
-        A = np.zeros((len(q), n, self.size))
-        A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
-        for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
-            if self.rotor:
-                A[:, j, self.inertial + j] = ddq[:, j]
-            A[:, j, place] = log.columns.joint(j, shape)[span]
-        return A
+#: Weights of the distance to the profile, from hardly any pull to the profile itself.
+WEIGHTS = (1e-2, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
+MARGIN = 1.01  #: Factor of the least misfit within which a pull counts as good.
+#: Pull of a maker's table with masses of 5 % standard deviation: the distance of
+#: P = (1 + δ) P₀ is 2 δ² for small δ.
+TABLE = 100.0
+STEPS = 100  #: Newton steps at most; a dozen or two are usual.
+#: Decrement at which Newton's method stops: the cost is a log-likelihood, where 1 is one standard
+#: deviation of one parameter, so that the rest to go is nothing.
+SETTLED = 1e-3
+#: A profile's link is made at least this thick, so that a distance to it exists. [m]
+SMALLEST_RADIUS = 1e-3
 
 
 class Triangles(NamedTuple):
@@ -112,14 +76,13 @@ def triangle(rows: Array) -> Array:
     return R
 
 
-def residuals(layout: ParameterColumns, log: TrainingLog, x: Array) -> Array:
+def residuals(layout: ParameterColumns, log: PreparedLog, x: Array) -> Array:
     """Drive torque of a log beyond the unknowns x (size,). (M, n) [N·m]"""
-    tau = log.motion.tau
-    parts = [tau[span] - layout.rows(log, span) @ x for span in log.motion.chunks()]
+    parts = [log.tau[span] - layout.rows(log, span) @ x for span in log.chunks()]
     return np.concatenate(parts)
 
 
-def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -> Triangles:
+def stack(layout: ParameterColumns, logs: Sequence[PreparedLog], start: Array) -> Triangles:
     """All logs weighed and stacked; the last solution weighs outliers down.
 
     The first one is the profile's with fitted friction, `start`. (size,)
@@ -133,22 +96,21 @@ def stack(layout: ParameterColumns, logs: Sequence[TrainingLog], start: Array) -
     x = start
     for _ in range(REWEIGHTINGS):
         left = [residuals(layout, log, x) for log in logs]
-        triangles = triangulate(layout, logs, left, joint_sigma(logs, left))
+        triangles = triangulate(layout, logs, left)
         x = least_change(triangles, start)
     return triangles
 
 
-def joint_sigma(logs: Sequence[TrainingLog], left: Sequence[Array]) -> Array:
-    """Robust deviation of each joint's weighted residual. (n,) [N·m]"""
+def triangulate(
+    layout: ParameterColumns, logs: Sequence[PreparedLog], left: Sequence[Array]
+) -> Triangles:
+    """QR updates over all chunks of all logs, a triangle per stretch.
+
+    Joints are weighed by the robust deviation of what is left of them.
+    """
     weights = np.concatenate([log.weights for log in logs])
     pairs = zip(np.concatenate(left).T, weights.T, strict=True)
-    return np.array([max(float(robust_sd(r[w > 0])), 1e-9) for r, w in pairs])
-
-
-def triangulate(
-    layout: ParameterColumns, logs: Sequence[TrainingLog], left: Sequence[Array], sigma: Array
-) -> Triangles:
-    """QR updates over all chunks of all logs, a triangle per stretch."""
+    sigma = np.array([max(float(robust_sd(r[w > 0])), 1e-9) for r, w in pairs])
     parts = [np.zeros((0, layout.size + 1)) for _ in range(FOLDS)]
     correlation = []
     for log, residual in zip(logs, left, strict=True):
@@ -157,10 +119,10 @@ def triangulate(
             if np.count_nonzero(w) > 10:
                 correlation.append(correlation_time(r[w > 0]))
         # Contiguous stretches: neighbours share noise.
-        for k, fold in enumerate(folds(log.motion.samples)):
+        for k, fold in enumerate(folds(log.samples)):
             for start in range(fold.start, fold.stop, ROWS):
                 span = slice(start, min(start + ROWS, fold.stop))
-                A = np.concatenate([layout.rows(log, span), log.motion.tau[span, :, None]], axis=2)
+                A = np.concatenate([layout.rows(log, span), log.tau[span, :, None]], axis=2)
                 rows = (A * scale[span, :, None]).reshape(-1, A.shape[2])
                 weighs = scale[span].ravel() > 0
                 parts[k] = triangle(np.vstack([parts[k], rows[weighs]]))
@@ -252,3 +214,153 @@ def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     sd = np.where(lost > DOUBTFUL, np.inf, spread * np.sqrt(triangles.correlation))
     determined = sd <= DOUBTFUL * np.maximum(np.abs(values), np.abs(before))
     return pl.DataFrame([grouping.sums(layout.names), values, sd, determined], schema=BASE)
+
+
+def pseudo_inertias(phi: Array) -> Array:
+    """Pseudo-inertia P of each link from all inertial parameters (10n,). (n, 4, 4)"""
+    rows = phi.reshape(-1, LINK)
+    P, tensor = np.zeros((len(rows), 4, 4)), np.zeros((len(rows), 3, 3))
+    for (r, c), values in zip(TENSOR, rows[:, 4:].T, strict=True):
+        tensor[:, r, c] = tensor[:, c, r] = values
+    half = 0.5 * np.trace(tensor, axis1=1, axis2=2)
+    P[:, :3, :3] = half[:, None, None] * np.eye(3) - tensor
+    P[:, :3, 3] = P[:, 3, :3] = rows[:, 1:4]
+    P[:, 3, 3] = rows[:, 0]
+    return P
+
+
+BASIS = pseudo_inertias(np.eye(LINK))  #: ∂P/∂φ_k by each of a link's parameters. (10, 4, 4)
+
+
+def is_physical(phi: Array) -> bool:
+    """Whether every link's pseudo-inertia is positive definite."""
+    try:
+        np.linalg.cholesky(pseudo_inertias(phi))
+    except np.linalg.LinAlgError:
+        return False
+    return True
+
+
+def thicken_links(phi: Array) -> Array:
+    """The nearest parameters with some mass and some thickness in every link. (10n,)
+
+    Rounded tables and point masses touch the edge of what is physical.
+    """
+    out = phi.reshape(-1, LINK).copy()
+    for row in out:
+        row[0] = max(row[0], 1e-3)
+        com = row[1:4] / row[0]
+        P = pseudo_inertias(row)[0]
+        about = P[:3, :3] - row[0] * np.outer(com, com)
+        values, vectors = np.linalg.eigh(about)
+        values = np.maximum(values, row[0] * SMALLEST_RADIUS**2)
+        second = (vectors * values) @ vectors.T + row[0] * np.outer(com, com)
+        tensor = np.trace(second) * np.eye(3) - second
+        row[4:] = [tensor[r, c] for r, c in TENSOR]
+    return out.ravel()
+
+
+class Problem(NamedTuple):
+    """½‖R x − z‖² + weight · distance(x, start), over physical x."""
+
+    R: Array  #: Triangle of the stacked equations. (size, size)
+    z: Array  #: Its right-hand side. (size,)
+    start: Array  #: The profile, physical. (size,)
+    layout: ParameterColumns  #: The unknowns.
+    weight: float  #: Weight of the distance.
+
+    def value(self, x: Array) -> float:
+        """The cost; infinite outside the physical models."""
+        n, places = self.layout.inertial, self.layout.rotor_places
+        J, J0 = x[places], self.start[places]
+        if not is_physical(x[:n]) or np.any(J <= 0):
+            return float("inf")
+        P, P0 = pseudo_inertias(x[:n]), pseudo_inertias(self.start[:n])
+        ratio = np.linalg.solve(P0, P)
+        distance = float(np.sum(np.trace(ratio, axis1=1, axis2=2)) - 4 * len(P))
+        distance -= float(np.sum(np.linalg.slogdet(ratio)[1]))
+        distance += float(np.sum(J / J0 - np.log(J / J0) - 1.0))
+        misfit = self.R @ x - self.z
+        return 0.5 * float(misfit @ misfit) + self.weight * distance
+
+    def step(self, x: Array) -> tuple[Array, float]:
+        """Newton's step and the square of its decrement."""
+        n, places = self.layout.inertial, self.layout.rotor_places
+        gradient = self.R.T @ (self.R @ x - self.z)
+        hessian = self.R.T @ self.R
+        inverse = np.linalg.inv(pseudo_inertias(x[:n]))
+        before = np.linalg.inv(pseudo_inertias(self.start[:n]))
+        for j, (now, then) in enumerate(zip(inverse, before, strict=True)):
+            place = slice(LINK * j, LINK * (j + 1))
+            gradient[place] += self.weight * np.einsum("rc,kcr->k", then - now, BASIS)
+            turned = now @ BASIS
+            hessian[place, place] += self.weight * np.einsum("krc,lcr->kl", turned, turned)
+        J, J0 = x[places], self.start[places]
+        gradient[places] += self.weight * (1.0 / J0 - 1.0 / J)
+        hessian[places, places] += np.diag(self.weight / J**2)
+        scale = np.sqrt(np.maximum(np.diag(hessian), 1e-12))
+        scaled = hessian / np.outer(scale, scale) + 1e-12 * np.eye(len(x))
+        step = -np.linalg.solve(scaled, gradient / scale) / scale
+        return step, float(-gradient @ step)
+
+
+def solve(problem: Problem, x: Array) -> Array:
+    """Damped Newton from a physical x; every iterate is physical. (size,)"""
+    cost = problem.value(x)
+    for _ in range(STEPS):
+        step, decrement = problem.step(x)
+        if decrement < SETTLED:
+            return x
+        # Backtracking keeps every iterate physical: outside, the cost is infinite.
+        length, low = 1.0, 1e-12
+        while (new := problem.value(x + length * step)) > cost - 1e-4 * length * decrement:
+            length *= 0.5
+            if length < low:
+                return x
+        x, cost = x + length * step, new
+    if decrement < 1.0:
+        return x
+    raise IdentificationError(
+        "the fit of physical links did not settle; the log contradicts the profile too much. "
+        "Use --method friction, or a profile closer to the arm"
+    )
+
+
+def starting_point(layout: ParameterColumns, x: Array) -> Array:
+    """Physical parameters near x to measure the distance from. (size,)"""
+    start = x.copy()
+    start[: layout.inertial] = thicken_links(x[: layout.inertial])
+    start[layout.rotor_places] = np.maximum(x[layout.rotor_places], 1e-3)
+    return start
+
+
+def pulled_links(
+    triangles: Triangles, profile: Array, leave_out: int | None = None
+) -> Iterator[tuple[float, Array]]:
+    """Weights and their physical parameters (size,), strongest pull first."""
+    start = x = starting_point(triangles.layout, profile)
+    R, z = triangles.joined(leave_out)
+    # Correlated rows repeat each other; dividing them makes the misfit a log-likelihood
+    # that can be weighed against the distance.
+    shrink = 1.0 / np.sqrt(triangles.correlation)
+    for weight in WEIGHTS[::-1]:
+        # Each optimum is a good start for the next, weaker pull.
+        x = solve(Problem(R * shrink, z * shrink, start, triangles.layout, weight), x)
+        yield weight, x
+
+
+def nearest_physical_links(
+    triangles: Triangles, profile: Array, weight: float = WEIGHTS[0]
+) -> Array:
+    """Physical parameters pulled to the profile by one of `WEIGHTS`. (size,)"""
+    return next(x for pull, x in pulled_links(triangles, profile) if pull <= weight)
+
+
+def predicts_best_unpulled(triangles: Triangles, profile: Array) -> bool:
+    """Whether all pulls but the weakest predict left-out stretches worse."""
+    misfits = dict.fromkeys(WEIGHTS, 0.0)
+    for part in range(len(triangles.parts)):
+        for weight, x in pulled_links(triangles, profile, leave_out=part):
+            misfits[weight] += triangles.misfit(part, x)
+    near = MARGIN**2 * min(misfits.values())  # of squares
+    return all(misfits[weight] > near for weight in WEIGHTS[1:])

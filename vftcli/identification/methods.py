@@ -24,16 +24,17 @@ from vftcli.identification.friction_fit import (
     fit_frictions,
     is_dissipative,
 )
-from vftcli.identification.links import ParameterColumns, base_parameters, stack
-from vftcli.identification.physical_links import (
+from vftcli.identification.links import (
     TABLE,
     WEIGHTS,
+    base_parameters,
     nearest_physical_links,
     predicts_best_unpulled,
+    stack,
 )
-from vftcli.identification.processing import rigid_torque
 from vftcli.identification.result import MethodResult, Number, number
-from vftcli.identification.training import Shape, Training, friction_columns, round_digits
+from vftcli.identification.shapes import Shape, round_digits
+from vftcli.identification.training import ParameterColumns, Training
 from vftcli.robots.friction import SMOOTHING, falling_speed, steady_torque
 from vftcli.robots.regressor import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
@@ -159,10 +160,9 @@ def identified_friction(
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    motions = [log.motion for log in data.logs]
-    speed = max(float(np.max(np.abs(m.dq[:, j]))) for m in motions)
+    speed = max(float(np.max(np.abs(log.dq[:, j]))) for log in data.logs)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
-    noise = max(robust_sd(m.tau)[j] for m in motions)
+    noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction comes out on either side of zero.
     if np.all(torque < -0.01 * noise):
         raise IdentificationError(
@@ -220,9 +220,9 @@ def temperature_remarks(data: Training) -> list[Remark]:
     """Remarks on the factors of friction by the joints' temperatures."""
     remarks = []
     for log in data.logs:
-        if (warmth := log.columns.warmth) is not None:
+        if (warmth := log.warmth) is not None:
             factors = [float(warmth.min()), float(warmth.max())]
-            where = Where(log.motion.recording.name)
+            where = Where(log.recording.name)
             remarks.append(fact("friction-by-temperature", where, factors=factors))
     return remarks
 
@@ -254,7 +254,8 @@ def whole_arm(data: Training) -> MethodResult:
     data, fits, remarks = fit_without_contacts(data, strict=False)
     layout, start = initial_columns(data, fits)
     x = nearest_physical_links(stack(layout, data.logs, start), start)
-    data = with_links(data, layout, x)
+    refined = with_vector(data.robot, layout, x, data.robot.friction)
+    data = replace(data, logs=tuple(log.under(refined) for log in data.logs))
     fits = fit_frictions(data)
     layout, start = initial_columns(data, fits)
     triangles = stack(layout, data.logs, start)
@@ -284,18 +285,6 @@ def whole_arm(data: Training) -> MethodResult:
     robot = with_vector(data.robot, layout, x, tuple(frictions) if data.rubs else ())
     result = fitted_result("base", data, fits, robot, numbers, remarks, base)
     return result._replace(is_narrow=narrow)
-
-
-def with_links(data: Training, layout: ParameterColumns, x: Array) -> Training:
-    """The training data with other links: their rigid-body torque and load."""
-    robot = with_vector(data.robot, layout, x, data.robot.friction)
-    logs = [
-        log._replace(
-            columns=friction_columns(log.motion, robot), rigid=rigid_torque(robot, log.motion)
-        )
-        for log in data.logs
-    ]
-    return replace(data, logs=tuple(logs))
 
 
 def initial_columns(
@@ -339,7 +328,7 @@ def chosen_method(data: Training) -> MethodResult:
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)
     free, fits = fitted.data, fitted.fits
-    spread = np.std(np.concatenate([log.motion.tau for log in free.logs]), axis=0)
+    spread = np.std(np.concatenate([log.tau for log in free.logs]), axis=0)
     much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
     ratios = links_explain(free, fits)[much[heavy_joints(free)]]
     ratio = float(np.max(ratios, initial=0.0))

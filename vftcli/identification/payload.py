@@ -7,7 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.free_motion.free_motion import LEAST, PARTLY, SURE, columns, weighed
-from vftcli.identification.processing import (
+from vftcli.identification.shapes import round_digits
+from vftcli.identification.training import (
     STATIC,
     PreparedLog,
     gravity_torque,
@@ -15,7 +16,6 @@ from vftcli.identification.processing import (
     prepare,
     root_mean_square,
 )
-from vftcli.identification.training import round_digits
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
@@ -175,7 +175,7 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
         inside = (at >= free.t[0]) & (at <= free.t[-1])
         extra = (motion.tau - resample_columns(at, free.t, torque))[inside]
         sign = motion.filtered(np.tanh(loaded.require("dq") / SMOOTHING))[inside]
-        q, usable = motion.q[inside], motion.usable[inside].astype(float)
+        q, usable = motion.q[inside], motion.weights[inside]
         Y = load_columns(robot, q, motion.dq[inside], motion.ddq[inside])
         fit = fit_all_joints(Y, extra, usable)
         # Friction grows with the load we seek: a few rounds settle it.

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.identification.processing import (
+from vftcli.identification.training import (
     STATIC,
     PreparedLog,
     load_columns,
-    predicted_torque,
     prepare,
     root_mean_square,
 )
@@ -176,15 +175,15 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
-    before = root_mean_square(motion.tau - predicted_torque(profile, motion))
+    before = root_mean_square(motion.tau - motion.predicted)
     old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
     # What was made from currents with the old constants is made with the new.
     if old is not None and new is not None and uses_current(log, profile):
         measured = measured * (new / old)
-    return Trace(motion, role, measured, predicted_torque(robot, motion), before)
+    return Trace(motion, role, measured, motion.under(robot).predicted, before)
 
 
-def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
+def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
     """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
     train = [trace for trace in traces if trace.role == "train"]
     held_out = [trace for trace in traces if trace.role == "held-out"]
@@ -206,11 +205,11 @@ def score_remarks(robot: Robot, traces: Sequence[Trace]) -> list[Remark]:
         return remarks
     level = np.mean([trace.rms for trace in train], axis=0)
     for test in held_out:
-        remarks += held_out_remarks(robot, test, level)
+        remarks += held_out_remarks(test, level)
     return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
 
 
-def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]:
+def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
     """Causes of a held-out residual far above the training's. (n,) [N·m]
 
     A load on the flange, which explains all joints at once, is looked for first.
@@ -219,11 +218,11 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
     worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
     if not worse:
         return []
-    mass, explained = apparent_load(robot, motion, trace.residual)
+    mass, explained = apparent_load(motion, trace.residual)
     if explained > EXPLAINS and abs(mass) > HEAVY:
         share = 100.0 * explained
         return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
-    moving = np.count_nonzero(motion.usable & faster(motion.dq), axis=0)
+    moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0)
     resting = [j for j in worse if moving[j] < ENOUGH]
     remarks = [joint_remark(trace, j, float(trained[j])) for j in worse if j not in resting]
     if resting:
@@ -231,11 +230,10 @@ def held_out_remarks(robot: Robot, trace: Trace, trained: Array) -> list[Remark]
     return remarks
 
 
-def apparent_load(robot: Robot, motion: PreparedLog, residual: Array) -> tuple[float, float]:
+def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
     """Mass that would explain the residual, and the share explained. [kg], [1]"""
-    q, dq, ddq = motion.q, motion.dq, motion.ddq
-    rows = [load_columns(robot, q[s], dq[s], ddq[s]).reshape(-1, STATIC) for s in motion.chunks()]
-    A = np.concatenate(rows)
+    signals = ((log.q[s], log.dq[s], log.ddq[s]) for s in log.chunks())
+    A = np.concatenate([load_columns(log.robot, *part).reshape(-1, STATIC) for part in signals])
     y = residual.ravel()
     x = np.linalg.lstsq(A, y, rcond=1e-6)[0]
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
@@ -251,7 +249,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     where = Where(motion.recording.name, (j + 1,))
     values = {"rms_Nm": size, "ratio": size / trained}
     dq = motion.recording.require("dq")[:, j]
-    used = (motion.usable & faster(motion.dq))[:, j]
+    used = ((motion.weights > 0) & faster(motion.dq))[:, j]
     sign = np.tanh(dq / SMOOTHING)
     A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
     fit = fit_column(A, residual[:, j], used.astype(float))

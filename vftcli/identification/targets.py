@@ -19,17 +19,9 @@ from vftcli.identification.methods import (
     profile_friction,
     temperature_remarks,
 )
-from vftcli.identification.processing import gravity_torque, prepare, rigid_torque
 from vftcli.identification.result import MethodResult, Number, number
-from vftcli.identification.training import (
-    LOGARITHMIC_VELOCITIES,
-    FrictionColumns,
-    Shape,
-    Training,
-    bent,
-    friction_columns,
-    round_digits,
-)
+from vftcli.identification.shapes import LOGARITHMIC_VELOCITIES, Shape, bent, round_digits
+from vftcli.identification.training import PreparedLog, Training, gravity_torque, prepare
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
@@ -147,7 +139,7 @@ def gravity_remarks(models: Sequence[ControllerModel]) -> list[Remark]:
 class ControllerTargets(NamedTuple):
     """Targets beside the motion, filtered alike, of logs."""
 
-    sources: tuple[FrictionColumns, ...]  #: Friction columns of each log.
+    logs: tuple[PreparedLog, ...]  #: The logs.
     dq: Array  #: Measured velocities. (M, n) [rad/s]
     ddq: Array  #: Measured accelerations. (M, n) [rad/s²]
     current: Array  #: Target current. (M, n) [A]
@@ -158,7 +150,7 @@ class ControllerTargets(NamedTuple):
 
     def columns(self, j: int, shape: Shape) -> Array:
         """Friction columns of joint j (from 0). (M, k)"""
-        return np.concatenate([source.joint(j, shape) for source in self.sources])
+        return np.concatenate([log.friction(j, shape) for log in self.logs])
 
 
 def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[ControllerModel]:
@@ -174,19 +166,19 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[Con
         motion = prepare(recording, robot, CUTOFF)
         smooth = zero_phase(recording.t, moment, CUTOFF)
         log = ControllerTargets(
-            sources=(friction_columns(motion, robot),),
+            logs=(motion,),
             dq=motion.dq,
             ddq=motion.ddq,
             current=motion.filtered(current),
             moment=smooth[motion.kept],
             lead=derivative(recording.t, smooth)[motion.kept],
-            rigid=rigid_torque(robot, motion),
+            rigid=motion.rigid,
             gravity=gravity_torque(robot, motion.q),
         )
         refuse_guided(recording, log, robot)
         logs.append(log)
-    sources, signals = tuple(log.sources[0] for log in logs), (log[1:] for log in logs)
-    every = ControllerTargets(sources, *map(np.concatenate, zip(*signals, strict=True)))
+    motions, signals = tuple(log.logs[0] for log in logs), (log[1:] for log in logs)
+    every = ControllerTargets(motions, *map(np.concatenate, zip(*signals, strict=True)))
     models = []
     for j, before in enumerate(robot.torque_constant.tolist()):
         # Of two ways to K, the surer one wins; friction needs it.
@@ -201,8 +193,7 @@ def controller_models(recordings: Sequence[Recording], robot: Robot) -> list[Con
 def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     """K from the ratio at rest, without friction; sd from the current's digits."""
     points = []
-    for source in log.sources:
-        recording = source.motion.recording
+    for recording in (motion.recording for motion in log.logs):
         t = recording.t
         current, moment = recording.require("target_current"), recording.require("target_torque")
         step = resolution(current[:, j])
@@ -282,7 +273,7 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
     if fast < SLIDES:
         return None
     y = constant * log.current[:, j] - log.moment[:, j]
-    load = np.concatenate([source.load[source.motion.kept, j] for source in log.sources])
+    load = np.concatenate([motion.load[motion.kept, j] for motion in log.logs])
     line = bent(float(speed.max()))
     shapes = WRITTEN if line is None else (line,)
     if np.std(load) >= LIGHT:

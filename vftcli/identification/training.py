@@ -1,170 +1,135 @@
-"""Training data: filtered logs, friction as columns, the profile's torques, joints that move.
+"""Training data: logs filtered alike, without delay, with friction as columns; joints that move."""
 
-Friction is a sum of known shapes times coefficients. The shapes are evaluated on the log as it was
-recorded and then filtered like the torque, so that a reversal is rounded alike on both sides of the
-equation.
-"""
-
-import itertools
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vftcli.identification.processing import (
-    CUTOFF,
-    PreparedLog,
-    gravity_torque,
-    predicted_torque,
-    prepare,
-    rigid_torque,
-)
-from vftcli.robots.friction import (
-    FRICTION_MODELS,
-    SMOOTHING,
-    bent_line,
-    coulomb_logarithmic,
-    friction_factor,
-)
-from vftcli.robots.robot import JointFriction, Robot
-from vftcli.robots.running_friction import measured_temperature, play
-from vftcli.robots.terms import uses_current
+from vftcli.identification.shapes import Shape, term_values
+from vftcli.robots.chain import Chain
+from vftcli.robots.friction import friction_factor
+from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.regressor import INERTIAL_NAMES, LINK, chain_parameters, torque_regressor
+from vftcli.robots.robot import Robot
+from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
+from vftcli.robots.terms import drive_torque, uses_current
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import IdentificationError
+from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.recording import Recording
-from vftcli.signals.rest import MOVES
-from vftcli.signals.series import median_step
+from vftcli.signals.rest import MOVES, NONZERO, faster
+from vftcli.signals.series import covered, gaps_of, intervals, median_step
 
-SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
-#: Velocities over which a Stribeck term may fade. [rad/s]
-STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
-#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]
-LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
-#: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
-BENDS = (0.01, 0.5, 1.5, 3.2)
-#: Share of the way between two points that a motion must cover to tell the faster one.
-SPANNED = 0.3
-#: Term → friction model in a robot file; the first that a joint has counts.
-MODELS = {
-    "logarithmic": "coulomb-logarithmic",
-    "stribeck": "coulomb-viscous-stribeck",
-    "load_coulomb": "coulomb-viscous-load",
-    "quadratic": "coulomb-viscous-quadratic",
-    "offset": "coulomb-viscous-offset",
-}
-SIMPLEST = "coulomb-viscous"  #: Model of a joint that has none of them.
-POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
+#: Cutoff of the zero-phase low-pass, −3 dB a pass; the band that is used ends there. [Hz]
+CUTOFF = 8.0
+#: Samples kept per period of the cutoff when the filtered log is decimated.
+OVERSAMPLING = 6.0
+STOP = 0.3  #: Length of a stop from which on it identifies nothing, because of stiction. [s]
+STATIC = 4  #: Parameters of a link that gravity shows: mass, three first moments.
+GAP = 10.0  #: Steps longer than this many median steps are left out.
+
+
+def settings_record(cutoff: float, step: float) -> dict[str, str | float]:
+    """The filter's settings for the robot file and `run.json`."""
+    return {
+        "filter": f"Butterworth order {STEEP}, forwards and backwards (zero phase)",
+        "cutoff_hz": cutoff,
+        "band_hz": f"0 to {cutoff:g}",
+        "differentiation": "central differences of the filtered velocity on the log's clock; "
+        "positions are never differentiated",
+        "decimation": float(stride(cutoff, step)),
+        "kept_rate_hz": round(1.0 / (step * stride(cutoff, step)), 6),
+        "scored_span": f"first to last sample with |dq| > {NONZERO:g} rad/s",
+    }
+
+
+def stride(cutoff: float, step: float) -> int:
+    """Every how many samples of the filtered log are kept."""
+    return max(1, int(1.0 / (step * OVERSAMPLING * cutoff) + 1e-9))
+
+
 ENOUGH = 1.0  #: Time a joint must move, and for both ways to count a tenth of it each way. [s]
 
 
-class Shape(NamedTuple):
-    """The structure of one joint's friction: which terms, and its nonlinear numbers."""
+@dataclass(frozen=True, kw_only=True)
+class PreparedLog:
+    """A log prepared for identification: M samples from first to last motion."""
 
-    #: Keys of the robot file that hold coefficients, in order; those that begin with `POINT`
-    #: are the torques of a bent line.
-    terms: tuple[str, ...]
-    smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
-    stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
-    logarithmic_velocity: float = 1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
-    #: Way over which the teeth of the gear give before they slide. [rad]
-    presliding_length: float = 0.0
-    speeds: tuple[float, ...] = ()  #: Speeds of the bent line's points. [rad/s]
-
-    @property
-    def model(self) -> str:
-        """Name of the simplest friction model that has all terms."""
-        if self.points:
-            return "points"
-        return next((name for term, name in MODELS.items() if term in self.terms), SIMPLEST)
-
-    @property
-    def points(self) -> tuple[str, ...]:
-        """The terms that are torques of a bent line, in the order of its speeds."""
-        return tuple(term for term in self.terms if term.startswith(POINT))
+    recording: Recording  #: The log.
+    robot: Robot  #: The arm with its model.
+    cutoff: float  #: Cutoff of its filter, one for all parts of a joint's torque. [Hz]
+    kept: NDArray[np.int64]  #: Numbers of these samples in the log. (M,)
+    t: Array  #: Time. (M,) [s]
+    q: Array  #: Positions. (M, n) [rad]
+    dq: Array  #: Velocities. (M, n) [rad/s]
+    ddq: Array  #: Accelerations. (M, n) [rad/s²]
+    tau: Array  #: Drive torque, friction included. (M, n) [N·m]
+    #: Weight of every sample and joint, 0 where it tells nothing: in a long stop of the joint, in a
+    #: gap of the clock, in a contact. (M, n)
+    weights: Array
+    #: Friction columns that were made for this robot. (M,) each
+    made: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
 
     @property
-    def words(self) -> str:
-        """The terms and the nonlinear numbers, for tables."""
-        line = ["points at " + ", ".join(f"{v:g}" for v in self.speeds)] if self.points else []
-        others = [term for term in self.terms if term not in self.points]
-        text = f"{' + '.join([*line, *others])}, smoothing {self.smoothing:g} rad/s"
-        if "presliding" in self.terms:
-            text += f", presliding over {1e3 * self.presliding_length:g} mrad"
-        if "stribeck" in self.terms:
-            text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
-        if "logarithmic" in self.terms:
-            text += f", flattening from {self.logarithmic_velocity:g} rad/s"
-        return text
+    def samples(self) -> int:
+        """Number of samples M that were kept; 0 where nothing moves."""
+        return len(self.t)
 
-    def friction(self, values: Array, confidence: str = "") -> JointFriction:
-        """The joint's friction with these coefficients, one a term."""
-        parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
-        torques = tuple(parameters.pop(term) for term in self.points)
-        parameters["smoothing"] = self.smoothing
-        for term in ("stribeck", "logarithmic"):
-            if term in self.terms:
-                parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
-        if "presliding" in self.terms:
-            parameters["presliding_length"] = self.presliding_length
-        # A dry torque that is all presliding's leaves none to what slides.
-        required = FRICTION_MODELS[self.model].required
-        parameters = {**dict.fromkeys(required, 0.0), **parameters}
-        return JointFriction(
-            model=self.model,
-            parameters=parameters,
-            speeds=self.speeds if torques else (),
-            torques=torques,
-            confidence=confidence,
-        )
+    def under(self, robot: Robot) -> "PreparedLog":
+        """The same log with another arm's model."""
+        return replace(self, robot=robot, made={})
 
+    def filtered(self, signals: Array) -> Array:
+        """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
+        recording = self.recording
+        columns = [
+            zero_phase(recording.t, column[:, None], self.cutoff)[self.kept] for column in signals.T
+        ]
+        return np.concatenate(columns, axis=1)
 
-def bent(speed: float) -> Shape | None:
-    """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
+    def chunks(self, size: int = 1024) -> Iterator[slice]:
+        """Spans of `size` samples: a whole log's regressor would not fit into memory."""
+        for start in range(0, self.samples, size):
+            yield slice(start, min(start + size, self.samples))
 
-    Between its points the line is straight, so that a motion well beyond one of them tells the
-    next one too; behind its last point it goes on as it came.
-    """
-    reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
-    count = 1 + int(np.argmin([*reached, False]))
-    if count < 2:
-        return None
-    points = tuple(f"{POINT}{k}" for k in range(1, count + 1))
-    return Shape(points, speeds=BENDS[:count])
+    @cached_property
+    def load(self) -> Array:
+        """Absolute gravity torque along the whole log. (T, n) [N·m]"""
+        return np.abs(gravity_torque(self.robot, self.recording.q))
 
+    @cached_property
+    def warmth(self) -> Array | None:
+        """Factor on each joint's friction by its temperature, None where unknown. (T, n)"""
+        temperature = measured_temperature(self.recording)
+        return None if temperature is None else friction_factor(self.robot.friction, temperature)
 
-def round_digits(value: float, digits: int = 7) -> float:
-    """A number with as many digits as an identification can possibly mean."""
-    return float(f"{value:.{digits}g}")
+    @cached_property
+    def rigid(self) -> Array:
+        """Rigid-body torque of the loaded arm, without rotors. (M, n) [N·m]"""
+        chain, phi = self.robot.chain, chain_parameters(self.robot.loaded_chain)
+        out = np.empty(self.q.shape)
+        for s in self.chunks():
+            out[s] = torque_regressor(chain, self.q[s], self.dq[s], self.ddq[s]) @ phi
+        return out
 
-
-def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
-    """One term at recorded velocities [rad/s] and loads [N·m], its coefficient at 1."""
-    if term in shape.points:
-        torques = np.eye(len(shape.speeds))[shape.points.index(term)].tolist()
-        return bent_line(dq, shape.speeds, torques, smoothing=shape.smoothing)
-    own = ("smoothing", "stribeck_velocity", "logarithmic_velocity")
-    numbers = {name: getattr(shape, name) for name in own}
-    return coulomb_logarithmic(
-        dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
-    )
-
-
-class FrictionColumns:
-    """Filtered friction columns of one prepared log, each made once.
-
-    `load` is the absolute gravity torque along the whole log (T, n) [N·m], `warmth` the factor on
-    each joint's friction by its temperature (T, n), None where that is not known.
-    """
-
-    def __init__(self, motion: PreparedLog, load: Array, warmth: Array | None = None) -> None:
-        self.motion = motion
-        self.load = load
-        self.warmth = warmth
-        self.cache: dict[tuple[str, int, tuple[float, ...]], Array] = {}
+    @cached_property
+    def predicted(self) -> Array:
+        """Drive torque by the robot's model, friction filtered like the log. (M, n) [N·m]"""
+        robot, log = self.robot, self.recording
+        torque: Array = self.rigid + robot.chain.rotor_inertia * self.ddq
+        if not robot.friction:
+            return torque
+        load, temperature = gravity_torque(robot, log.q), measured_temperature(log)
+        friction = RunningFriction(robot.friction)
+        losses = friction.torque(log.q, log.require("dq"), load, temperature)
+        return np.asarray(torque + self.filtered(losses))
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
-        """One term of joint j (from 0), filtered like the torque, made once. (M,)"""
+        """One friction term of joint j (from 0), filtered like the torque, made once. (M,)"""
         # The key holds only what the term depends on, so that shapes share their columns.
         numbers = {
             **dict.fromkeys(("coulomb", "load_coulomb"), (shape.smoothing,)),
@@ -174,38 +139,129 @@ class FrictionColumns:
             **dict.fromkeys(shape.points, (shape.smoothing, *shape.speeds)),
         }
         key = (term, j, numbers.get(term, ()))
-        if key not in self.cache:
-            log = self.motion.recording
+        if key not in self.made:
+            log = self.recording
             if term == "presliding":
                 values = play(log.q[:, j : j + 1], shape.presliding_length).state[:, 0]
             else:
                 values = term_values(term, shape, log.require("dq")[:, j], self.load[:, j])
             if self.warmth is not None and term != "offset":
                 values = values * self.warmth[:, j]
-            self.cache[key] = self.motion.filtered(values[:, None])[:, 0]
-        return self.cache[key]
+            self.made[key] = self.filtered(values[:, None])[:, 0]
+        return self.made[key]
 
-    def joint(self, j: int, shape: Shape) -> Array:
+    def friction(self, j: int, shape: Shape) -> Array:
         """All terms of a shape for joint j (from 0), one column a term. (M, k)"""
         columns = [self.column(term, j, shape) for term in shape.terms]
-        return np.stack(columns, axis=1) if columns else np.zeros((self.motion.samples, 0))
+        return np.stack(columns, axis=1) if columns else np.zeros((self.samples, 0))
 
 
-def friction_columns(motion: PreparedLog, robot: Robot) -> FrictionColumns:
-    """A log's friction columns, by a robot's gravity and temperature law."""
-    temperature = measured_temperature(motion.recording)
-    warmth = None if temperature is None else friction_factor(robot.friction, temperature)
-    return FrictionColumns(motion, np.abs(gravity_torque(robot, motion.recording.q)), warmth)
+def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> PreparedLog:
+    """Filter, differentiate and decimate a log, one column at a time."""
+    torque, dq = drive_torque(recording, robot), recording.require("dq")
+    t, each = recording.t, stride(cutoff, recording.median_step)
+    # Before the first and after the last movement stiction holds what no model of velocity knows.
+    moving = np.flatnonzero(faster(dq, NONZERO).any(axis=1))
+    kept = np.arange(moving[0], moving[-1] + 1, each) if moving.size else np.arange(0)
+
+    def smooth(signal: Array) -> Array:
+        return zero_phase(t, signal[:, None], cutoff)
+
+    joints = []
+    for position, speed, effort in zip(recording.q.T, dq.T, torque.T, strict=True):
+        velocity = smooth(speed)
+        signals = smooth(position), velocity, derivative(t, velocity), smooth(effort)
+        joints.append([signal[kept] for signal in signals])
+    q, velocities, ddq, tau = (np.concatenate(x, axis=1) for x in zip(*joints, strict=True))
+    return PreparedLog(
+        recording=recording,
+        robot=robot,
+        cutoff=cutoff,
+        kept=kept,
+        t=t[kept],
+        q=q,
+        dq=velocities,
+        ddq=ddq,
+        tau=tau,
+        weights=usable_samples(t, dq, cutoff)[kept].astype(float),
+    )
 
 
-class TrainingLog(NamedTuple):
-    """One log to be fitted: M samples in motion."""
+def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
+    """Samples with information, by joint: no long stop, no gap beside. (T, n)"""
+    usable = np.ones(dq.shape, dtype=bool)
+    for j, moves in enumerate(faster(dq, NONZERO).T):
+        usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
+    # What the filter makes of a gap reaches half a period of its cutoff to either side.
+    margin = 0.5 / cutoff
+    for k in gaps_of(t, GAP):
+        usable[(t > t[k] - margin) & (t < t[k + 1] + margin)] = False
+    return usable
 
-    motion: PreparedLog  #: The prepared log.
-    columns: FrictionColumns  #: Its friction columns.
-    weights: Array  #: Weight of every sample and joint, 0 where it tells nothing. (M, n)
-    rigid: Array  #: Torque of the profile's rigid body. (M, n) [N·m]
-    losses: Array  #: Torque of the profile's rotors and friction. (M, n) [N·m]
+
+def gravity_torque(robot: Robot, q: Array) -> Array:
+    """Gravity torques of the loaded arm. (T, n) [N·m]"""
+    return momentum_terms(robot.loaded_chain, q, np.zeros_like(q)).gravity
+
+
+def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
+    """Torque of mass and first moments in the last link's frame. (N, n, 4)"""
+    return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
+
+
+def root_mean_square(x: Array) -> Array:
+    """Root mean square of each column of x (M, n), in its unit. (n,)"""
+    value: Array = np.sqrt(np.mean(x**2, axis=0))
+    return value
+
+
+class ParameterColumns(NamedTuple):
+    """Order of all unknowns in one vector: inertial parameters, rotor inertias, friction."""
+
+    chain: Chain  #: The arm's geometry.
+    rotor: bool  #: Whether rotor inertias are unknown: with torque measured before the gear.
+    shapes: tuple[Shape, ...]  #: Friction structure of each joint.
+
+    @property
+    def inertial(self) -> int:
+        """Number of inertial unknowns: ten a link, first in the vector."""
+        return LINK * self.chain.joints
+
+    @property
+    def rotor_places(self) -> slice:
+        """Places of the rotor inertias, next; none with torque measured behind the gear."""
+        return slice(self.inertial, self.inertial + self.rotor * self.chain.joints)
+
+    @property
+    def frictions(self) -> tuple[slice, ...]:
+        """Places of each joint's friction coefficients, behind the rotors."""
+        edges = np.cumsum([self.rotor_places.stop, *(len(s.terms) for s in self.shapes)])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
+
+    @property
+    def size(self) -> int:
+        """Length of the vector of unknowns."""
+        return int(self.frictions[-1].stop)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """A name for each unknown: m2, mx3, Ixx1, J4, coulomb5 …"""
+        n = self.chain.joints
+        inertial = [f"{name}{j}" for j in range(1, n + 1) for name in INERTIAL_NAMES]
+        rotors = [f"J{j}" for j in range(1, self.rotor * n + 1)]
+        terms = [f"{t}{j}" for j, s in enumerate(self.shapes, start=1) for t in s.terms]
+        return (*inertial, *rotors, *terms)
+
+    def rows(self, log: PreparedLog, span: slice) -> Array:
+        """Regressor A of a span: A x is every joint's drive torque. (N, n, size)"""
+        n, q, dq, ddq = self.chain.joints, log.q[span], log.dq[span], log.ddq[span]
+        A = np.zeros((len(q), n, self.size))
+        A[:, :, : self.inertial] = torque_regressor(self.chain, q, dq, ddq)
+        for j, (shape, place) in enumerate(zip(self.shapes, self.frictions, strict=True)):
+            if self.rotor:
+                A[:, j, self.inertial + j] = ddq[:, j]
+            A[:, j, place] = log.friction(j, shape)[span]
+        return A
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -214,7 +270,7 @@ class Training:
 
     robot: Robot  #: The profile.
     recordings: tuple[Recording, ...]  #: The logs.
-    logs: tuple[TrainingLog, ...]  #: Those that move, filtered and decimated.
+    logs: tuple[PreparedLog, ...]  #: Those that move, filtered and decimated.
     moves: Mask  #: Joints that move at all. (n,)
     reverses: Mask  #: Joints that move both ways. (n,)
     fit_constants: bool = False  #: Whether drive constants are unknowns of the friction method.
@@ -227,7 +283,7 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        fastest = max(float(np.max(np.abs(log.motion.dq[:, j]))) for log in self.logs)
+        fastest = max(float(np.max(np.abs(log.dq[:, j]))) for log in self.logs)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 
@@ -245,16 +301,10 @@ def prepare_training(
             "--set identify.constants=yes needs motor currents; the logs have torques. Leave it out"
         )
     moves, reverses = moving_joints(motions)
-    logs = []
-    for motion in motions:
-        if motion.samples > 1:
-            rigid, columns = rigid_torque(robot, motion), friction_columns(motion, robot)
-            losses = predicted_torque(robot, motion) - rigid
-            logs.append(TrainingLog(motion, columns, motion.usable.astype(float), rigid, losses))
     return Training(
         robot=robot,
         recordings=tuple(recordings),
-        logs=tuple(logs),
+        logs=tuple(motion for motion in motions if motion.samples > 1),
         moves=moves,
         reverses=reverses,
         fit_constants=fit_constants,

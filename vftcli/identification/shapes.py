@@ -1,0 +1,126 @@
+"""The shape of a joint's friction: a sum of known terms times coefficients.
+
+A term is evaluated on the log as it was recorded and then filtered like the torque, so that a
+reversal is rounded alike on both sides of the equation.
+"""
+
+import itertools
+from typing import NamedTuple
+
+import numpy as np
+
+from vftcli.robots.friction import FRICTION_MODELS, SMOOTHING, bent_line, coulomb_logarithmic
+from vftcli.robots.robot import JointFriction
+from vftcli.signals.arrays import Array
+
+SMOOTHINGS = (0.003, 0.01, 0.03, 0.1)  #: Velocities over which the sign may be smoothed. [rad/s]
+#: Velocities over which a Stribeck term may fade. [rad/s]
+STRIBECK_VELOCITIES = (0.02, 0.05, 0.1, 0.2)
+#: Velocities from which a logarithmic rise may flatten; UR's gears have .28 to 2.1. [rad/s]
+LOGARITHMIC_VELOCITIES = (0.1, 0.2, 0.5, 1.0, 2.0)
+#: Speeds of the points between which UR's controllers draw friction as a line. [rad/s]
+BENDS = (0.01, 0.5, 1.5, 3.2)
+#: Share of the way between two points that a motion must cover to tell the faster one.
+SPANNED = 0.3
+#: Term → friction model in a robot file; the first that a joint has counts.
+MODELS = {
+    "logarithmic": "coulomb-logarithmic",
+    "stribeck": "coulomb-viscous-stribeck",
+    "load_coulomb": "coulomb-viscous-load",
+    "quadratic": "coulomb-viscous-quadratic",
+    "offset": "coulomb-viscous-offset",
+}
+SIMPLEST = "coulomb-viscous"  #: Model of a joint that has none of them.
+POINT = "point"  #: Head of a bent line's terms: point1 is the torque at its first speed.
+
+
+class Shape(NamedTuple):
+    """The structure of one joint's friction: which terms, and its nonlinear numbers."""
+
+    #: Keys of the robot file that hold coefficients, in order; those that begin with `POINT`
+    #: are the torques of a bent line.
+    terms: tuple[str, ...]
+    smoothing: float = SMOOTHING  #: Velocity over which the sign is smoothed. [rad/s]
+    stribeck_velocity: float = 0.05  #: Velocity over which the Stribeck term fades. [rad/s]
+    logarithmic_velocity: float = 1.0  #: Velocity from which the logarithmic term flattens. [rad/s]
+    #: Way over which the teeth of the gear give before they slide. [rad]
+    presliding_length: float = 0.0
+    speeds: tuple[float, ...] = ()  #: Speeds of the bent line's points. [rad/s]
+
+    @property
+    def model(self) -> str:
+        """Name of the simplest friction model that has all terms."""
+        if self.points:
+            return "points"
+        return next((name for term, name in MODELS.items() if term in self.terms), SIMPLEST)
+
+    @property
+    def points(self) -> tuple[str, ...]:
+        """The terms that are torques of a bent line, in the order of its speeds."""
+        return tuple(term for term in self.terms if term.startswith(POINT))
+
+    @property
+    def words(self) -> str:
+        """The terms and the nonlinear numbers, for tables."""
+        line = ["points at " + ", ".join(f"{v:g}" for v in self.speeds)] if self.points else []
+        others = [term for term in self.terms if term not in self.points]
+        text = f"{' + '.join([*line, *others])}, smoothing {self.smoothing:g} rad/s"
+        if "presliding" in self.terms:
+            text += f", presliding over {1e3 * self.presliding_length:g} mrad"
+        if "stribeck" in self.terms:
+            text += f", Stribeck velocity {self.stribeck_velocity:g} rad/s"
+        if "logarithmic" in self.terms:
+            text += f", flattening from {self.logarithmic_velocity:g} rad/s"
+        return text
+
+    def friction(self, values: Array, confidence: str = "") -> JointFriction:
+        """The joint's friction with these coefficients, one a term."""
+        parameters = {k: round_digits(float(v)) for k, v in zip(self.terms, values, strict=True)}
+        torques = tuple(parameters.pop(term) for term in self.points)
+        parameters["smoothing"] = self.smoothing
+        for term in ("stribeck", "logarithmic"):
+            if term in self.terms:
+                parameters[f"{term}_velocity"] = float(getattr(self, f"{term}_velocity"))
+        if "presliding" in self.terms:
+            parameters["presliding_length"] = self.presliding_length
+        # A dry torque that is all presliding's leaves none to what slides.
+        required = FRICTION_MODELS[self.model].required
+        parameters = {**dict.fromkeys(required, 0.0), **parameters}
+        return JointFriction(
+            model=self.model,
+            parameters=parameters,
+            speeds=self.speeds if torques else (),
+            torques=torques,
+            confidence=confidence,
+        )
+
+
+def bent(speed: float) -> Shape | None:
+    """The bent line for a motion up to a speed [rad/s], None of fewer than two points.
+
+    Between its points the line is straight, so that a motion well beyond one of them tells the
+    next one too; behind its last point it goes on as it came.
+    """
+    reached = [speed >= low + SPANNED * (high - low) for low, high in itertools.pairwise(BENDS)]
+    count = 1 + int(np.argmin([*reached, False]))
+    if count < 2:
+        return None
+    points = tuple(f"{POINT}{k}" for k in range(1, count + 1))
+    return Shape(points, speeds=BENDS[:count])
+
+
+def round_digits(value: float, digits: int = 7) -> float:
+    """A number with as many digits as an identification can possibly mean."""
+    return float(f"{value:.{digits}g}")
+
+
+def term_values(term: str, shape: Shape, dq: Array, load: Array) -> Array:
+    """One term at recorded velocities [rad/s] and loads [N·m], its coefficient at 1."""
+    if term in shape.points:
+        torques = np.eye(len(shape.speeds))[shape.points.index(term)].tolist()
+        return bent_line(dq, shape.speeds, torques, smoothing=shape.smoothing)
+    own = ("smoothing", "stribeck_velocity", "logarithmic_velocity")
+    numbers = {name: getattr(shape, name) for name in own}
+    return coulomb_logarithmic(
+        dq, **{"coulomb": 0.0, "logarithmic": 0.0, term: 1.0}, **numbers, load=load
+    )
