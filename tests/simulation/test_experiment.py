@@ -229,8 +229,10 @@ def test_warming_joints_rub_less() -> None:
     ratio = rms(warm.samples.friction[late]) / rms(cold.samples.friction[late])
     # at 36 to 40 °C the law gives .82–.86 (size 3) and .73–.79 (size 1) of that at 25 °C
     assert np.all(ratio[[0, 1, 2, 3, 5]] < 0.9)
-    np.testing.assert_allclose(warm.measured.temperature[[0, -1]], [[25.0] * 6, [40.0] * 6])
-    np.testing.assert_array_equal(cold.measured.temperature, 25.0)
+    np.testing.assert_allclose(
+        warm.measured.signals["temperature"][[0, -1]], [[25.0] * 6, [40.0] * 6]
+    )
+    np.testing.assert_array_equal(cold.measured.signals["temperature"], 25.0)
 
 
 def test_a_temperature_that_no_joint_has_is_refused() -> None:

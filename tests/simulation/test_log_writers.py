@@ -92,7 +92,7 @@ def test_libfranka_log_has_its_columns_and_sign(panda: Simulation, tmp_path: Pat
     assert names[:3] == ["time", "success_rate", "state.q[0]"]
     row = [float(v) for v in lines[1].split(",")]
     column = names.index("state.tau_ext_hat_filtered[1]")
-    assert row[column] == pytest.approx(-panda.vendor.tau_ext[0, 1], rel=1e-5)
+    assert row[column] == pytest.approx(-panda.measured.signals["tau_ext"][0, 1], rel=1e-5)
     assert row[0] == 100_000.0
 
 
@@ -103,7 +103,7 @@ def test_sensor_is_logged_in_every_format(sensed: Simulation, tmp_path: Path) ->
     for form, name in (("parquet", "log.parquet"), ("rosbag2", "bag")):
         save({tmp_path / name: sensed}, form)
         back = read(tmp_path / name)
-        np.testing.assert_array_equal(back.require("wrench"), sensed.force_sensor)
+        np.testing.assert_array_equal(back.require("wrench"), sensed.measured.signals["wrench"])
 
 
 def test_truth_is_on_the_clock_of_the_log(ur5: Simulation, tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_jittering_stamps_still_increase() -> None:
 @pytest.mark.slow
 def test_vendor_estimate_sees_the_push_late_and_through_a_filter() -> None:
     run = simulate(load_scenario("ur5-circle", ["contacts.hand.style=slow"]), 1)
-    truth, vendor = run.truth.tau_ext[:, 0], run.vendor.tau_ext[:, 0]
+    truth, vendor = run.truth.tau_ext[:, 0], run.measured.signals["tau_ext"][:, 0]
     lags = [np.corrcoef(truth[:-k], vendor[k:])[0, 1] for k in range(1, 40)]
     # torque ON the robot, 5 Hz first order: 32 ms behind, and the average's 4 ms
     assert max(lags) > 0.9
@@ -96,19 +96,21 @@ def test_force_sensor_reads_the_handle_in_its_own_axes() -> None:
     run = simulate(
         load_scenario("ur5-sensor", ["duration=9", *settings, "force_sensor.bias=[0,0,0,0,0,0]"]), 1
     )
-    assert run.force_sensor is not None
+    assert "wrench" in run.measured.signals
     # lengths of a vector do not depend on the axes
     there = np.linalg.norm(run.truth.wrench[:, :3], axis=1)
-    np.testing.assert_allclose(np.linalg.norm(run.force_sensor[:, :3], axis=1), there, atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.norm(run.measured.signals["wrench"][:, :3], axis=1), there, atol=1e-9
+    )
     assert np.max(there) > 20.0
 
 
 @pytest.mark.slow
 def test_force_sensor_at_rest_weighs_its_tool() -> None:
     run = simulate(load_scenario("ur5-sensor", ["duration=2", "force_sensor.tool_mass=0.5"]), 1)
-    assert run.force_sensor is not None
+    assert "wrench" in run.measured.signals
     bias = np.array(run.scenario.force_sensor.bias)  # type: ignore[union-attr]
-    weight = np.linalg.norm((run.force_sensor - bias)[:, :3].mean(axis=0))
+    weight = np.linalg.norm((run.measured.signals["wrench"] - bias)[:, :3].mean(axis=0))
     # 250 samples of 0.1 N noise and 2 mN drift: 0.01 N
     assert weight == pytest.approx(0.5 * 9.81, abs=0.02)
 

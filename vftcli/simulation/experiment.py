@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,13 +19,10 @@ from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import (
     Measured,
     Samples,
-    Vendor,
     check_sensing,
     interpolate,
     measure_run,
-    read_force_sensor,
     sample_run,
-    vendor_view,
 )
 from vftcli.simulation.trajectories import Reference, plan
 
@@ -72,16 +69,14 @@ class Simulation:
     robot: Robot  #: The profile.
     nominal: Robot  #: The controller's robot: the profile with the payload it knows.
     samples: Samples  #: True signals at the sampling instants.
-    measured: Measured  #: What the sensors report.
-    vendor: Vendor  #: What the controller reports.
-    #: Reading of the flange sensor, sensor axes, ON the robot. (M, 6) [N, N·m]
-    force_sensor: Array | None
+    measured: Measured  #: What the controller logs.
     truth: Truth  #: What really happened.
 
     @cached_property
     def actual(self) -> "FlangeMotion":
         """The flange as it is measured."""
-        return flange_motion(self.nominal.chain, self.measured.q, self.measured.dq)
+        seen = self.measured.signals
+        return flange_motion(self.nominal.chain, seen["q"], seen["dq"])
 
     @cached_property
     def target(self) -> "FlangeMotion":
@@ -91,28 +86,18 @@ class Simulation:
     @property
     def recording(self) -> Recording:
         """The log as a reader would hand it over: repeats dropped, losses left as gaps."""
-        written = np.array(self.measured.rows)
+        stamp, written, signals = self.measured
         rows = np.unique(written)
-        seen = self.measured
         duplicates = len(written) - len(rows)
         repeated = "repeats-dropped" if duplicates > 1 else "repeat-dropped"
         remarks = (fact(repeated, rows=duplicates),) if duplicates else ()
-        in_current = seen.current is not None
-        current = self.vendor.target_current
+        # A UR logs temperatures, a Franka its estimate of contact.
+        other = "tau_ext" if "current" in signals else "temperature"
+        columns: dict[str, Any] = {k: x[rows] for k, x in signals.items() if k != other}
         return Recording(
-            t=seen.stamp[rows] - seen.stamp[rows[0]],
-            q=seen.q[rows],
-            dq=seen.dq[rows],
-            current=seen.current[rows] if seen.current is not None else None,
-            torque=None if in_current else seen.torque[rows],
-            target_q=self.samples.target_q[rows],
-            target_dq=self.samples.target_dq[rows],
-            target_current=current[rows] if current is not None else None,
-            target_torque=self.vendor.target_torque[rows],
-            tau_ext=None if in_current else self.vendor.tau_ext[rows],
-            temperature=seen.temperature[rows] if in_current else None,
-            wrench=None if self.force_sensor is None else self.force_sensor[rows],
-            wrench_frame=None if self.force_sensor is None else WrenchFrame("sensor", "sensor"),
+            t=stamp[rows] - stamp[rows[0]],
+            **columns,
+            wrench_frame=WrenchFrame("sensor", "sensor") if "wrench" in signals else None,
             joint_names=self.robot.chain.names,
             robot_hint=self.robot.name,
             source=Source(
@@ -182,7 +167,6 @@ def simulate(
 def observe(arm: Arm) -> Simulation:
     """Turn a finished run, whoever commanded it, into its log and truth."""
     samples = sample_run(arm)
-    measured = measure_run(arm, samples)
     truth = truth_of(arm, samples)
     return Simulation(
         scenario=arm.scenario,
@@ -190,9 +174,7 @@ def observe(arm: Arm) -> Simulation:
         robot=arm.robot,
         nominal=arm.true.nominal,
         samples=samples,
-        measured=measured,
-        vendor=vendor_view(arm, samples, measured),
-        force_sensor=read_force_sensor(arm, samples, truth.wrench),
+        measured=measure_run(arm, samples, truth.wrench),
         truth=truth,
     )
 

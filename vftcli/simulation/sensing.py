@@ -3,7 +3,9 @@
 Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,29 +31,15 @@ class Samples(JointSignals):
     stamp: Array  #: The same on the log's clock, before jitter. (M,) [s]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measured:
-    """What the sensors report at each sample."""
+class Measured(NamedTuple):
+    """What the controller logs at each sample."""
 
     stamp: Array  #: Time stamps, jittering. (M,) [s]
-    q: Array  #: Positions. (M, n) [rad]
-    dq: Array  #: Velocities. (M, n) [rad/s]
-    #: Drive torques; for a robot that measures currents, K times `current`. (M, n) [N·m]
-    torque: Array
-    current: Array | None  #: Motor currents, None for a robot that measures torques. (M, n) [A]
-    temperature: Array  #: Joint temperatures. (M, n) [°C]
     #: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
     rows: tuple[int, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Vendor:
-    """The controller's own quantities at each sample."""
-
-    target_torque: Array  #: Nominal rigid-body torque of the reference. (M, n) [N·m]
-    #: That and the nominal friction as current, None without drive constants. (M, n) [A]
-    target_current: Array | None
-    tau_ext: Array  #: Its estimate of the external torque ON the robot. (M, n) [N·m]
+    #: Field of a recording → its signal: what the sensors and the flange's own report, and the
+    #: controller's targets and estimate of contact. (M, n) each
+    signals: dict[str, Array]
 
 
 def check_sensing(spec: SensingSpec) -> None:
@@ -129,8 +117,8 @@ def drive_constants(robot: Robot) -> Array | None:
     return robot.torque_constant if robot.torque_source == "current" else None
 
 
-def measure_run(arm: Arm, samples: Samples) -> Measured:
-    """What the sensors make of the true signals, noise from the seed."""
+def measure_run(arm: Arm, samples: Samples, wrench: Array) -> Measured:
+    """What the controller logs of the true signals and wrench (M, 6), noise from the seed."""
     spec, K = arm.scenario.sensing, drive_constants(arm.robot)
     rng = np.random.default_rng(arm.seeds["sensing"])
     sizes, shape = noise_sizes(arm), samples.q.shape
@@ -138,7 +126,7 @@ def measure_run(arm: Arm, samples: Samples) -> Measured:
     dq = samples.v + sizes[1] * rng.standard_normal(shape)
     seen = samples.tau / arm.true.gain + arm.true.offset
     noise = sizes[2] * rng.standard_normal(shape)
-    current = None if K is None else seen / K + noise
+    effort = {"torque": seen + noise} if K is None else {"current": seen / K + noise}
     # Less than half a period to either side: stamps must go on increasing.
     stamp, count = samples.stamp, len(samples.stamp)
     draw = spec.jitter * rng.standard_normal(count)
@@ -150,15 +138,11 @@ def measure_run(arm: Arm, samples: Samples) -> Measured:
     inner = np.arange(count) > 0
     inner[-1] = False
     source = np.arange(count) - (again & inner)
-    return Measured(
-        stamp=stamp,
-        q=q,
-        dq=dq,
-        torque=seen + noise if K is None or current is None else current * K,
-        current=current,
-        temperature=arm.temperature(samples.time),
-        rows=tuple(source[~(lost & inner)].tolist()),
-    )
+    signals = {"q": q, "dq": dq, **effort}
+    signals |= controller_signals(arm, samples, signals)
+    if (reading := read_force_sensor(arm, samples, wrench)) is not None:
+        signals["wrench"] = reading
+    return Measured(stamp, tuple(source[~(lost & inner)].tolist()), signals)
 
 
 def rounded(q: Array, step: float) -> Array:
@@ -166,27 +150,36 @@ def rounded(q: Array, step: float) -> Array:
     return np.round(q / step) * step if step > 0 else q
 
 
-def vendor_view(arm: Arm, samples: Samples, measured: Measured) -> Vendor:
-    """The controller's nominal model along a run.
+def controller_signals(
+    arm: Arm, samples: Samples, measured: Mapping[str, Array]
+) -> dict[str, Array]:
+    """Temperatures, targets and estimate of contact by the controller's nominal model.
 
     As Universal Robots', its friction knows load and temperature, no presliding.
     """
-    nominal: Robot = arm.true.nominal
+    nominal, K = arm.true.nominal, drive_constants(arm.robot)
     target = Reference(samples.target_q, samples.target_dq, samples.target_ddq)
-    still, warm = np.zeros_like(samples.target_q), measured.temperature
+    still, warm = np.zeros_like(samples.target_q), arm.temperature(samples.time)
     load = momentum_terms(nominal.loaded_chain, samples.target_q, still).gravity
     target_torque = rigid_torque(nominal.model, target)
-    target_current = None
+    signals = dict[str, Array]()
     if nominal.torque_constant is not None:
         rubs = friction_torque(nominal.friction, samples.target_dq, load, temperature=warm)
-        target_current = (target_torque + rubs) / nominal.torque_constant
-    motion = Reference(measured.q, measured.dq, samples.target_ddq)
-    model_torque = rigid_torque(nominal.model, motion)
-    model_torque += friction_torque(nominal.friction, measured.dq, load, temperature=warm)
+        signals["target_current"] = (target_torque + rubs) / nominal.torque_constant
+    q, dq = measured["q"], measured["dq"]
+    model_torque = rigid_torque(nominal.model, Reference(q, dq, samples.target_ddq))
+    model_torque += friction_torque(nominal.friction, dq, load, temperature=warm)
+    torque = measured["torque"] if K is None else measured["current"] * K
     spec = arm.scenario.sensing
     step = 1.0 / log_rate(spec, arm.robot)
-    residual = first_order_low_pass(measured.torque - model_torque, spec.vendor_cutoff, step)
-    return Vendor(target_torque=target_torque, target_current=target_current, tau_ext=-residual)
+    residual = first_order_low_pass(torque - model_torque, spec.vendor_cutoff, step)
+    return signals | {
+        "target_q": samples.target_q,
+        "target_dq": samples.target_dq,
+        "target_torque": target_torque,
+        "tau_ext": -residual,
+        "temperature": warm,
+    }
 
 
 def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:

@@ -80,7 +80,7 @@ FRANKA: Columns = {
     "state.q_d": "target_q",
     "state.dq": "dq",
     "state.dq_d": "target_dq",
-    "state.tau_J": "tau",
+    "state.tau_J": "torque",
     "state.tau_ext_hat_filtered": "-tau_ext",
     "cmd.q_d": "next target_q",
     "cmd.dq_d": "next target_dq",
@@ -96,26 +96,6 @@ TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wren
 AT_CONTACT = "base axes, moment about the point that is touched"
 
 
-def joint_signals(simulation: Simulation) -> dict[str, Array]:
-    """Signals by name, one column a joint; those that the robot has. (M, n) each"""
-    samples, measured, vendor = simulation.samples, simulation.measured, simulation.vendor
-    table = {"q": measured.q, "dq": measured.dq}
-    if measured.current is not None and vendor.target_current is not None:
-        table |= {"current": measured.current, "target_current": vendor.target_current}
-    else:
-        table["tau"] = measured.torque
-    table |= {
-        "target_q": samples.target_q,
-        "target_dq": samples.target_dq,
-        "target_torque": vendor.target_torque,
-        "tau_ext": vendor.tau_ext,
-        "temperature": measured.temperature,
-    }
-    if simulation.force_sensor is not None:
-        table["wrench"] = simulation.force_sensor
-    return table
-
-
 def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
     """Signals of vendors' tables by name, to be called. (M, …) each
 
@@ -123,8 +103,9 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
     """
     import pinocchio as pin
 
-    samples, measured, model = simulation.samples, simulation.measured, simulation.nominal.model
-    target, time = simulation.target, measured.stamp + simulation.scenario.sensing.start
+    samples, signals = simulation.samples, simulation.measured.signals
+    model = simulation.nominal.model
+    target, time = simulation.target, simulation.measured.stamp + simulation.scenario.sensing.start
     still = np.zeros_like(samples.target_q)
     resting = Reference(samples.target_q, still, still)
 
@@ -134,7 +115,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
         return np.asarray(np.einsum("kji,kj->ki", target.rotation, felt))
 
     def momentum() -> Array:
-        data, states = model.createData(), zip(measured.q, measured.dq, strict=True)
+        data, states = model.createData(), zip(signals["q"], signals["dq"], strict=True)
         linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
         return np.array([np.linalg.norm(vector) for vector in linear])
 
@@ -143,9 +124,8 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
         pose[:, :3, :3], pose[:, :3, 3], pose[:, 3, 3] = target.rotation, target.position, 1.0
         return pose.transpose(0, 2, 1).reshape(-1, 16)
 
-    joints = joint_signals(simulation)
     return {
-        **{name: partial(joints.__getitem__, name) for name in joints},
+        **{name: partial(signals.__getitem__, name) for name in signals},
         "time": lambda: time,
         "milliseconds": lambda: np.rint(time * 1e3).astype(int),
         "target_ddq": lambda: samples.target_ddq,
@@ -153,16 +133,14 @@ def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
         "twist": lambda: simulation.actual.twist,
         # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
         "force": lambda: (
-            wrench_of(
-                simulation.vendor.tau_ext, simulation.actual.jacobian, left_out=LEAST_SIGMA
-            ).values
+            wrench_of(signals["tau_ext"], simulation.actual.jacobian, left_out=LEAST_SIGMA).values
         ),
         "target_pose": lambda: pose_of(target),
         "target_matrix": matrix,
         "target_twist": lambda: target.twist,
         "accelerometer": accelerometer,
         "momentum": momentum,
-        "torque_command": lambda: simulation.vendor.target_torque - rigid_torque(model, resting),
+        "torque_command": lambda: signals["target_torque"] - rigid_torque(model, resting),
     }
 
 
@@ -190,7 +168,7 @@ class VendorTable(NamedTuple):
         if self.columns is not FRANKA:
             if recipe == "short":
                 own = {name: own[name] for name in SHORT}
-            if simulation.force_sensor is not None:
+            if "wrench" in simulation.measured.signals:
                 own["ft_raw_wrench"] = "wrench"
         known, rows = vendor_signals(simulation), np.array(simulation.measured.rows)
         names, texts = [], []
@@ -222,12 +200,13 @@ LIBFRANKA = VendorTable(FRANKA, "[{}]", ",", "\n", "%.6g")
 
 def write_parquet(path: Path, simulation: Simulation) -> None:
     """Write the log as one flat table, `t`, `q/1`, `dq/1` and so on."""
-    rows = np.array(simulation.measured.rows)
-    start = simulation.scenario.sensing.start
-    columns: dict[str, Array] = {"t": simulation.measured.stamp + start}
-    for name, values in joint_signals(simulation).items():
-        columns |= flat(name, values, AXES if name == "wrench" else ())
-    write_columns(path, {name: values[rows] for name, values in columns.items()})
+    stamp, rows, signals = simulation.measured
+    columns: dict[str, Array] = {"t": stamp + simulation.scenario.sensing.start}
+    for name, values in signals.items():
+        if name != "target_current" or "current" in signals:
+            label = "tau" if name == "torque" else name
+            columns |= flat(label, values, AXES if name == "wrench" else ())
+    write_columns(path, {name: values[list(rows)] for name, values in columns.items()})
 
 
 def write_truth(path: Path, truth: Truth, start: float) -> None:

@@ -46,13 +46,13 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-    rows = np.array(simulation.measured.rows)
+    rows, signals = np.array(simulation.measured.rows), simulation.measured.signals
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
     stamps = np.array([round(float(t) * 1e9) for t in clock], dtype=np.int64)
     make = robot_states if simulation.robot.ros_state == ROBOT_STATE else joint_states
     topics = [make(simulation, rows, stamps)]
-    if simulation.force_sensor is not None:
-        topics.append(wrenches(simulation.force_sensor[rows], stamps))
+    if "wrench" in signals:
+        topics.append(wrenches(signals["wrench"][rows], stamps))
     # The bag declares the types of ROS 2 Humble, and Franka's.
     store, types = get_typestore(Stores.ROS2_HUMBLE), dict[str, Any]()
     for name, text in FRANKA.items():
@@ -71,14 +71,13 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
 def joint_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
     """`/joint_states`, effort in ampere for a current-driven arm, in N·m for the others."""
     names = [f"{name.removesuffix('_joint')}_joint" for name in simulation.robot.chain.names]
-    seen = simulation.measured
-    effort = seen.torque if seen.current is None else seen.current
+    seen = simulation.measured.signals
     values: dict[str, Value] = {
         **stamped(stamps),
         "name": names,
-        "position": seen.q[rows],
-        "velocity": seen.dq[rows],
-        "effort": effort[rows],
+        "position": seen["q"][rows],
+        "velocity": seen["dq"][rows],
+        "effort": seen["current" if "current" in seen else "torque"][rows],
     }
     return "/joint_states", JOINT_STATE, serialised(JOINT_STATE, values, len(rows))
 
@@ -92,18 +91,16 @@ def wrenches(readings: Array, stamps: Nanoseconds) -> Topic:
 
 def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Topic:
     """Franka's state topic, signs as libfranka's; other fields are zero."""
-    samples, seen, vendor = simulation.samples, simulation.measured, simulation.vendor
+    samples, seen = simulation.samples, simulation.measured.signals
     names = [f"{simulation.robot.name}_joint{j}" for j in range(1, 8)]
     measured, desired = "measured_joint_state", "desired_joint_state"
     motor, external = "measured_joint_motor_state", "tau_ext_hat_filtered"
-    q, dq, target_q, target_dq = (
-        signal[rows] for signal in (seen.q, seen.dq, samples.target_q, samples.target_dq)
-    )
+    q, dq, target_q, target_dq = (seen[name][rows] for name in ("q", "dq", "target_q", "target_dq"))
     actual, target = (
         FlangeMotion(*(part[rows] for part in flange))
         for flange in (simulation.actual, simulation.target)
     )
-    tau_ext = -vendor.tau_ext[rows]
+    tau_ext = -seen["tau_ext"][rows]
     force, regular = wrench_of(tau_ext, actual.jacobian)
     force[~regular] = 0.0
     in_flange = [np.einsum("kji,kj->ki", actual.rotation, part) for part in np.hsplit(force, 2)]
@@ -113,15 +110,15 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
         **{f"{joints}.name": names for joints in (measured, desired, motor, external)},
         f"{measured}.position": q,
         f"{measured}.velocity": dq,
-        f"{measured}.effort": seen.torque[rows],
+        f"{measured}.effort": seen["torque"][rows],
         f"{desired}.position": target_q,
         f"{desired}.velocity": target_dq,
-        f"{desired}.effort": vendor.target_torque[rows],
+        f"{desired}.effort": seen["target_torque"][rows],
         f"{motor}.position": q,
         f"{motor}.velocity": dq,
         f"{external}.effort": tau_ext,
         "ddq_d": samples.target_ddq[rows],
-        "dtau_j": np.gradient(seen.torque, samples.time, axis=0)[rows],
+        "dtau_j": np.gradient(seen["torque"], samples.time, axis=0)[rows],
         **six("k_f_ext_hat_k.wrench", WRENCH, np.hstack(in_flange)),
         **six("o_f_ext_hat_k.wrench", WRENCH, np.hstack([force[:, :3], about_base])),
         **pose("o_t_ee", actual.position, quaternions(actual.rotation)),
@@ -131,7 +128,7 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
         **pose("ee_t_k", np.zeros((1, 3)), UPRIGHT),
         **six("o_dp_ee_d.twist", TWIST, target.twist),
         **six("o_dp_ee_c.twist", TWIST, target.twist),
-        "time": (seen.stamp + simulation.scenario.sensing.start)[rows, None],
+        "time": (simulation.measured.stamp + simulation.scenario.sensing.start)[rows, None],
         "control_command_success_rate": 1.0,
         "robot_mode": MODE_MOVE,
     }
