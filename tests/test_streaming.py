@@ -23,7 +23,6 @@ FIXTURE = Path(__file__).parents[1] / "fixtures" / "ur5_circle.csv"
 @pytest.fixture
 def in_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every table counts as a long log, in blocks of 320 samples."""
-    monkeypatch.setattr(importlib.import_module("vftcli.readers.tables"), "WHOLE_ROWS", 0)
     monkeypatch.setattr(importlib.import_module("vftcli.readers.delimited"), "BLOCK_BYTES", 1 << 16)
     monkeypatch.setattr(importlib.import_module("vftcli.readers.table"), "HELD", 1 << 14)
     monkeypatch.setattr(streaming, "WHOLE_ROWS", 0)

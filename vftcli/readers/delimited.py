@@ -3,7 +3,6 @@
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
@@ -12,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile
-from vftcli.readers.table import Column
+from vftcli.readers.table import Column, Table
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 
 Series = Any  #: A column of polars, which is imported when a text is read.
 
 SEPARATORS = (",", ";", "\t", " ")
 TAIL_BYTES = 128 * 1024
-BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time, of a long table.
+BLOCK_BYTES = 1 << 22  #: Text that is parsed at a time.
 COMPARED_ROWS = 20  #: Rows before the last that tell whether its last number is whole.
 
 
@@ -45,23 +44,15 @@ def split_cells(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in line.split(separator)]
 
 
-@dataclass
-class TextTable:
+class TextTable(Table):
     """A delimited text table; only the columns asked for are parsed, always as float64."""
 
-    file: LogFile  #: The opened file.
-    lists: Mapping[int, int] = field(default_factory=dict)
-    _is_cut: bool = False
-
-    @property
-    def path(self) -> Path:
-        """The file."""
-        return self.file.path
-
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What loading dropped."""
-        return (fact("row-cut"),) if self._is_cut else ()
+    def __init__(self, file: LogFile) -> None:
+        self.file, self.path = file, file.path
+        cells = self.cells(self.sample[0])
+        self.width = len(cells)
+        numbers = all(not cell or self.is_number(cell) for cell in cells)
+        self.names = () if numbers else tuple(cells)
 
     @cached_property
     def sample(self) -> list[str]:
@@ -104,59 +95,19 @@ class TextTable:
         """Whether a cell holds a number as this table writes them."""
         return is_number(cell, decimal_comma=self.decimal_comma)
 
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The header's names, none if the first line holds numbers only."""
-        cells = self.cells(self.sample[0])
-        return () if all(not cell or self.is_number(cell) for cell in cells) else tuple(cells)
-
-    @cached_property
-    def width(self) -> int:
-        """Number of columns."""
-        return len(self.cells(self.sample[0]))
-
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
-        kinds = self._kinds(columns, clock)
-        # Most files parse as they are; mending copies them, so it waits for a failure.
-        for text in (self._text, self._mended):
-            found = self._parse(text(), kinds)
-            if found is not None and not _has_blank_rows(found):
-                return {c: _numbers(found[c], self.path) for c in columns}
-        raise self._diagnosed(kinds)
-
-    @property
-    def rows(self) -> int:
-        """About how many rows it has, by its size and its first lines."""
-        lines = self.sample[1:] or self.sample
-        return len(self.file.content) * len(lines) // sum(len(line) + 1 for line in lines)
-
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Parse some columns as `load` does, some megabytes of text at a time."""
-        path, kinds = self.file.direct, self._kinds(columns, clock)
-        in_one_piece = LogError(f"{self.path}: a text that needs mending is read in one piece")
-        if path is None or self._is_quoted or self._needs_mending(self.file.head):
-            raise in_one_piece
-        end = self._end() or len(self.file.content)
-        with path.open("rb") as source:
-            for _ in range(self._lines_before_rows):
-                source.readline()
-            while (left := end - source.tell()) > 0:
-                text = source.read(min(BLOCK_BYTES, left))
-                text += source.readline() if source.tell() < end else b""
-                found = self._parse(text, kinds)
-                if found is None or _has_blank_rows(found):
-                    raise in_one_piece
-                yield {c: _numbers(found[c], self.path) for c in columns}
+        """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
+        for found in self._parsed(self._kinds(columns, clock)):
+            yield {c: _numbers(found[c], self.file.path) for c in columns}
 
     def words(self, column: int) -> tuple[str, ...]:
         """The different texts that a column holds, in the order in which they come."""
-        for text in (self._text, self._mended):
-            found = self._parse(text(), {column: "String"})
-            if found is not None and len(found[column]):
-                words = found[column].unique(maintain_order=True)
-                return tuple(str(word or "").strip() for word in words)
-        raise self._diagnosed({})
+        parts = (found[column] for found in self._parsed({column: "String"}))
+        each = (part.unique(maintain_order=True) for part in parts)
+        words = dict.fromkeys(str(word or "").strip() for part in each for word in part)
+        if not words:
+            raise self._diagnosed({})
+        return tuple(words)
 
     def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, str]:
         """Column → its polars type; a clock's long whole numbers must not pass through float64."""
@@ -172,26 +123,35 @@ class TextTable:
                 kinds[clock] = "String"
         return kinds
 
-    @property
-    def _is_quoted(self) -> bool:
-        return any('"' in line for line in self.sample)
+    def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
+        """The wanted columns, some megabytes of text at a time."""
+        quoted = any('"' in line for line in self.sample)
+        for text in self._pieces(quoted=quoted):
+            # Most texts parse as they are; mending copies them, so it waits for a failure.
+            found = self._parse(text, kinds, quoted=quoted)
+            if found is None or _has_blank_rows(found):
+                found = self._parse(self._mended(text), kinds, quoted=quoted)
+            if found is None or _has_blank_rows(found):
+                raise self._diagnosed(kinds)
+            yield found
+            self.file.release()
 
-    def _parse(self, source: Path | bytes, kinds: Mapping[int, str]) -> dict[int, Series] | None:
+    def _parse(
+        self, text: bytes, kinds: Mapping[int, str], *, quoted: bool
+    ) -> dict[int, Series] | None:
         """The wanted columns by polars, each of its type; None where it refuses the text."""
         import polars as pl
 
         types = {c: getattr(pl, kind) for c, kind in kinds.items()}
         try:
             frame = pl.read_csv(
-                source,
+                text,
                 has_header=False,
-                skip_lines=self._lines_before_rows if isinstance(source, Path) else 0,
                 separator=self.separator,
                 columns=sorted(kinds),
                 schema={str(c): types.get(c, pl.String) for c in range(self.width)},
-                quote_char='"' if self._is_quoted else None,
+                quote_char='"' if quoted else None,
                 decimal_comma=self.decimal_comma,
-                glob=False,
             )
         except pl.exceptions.NoDataError:  # a header alone, before polars 2
             return {c: pl.Series(dtype=kind) for c, kind in types.items()}
@@ -199,35 +159,27 @@ class TextTable:
             return None
         return {c: frame[str(c)] for c in kinds}
 
-    @property
-    def _lines_before_rows(self) -> int:
-        """Raw lines before the first row of numbers."""
-        lines = self.file.head.split(b"\n", 2000)[:2000]
-        for number, line in enumerate(lines):
-            text = decoded(line).removeprefix("\ufeff").strip()
-            # The header is a row of its own, unless it stood in a comment.
-            if text and not text.startswith("#"):
-                return number + (bool(self.names) and not self._header_is_comment)
-        return 0
-
-    @property
-    def _header_is_comment(self) -> bool:
+    @cached_property
+    def is_headed(self) -> bool:
+        """Whether the names are a line of their own, and not a comment's."""
         lines = [decoded(line).removeprefix("\ufeff").strip() for line in self.file.lines[:200]]
         first = next((line for line in lines if not line.startswith("#")), "")
-        return bool(self.names) and self.cells(first) != list(self.names)
+        return bool(self.names) and self.cells(first) == list(self.names)
 
-    def _text(self) -> Path | bytes:
-        """The table as it can be parsed at once: the path, or bytes where something must go."""
-        head = self.file.head
-        if self._needs_mending(head):
-            return self._mended()
+    def _pieces(self, *, quoted: bool) -> Iterator[bytes]:
+        """The text of the rows; in one piece where a line's end may not be a row's."""
+        if self._needs_mending(self.file.head):
+            yield self._mended_rows()
+            return
+        content: Any = self.file.content.obj
         end = self._end()
-        if self.file.direct is not None and end is None:
-            return self.file.direct
-        text = bytes(self.file.content[:end])
-        for _ in range(self._lines_before_rows):
-            text = text.partition(b"\n")[2]
-        return text
+        place = (content.find(b"\n") + 1 or end) if self.is_headed else 0
+        while True:
+            stop = -1 if quoted else content.find(b"\n", place + BLOCK_BYTES, end)
+            stop = stop + 1 or end
+            yield content[place:stop]
+            if (place := stop) >= end:
+                return
 
     def _needs_mending(self, head: bytes) -> bool:
         """Whether the head holds what polars refuses: blank lines, odd ends, comments."""
@@ -237,35 +189,31 @@ class TextTable:
         begins = is_comment(decoded(head[:64])) or head.startswith(b"\xef\xbb\xbf")
         return blank or lone or blanks or begins
 
-    def _mended(self) -> bytes:
-        """The rows with plain line ends, without blank lines, comments and doubled blanks."""
-        end = self._end()
-        text = bytes(self.file.content[:end]).removeprefix(b"\xef\xbb\xbf")
+    def _mended(self, text: bytes) -> bytes:
+        """A text with plain line ends, without blank lines and doubled blanks."""
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if self.separator == " ":
             text = re.sub(rb"[ \t]+", b" ", text).replace(b"\n ", b"\n").replace(b" \n", b"\n")
-        text = text.lstrip(b"\n ")
+        return re.sub(rb"\n\s*\n", b"\n", text.lstrip(b"\n "))
+
+    def _mended_rows(self) -> bytes:
+        """The text of all rows, mended, behind the comments and the header."""
+        text = self._mended(bytes(self.file.content[: self._end()]).removeprefix(b"\xef\xbb\xbf"))
         while is_comment(decoded(text[:64])):
             text = text.partition(b"\n")[2].lstrip(b"\n ")
-        text = re.sub(rb"\n\s*\n", b"\n", text)
-        if self.names and not self._header_is_comment:
-            text = text.partition(b"\n")[2]
-        return text
+        return text.partition(b"\n")[2] if self.is_headed else text
 
-    def _end(self) -> int | None:
-        """Where the last row is cut, so that it has to go; None if it is whole."""
+    def _end(self) -> int:
+        """Where the last row ends, or begins if it is cut, so that it has to go."""
         content = self.file.content
         tail = bytes(content[-TAIL_BYTES:])
         if len(re.split(rb"[\r\n]+", tail, maxsplit=3)) <= 3:
             tail = bytes(content)  # very long rows
         stripped = tail.rstrip(b"\r\n")
         rows = [line for line in re.split(rb"[\r\n]+", stripped) if line.strip()]
-        if len(rows) < 2:
-            return None
-        ended = len(stripped) < len(tail)
-        if not self._ends_inside(rows, ended=ended):
-            return None
-        self._is_cut = True
+        if len(rows) < 2 or not self._ends_inside(rows, ended=len(stripped) < len(tail)):
+            return len(content)
+        self.remarks = (fact("row-cut"),)
         start = len(stripped) - len(re.split(rb"[\r\n]+", stripped)[-1])
         return len(content) - len(tail) + start
 
@@ -286,7 +234,7 @@ class TextTable:
 
     def _diagnosed(self, kinds: Mapping[int, str]) -> LogError:
         """Look at the table row by row for what the parser could not take."""
-        rows = self._mended().split(b"\n")
+        rows = self._mended_rows().split(b"\n")
         for number, row in enumerate(rows, start=1):
             cells = self.cells(decoded(row))
             if len(cells) > self.width:
@@ -294,7 +242,7 @@ class TextTable:
                     f"{self.path}: row {number} has {len(cells)} cells, the first line "
                     f"{self.width}. Two logs in one file, or a damaged row: cut it out."
                 )
-            for column in sorted(kinds):
+            for column in sorted(c for c, kind in kinds.items() if kind != "String"):
                 cell = cells[column] if column < len(cells) else ""
                 if cell and not self.is_number(cell):
                     name = f" ({self.names[column]})" if self.names else ""

@@ -7,10 +7,10 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -107,19 +107,20 @@ class Hdf5Table(ArrayTable):
     out; nothing is read before it is asked for.
     """
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self.lists = {k: width for k, width in self.lists.items() if width != 1}
+    @cached_property
+    def lists(self) -> Mapping[int, int]:
+        """Column → length of its rows, of matrices of several columns."""
+        return {k: width for k, width in super().lists.items() if width != 1}
 
     def within(self, group: str, also: Sequence[str] = ()) -> "Hdf5Table":
         """The datasets below a group, by their paths from there on, and others by theirs."""
         below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
         return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
-        return super().load(columns, clock)
+        return super().blocks(columns, clock)
 
     def check_size(self, columns: Sequence[int]) -> None:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""

@@ -192,7 +192,7 @@ def _by_frames(raw: RawLog, table: ParquetTable, fps: Json) -> RawLog:
     if not good or FRAME not in table.names or raw.clock != "column timestamp":
         return raw
     column = table.names.index(FRAME)
-    frames = table.load([column], column)[column]
+    frames = table.load([column], clock=column)[column]
     exact = frames.ndim == 1 and np.all(np.abs(raw.stamps * raw.tick - frames / fps) < CLOCK_SLACK)
     if frames.dtype.kind != "i" or not exact:
         return raw
@@ -251,7 +251,7 @@ def _episodes_of_table(folder: Path, path: Path) -> Iterable[Episode]:
     if missing := [name for name in EPISODES_TABLE if name not in table.names]:
         raise LogError(f"{path}: no column {missing[0]}; a table of episodes has one.")
     places = [table.names.index(name) for name in EPISODES_TABLE]
-    loaded = table.load(places, None)
+    loaded = table.load(places)
     columns = [loaded[place] for place in places]
     if not all(column.ndim == 1 and np.isfinite(column).all() for column in columns):
         raise LogError(f"{path}: a row of the table of episodes lacks a number.")
@@ -300,7 +300,7 @@ def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
     if "index" in names and episode.start is not None and not differs:
         index = names.index("index")
         usual = episode.start + np.arange(len(rows))
-        differs = not np.array_equal(table.load([index], index)[index][rows], usual)
+        differs = not np.array_equal(table.load([index], clock=index)[index][rows], usual)
     if differs:
         raise LogError(
             f"{file.path}: the rows of episode {episode.number} are not those that the table of "

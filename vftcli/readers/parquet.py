@@ -6,7 +6,7 @@ polars would end the whole process.
 
 import json
 import struct
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,18 +19,17 @@ import numpy as np
 
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
-from vftcli.readers.table import Column
+from vftcli.readers.table import Column, Table
 from vftcli.readers.tables import from_table
 from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
-from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
 Arrow = Any  #: An array, type or buffer of pyarrow, which has no stubs.
 
 EPISODE = "episode_index"
-#: Rows that are decoded at a time of a long table, and bytes of a column that are read for them.
+#: Rows that are decoded at a time, and bytes of a column that are read for them.
 BLOCK_ROWS, BUFFER_BYTES = 1 << 13, 1 << 18
 
 FILE_MAGIC = b"ARROW1\0\0"  #: How a file of Arrow begins.
@@ -49,27 +48,20 @@ def guarded(path: Path) -> Iterator[None]:
         yield
 
 
-class ColumnarTable(ABC):
-    """A file of columns; only those asked for are decoded, and nothing is ever mended.
-
-    Attributes:
-        path: The file.
-        names: Column names.
-    """
-
-    remarks: tuple[Remark, ...] = ()
+class ColumnarTable(Table):
+    """A file of columns; only those asked for are decoded, and nothing is ever mended."""
 
     def __init__(self, file: LogFile) -> None:
         self.path: Path = file.path
         self._rows: Indices | None = None
         self._size = len(file.content)
         with guarded(self.path):
-            schema, self.rows = self._opened(file)
+            schema, self._count = self._opened(file)
             self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
             self._lists = [k for k, kind in enumerate(schema.types) if _is_list(kind)]
-            if self.rows == 0:
+            if self._count == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
-        self.names: tuple[str, ...] = tuple(schema.names)
+        self.names = tuple(schema.names)
         self.width = len(self.names)
 
     @abstractmethod
@@ -77,12 +69,8 @@ class ColumnarTable(ABC):
         """Open the file; its schema, and how many rows it says it has."""
 
     @abstractmethod
-    def _first_list(self, column: int) -> Arrow:
-        """The value in the first row of a column of lists, None for none."""
-
-    @abstractmethod
-    def _decoded(self, columns: Sequence[int]) -> Arrow:
-        """Some columns of all rows, as a table."""
+    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
+        """Some columns of all rows, not many more than so many at a time."""
 
     def conversion(self) -> dict[str, Any]:
         """What vftcli convert wrote beside the columns; nothing for files of other programs."""
@@ -97,26 +85,38 @@ class ColumnarTable(ABC):
     def lists(self) -> Mapping[int, int]:
         """Columns of lists and their length in the first row."""
         with guarded(self.path):
-            return {k: len(self._first_list(k) or ()) for k in self._lists}
+            first = {k: (b for b in self._batches([k], 1) if b.num_rows) for k in self._lists}
+            rows = {k: next(batches, None) for k, batches in first.items()}
+            return {k: len((b and b.column(0)[0].as_py()) or ()) for k, b in rows.items()}
 
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Decode some columns."""
         self._check(columns)
         with guarded(self.path):
-            # One after the other: of a long log all of them have no room in two forms.
-            return {c: self._column(self._kept(c), c, clock) for c in sorted(columns)}
-
-    def _kept(self, column: int) -> Arrow:
-        values = self._decoded([column]).column(0)
-        return values if self._rows is None else values.take(self._rows)
+            start = 0
+            for batch in self._batches(columns, BLOCK_ROWS):
+                each = {c: batch.column(self.names[c]) for c in columns}
+                if self._rows is not None:
+                    ends = np.searchsorted(self._rows, [start, start + batch.num_rows])
+                    own = self._rows[slice(*ends)] - start
+                    each = {c: values.take(own) for c, values in each.items()}
+                start += batch.num_rows
+                yield {c: self._column(values, c, clock) for c, values in each.items()}
 
     def _column(self, values: Arrow, column: int, clock: int | None) -> Column:
         """A column as numbers; whole stamps stay whole, times become nanoseconds."""
         import pyarrow as pa
 
-        if column in self.lists:
-            return self._matrix(values, column)
-        kind, name = values.type, self.names[column]
+        name, length = self.names[column], self.lists.get(column)
+        if length is not None:
+            even = np.all(np.asarray(values.value_lengths()) == length)
+            flat = values.flatten()
+            if values.null_count or not even or len(flat) != length * len(values):
+                raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
+            if not is_number(flat.type):
+                raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
+            return plain(flat).astype(np.float64).reshape(len(values), length)
+        kind = values.type
         if pa.types.is_timestamp(kind) or pa.types.is_duration(kind):
             unit = pa.timestamp("ns") if pa.types.is_timestamp(kind) else pa.duration("ns")
             values = values.cast(unit).cast(pa.int64())
@@ -129,20 +129,6 @@ class ColumnarTable(ABC):
         # Not copied where nothing is to be changed: what is picked of it is copied once more.
         return plain(values).astype(target, copy=False)
 
-    def _matrix(self, values: Arrow, column: int) -> Column:
-        """A column of lists of one length. (T, k)"""
-        length, name = self.lists[column], self.names[column]
-        values = values.combine_chunks()
-        if hasattr(values, "chunks"):  # pyarrow keeps an empty or split column as chunks
-            values = values.chunk(0) if values.num_chunks else values
-        flat = values.flatten()
-        even = np.all(np.asarray(values.value_lengths()) == length) if len(values) else True
-        if values.null_count or not even or len(flat) != length * len(values):
-            raise LogError(f"{self.path}: the lists of {name} are not all {length} long.")
-        if not is_number(flat.type):
-            raise LogError(f"{self.path}: the lists of {name} hold {flat.type}.")
-        return plain(flat).astype(np.float64).reshape(len(values), length)
-
     def _check(self, columns: Sequence[int]) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
 
@@ -153,14 +139,14 @@ class ColumnarTable(ABC):
         if any(self.names.count(self.names[c]) > 1 for c in columns):
             raise LogError(f"{self.path}: two columns have one name; rename one of them.")
         width = sum(self.lists.get(column, 1) for column in columns)
-        check_unpacked(self.path, 8 * width * self.rows, self._size)
+        check_unpacked(self.path, 8 * width * self._count, self._size)
 
     def episodes(self) -> Column:
         """The episode of each row, as datasets of LeRobot number them; none elsewhere. (T,)"""
         if EPISODE not in self.names:
             return np.empty(0)
         column = self.names.index(EPISODE)
-        numbers = self.load([column], None)[column]
+        numbers = self.load([column])[column]
         if numbers.ndim != 1 or not np.isfinite(numbers).all():
             raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
         return numbers
@@ -175,11 +161,7 @@ def plain(values: Arrow) -> Column:
 
     Where none is missing without pyarrow's own way, which imports pandas: 50 MB and half a second.
     """
-    if hasattr(values, "chunks"):
-        values = values.combine_chunks()
-    if hasattr(values, "chunks") and values.num_chunks == 1:
-        values = values.chunk(0)
-    if values.null_count or hasattr(values, "chunks") or values.type.bit_width < 8:
+    if values.null_count or values.type.bit_width < 8:
         return np.asarray(values.to_numpy(zero_copy_only=False))
     return np.from_dlpack(values)
 
@@ -204,42 +186,20 @@ class ParquetTable(ColumnarTable):
     def _opened(self, file: LogFile) -> tuple[Any, int]:
         import pyarrow.parquet as pq
 
-        source = file.direct or BytesIO(file.content)
-        self._direct = file.direct
-        self._file = pq.ParquetFile(source, memory_map=False, pre_buffer=False)
+        # Read ahead, or as a mapped file, all of it would lie in memory.
+        self._file = pq.ParquetFile(
+            file.direct or BytesIO(file.content),
+            memory_map=False,
+            pre_buffer=False,
+            buffer_size=BUFFER_BYTES,
+        )
         about = self._file.metadata  # vftcli's own is the file's, not the schema's
         return self._file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
 
-    def _first_list(self, column: int) -> Arrow:
-        name = self.names[column]
-        batches = self._file.iter_batches(batch_size=1, columns=[name], use_threads=False)
-        first = next(iter(batches), None)
-        return first.column(name)[0].as_py() if first is not None and first.num_rows else None
-
-    def _decoded(self, columns: Sequence[int]) -> Arrow:
-        return self._file.read(columns=[self.names[c] for c in columns], use_threads=False)
-
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Decode some columns as `load` does, some thousand rows at a time."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
-
-        if self._rows is not None or self._direct is None:
-            raise LogError(f"{self.path}: part of a file, or a packed one, is read in one piece")
-        self._check(columns)
-        names = {c: self.names[c] for c in columns}
-        with guarded(self.path):
-            # Read ahead, or as a mapped file, all of it would lie in memory; so would groups that
-            # are asked for together.
-            file = pq.ParquetFile(
-                self._direct, memory_map=False, pre_buffer=False, buffer_size=BUFFER_BYTES
-            )
-            for group in range(file.num_row_groups):
-                for batch in file.iter_batches(
-                    BLOCK_ROWS, [group], list(names.values()), use_threads=False
-                ):
-                    table = pa.Table.from_batches([batch])
-                    yield {c: self._column(table.column(names[c]), c, clock) for c in columns}
+    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
+        names = [self.names[c] for c in columns]
+        for group in range(self._file.num_row_groups):  # together they would all lie in memory
+            yield from self._file.iter_batches(rows, [group], names, use_threads=False)
 
 
 class ArrowTable(ColumnarTable):
@@ -254,43 +214,33 @@ class ArrowTable(ColumnarTable):
         check_unpacked(file.path, sum(size for _, size in batches), self._size)
         return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
-    def _first_list(self, column: int) -> Arrow:
-        for batch in self._stream([column]):
-            batch.validate(full=True)
-            if batch.num_rows:
-                return batch.column(0)[0].as_py()
-        return None
-
-    def _decoded(self, columns: Sequence[int]) -> Arrow:
-        table = self._stream(columns).read_all()
-        table.validate(full=True)  # a damaged offset would lead out of the file
-        return table
-
-    def _stream(self, columns: Sequence[int]) -> Arrow:
+    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:  # noqa: ARG002
         import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
-        return pa.ipc.open_stream(self._content, options=options)
+        for batch in pa.ipc.open_stream(self._content, options=options):
+            batch.validate(full=True)  # a damaged offset would lead out of the file
+            yield batch
 
 
 def claims(content: Arrow) -> Iterator[tuple[int, int]]:
     """Rows of each batch, and the bytes it says to unpack to; nothing is unpacked."""
     import pyarrow as pa
 
-    reader = pa.ipc.MessageReader.open_stream(content)
-    while True:
-        try:
-            message = reader.read_next_message()
-        except StopIteration:
-            return
+    for message in pa.ipc.MessageReader.open_stream(content):
         if message.type not in {"record batch", "dictionary"}:
             continue
         try:
             table = Flat(memoryview(message.metadata)).table(MESSAGE_HEADER)
             if message.type == "dictionary":
                 table = table.table(DICTIONARY_BATCH)
-            size = unpacked(table, memoryview(message.body or b""))
             rows = table.number(BATCH_ROWS) if message.type == "record batch" else 0
+            size, body = 0, memoryview(message.body or b"")
+            packed = table.place(BATCH_PACKING) is not None
+            for start, length in table.pairs(BATCH_BUFFERS):
+                behind = packed and length >= NUMBER.size
+                claimed = NUMBER.unpack_from(body, start)[0] if behind else length
+                size += length if claimed == -1 else claimed  # -1: stored as it is
         except struct.error:
             raise ValueError("a batch that contradicts itself") from None
         if rows < 0 or size < 0:
@@ -298,58 +248,41 @@ def claims(content: Arrow) -> Iterator[tuple[int, int]]:
         yield rows, size
 
 
-def unpacked(batch: "Flat", body: memoryview) -> int:
-    """Bytes that the buffers of a batch say to unpack to."""
-    packed, total = batch.field(BATCH_PACKING) is not None, 0
-    for start, length in batch.pairs(BATCH_BUFFERS):
-        claimed = length
-        if packed and length >= NUMBER.size:
-            (claimed,) = NUMBER.unpack_from(body, start)
-            claimed = length if claimed == -1 else claimed  # -1: stored as it is
-        total += claimed
-    return total
-
-
 class Flat:
     """A table of a flatbuffer, in which Arrow describes a batch."""
 
-    def __init__(self, data: memoryview, place: int | None = None) -> None:
+    def __init__(self, data: memoryview, start: int = 0) -> None:
         self._data = data
-        self._place = self._at("<I", 0) if place is None else place
-        self._fields = self._place - self._at("<i", self._place)
+        self._start = start + self._at("<I", start)
+        self._fields = self._start - self._at("<i", self._start)
 
     def _at(self, kind: str, place: int) -> int:
         if place < 0:
             raise struct.error
         return int(struct.unpack_from(kind, self._data, place)[0])
 
-    def field(self, index: int) -> int | None:
+    def place(self, index: int) -> int | None:
         """Place of a field, None where it is left out."""
         if 4 + 2 * index >= self._at("<H", self._fields):
             return None
         offset = self._at("<H", self._fields + 4 + 2 * index)
-        return self._place + offset if offset else None
+        return self._start + offset if offset else None
 
     def number(self, index: int) -> int:
         """A field of 64 bits, 0 where it is left out."""
-        place = self.field(index)
+        place = self.place(index)
         return 0 if place is None else self._at("<q", place)
 
     def table(self, index: int) -> "Flat":
         """A field that is a table."""
-        place = self.field(index)
-        if place is None:
-            raise struct.error
-        return Flat(self._data, place + self._at("<I", place))
+        return Flat(self._data, -1 if (place := self.place(index)) is None else place)
 
     def pairs(self, index: int) -> Iterator[tuple[int, int]]:
         """A field that is a row of pairs of numbers."""
-        place = self.field(index)
-        if place is None:
+        if (place := self.place(index)) is None:
             return
         place += self._at("<I", place)
-        for k in range(self._at("<I", place)):
-            at = place + 4 + 16 * k
+        for at in range(place + 4, place + 4 + 16 * self._at("<I", place), 16):
             yield self._at("<q", at), self._at("<q", at + 8)
 
 

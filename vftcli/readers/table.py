@@ -1,13 +1,14 @@
 """Tables: columns of numbers under names or in file order, whatever file they come from."""
 
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple
 from weakref import finalize
 
 import numpy as np
@@ -25,43 +26,31 @@ JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
 Column = NDArray[Any]  #: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
 
 
-class Table(Protocol):
+class Table(ABC):
     """Columns of numbers that are loaded when they are asked for."""
 
-    @property
-    def path(self) -> Path | str:
-        """What messages call the table: the file, and in a bag the topic."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Column names, none for a headerless table."""
-
-    @property
-    def width(self) -> int:
-        """Number of columns."""
+    path: Path | str  #: What messages call the table: the file, and in a bag the topic.
+    names: tuple[str, ...]  #: Column names, none for a headerless table.
+    width: int  #: Number of columns.
+    remarks: tuple[Remark, ...] = ()  #: What loading dropped or mended.
 
     @property
     def lists(self) -> Mapping[int, int]:
         """Column → length of its lists, for columns that hold lists."""
+        return {}
 
-    @property
-    def remarks(self) -> tuple[Remark, ...]:
-        """What loading dropped or mended."""
-
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Load columns as float64; the clock's column may stay whole numbers."""
-
-
-@runtime_checkable
-class LongTable(Table, Protocol):
-    """A table that can be loaded a block of rows after another."""
-
-    @property
-    def rows(self) -> int:
-        """About how many rows it has."""
-
+    @abstractmethod
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
-        """Load columns as `load` does, some thousand rows at a time."""
+        """Columns as float64, some thousand rows at a time; the clock's may stay whole numbers."""
+
+    def load(self, columns: Sequence[int], clock: int | None = None) -> dict[int, Column]:
+        """All rows of some columns."""
+        first, *more = self.blocks(columns, clock)
+        return (
+            {c: np.concatenate([first[c], *(b[c] for b in more)]) for c in columns}
+            if more
+            else first
+        )
 
 
 class Cell(NamedTuple):
@@ -281,7 +270,7 @@ def checked(table: Table, picks: Picks) -> Picks:
 
 #: Bytes of a signal that wait in memory. A longer one lies in a nameless file in the system's
 #: folder for temporary files, and is an array all the same.
-HELD = 1 << 22
+HELD = 1 << 23
 
 
 class JoinedRows:

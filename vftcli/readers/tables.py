@@ -3,7 +3,8 @@
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,12 @@ import numpy as np
 from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, robot_of, table_clock
 from vftcli.readers.columns import ColumnSpec, Item, guessed, parse_columns, tick_of
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.opening import WHOLE_ROWS, LogFile
+from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.table import (
     Cell,
     Column,
-    LongTable,
     Pick,
     Picks,
     Table,
@@ -129,7 +129,7 @@ def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawL
     columns: dict[int, Column] = {}
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue
-            columns = table.load(range(table.width), 0)
+            columns = table.load(range(table.width), clock=0)
     found = guessed(list(columns.values())) if columns else None
     if found is None or found.others:
         likely = "as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
@@ -147,31 +147,26 @@ def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawL
 
 
 @dataclass
-class ArrayTable:
+class ArrayTable(Table):
     """A table of arrays of numbers or of lists, in memory or an open file's."""
 
-    path: Path | str  #: What messages call it: the file, and in a bag the topic.
+    path: Path | str
     columns: Mapping[str, Any]  #: Name → (T,) or (T, k).
     headed: bool = True  #: Whether the names are the file's own.
-    remarks: tuple[Remark, ...] = ()  #: What had to be done to the arrays.
-    lists: Mapping[int, int] = field(init=False)
+    remarks: tuple[Remark, ...] = ()
 
     def __post_init__(self) -> None:
+        self.names = tuple(self.columns) if self.headed else ()
+        self.width = len(self.columns)
+
+    @cached_property
+    def lists(self) -> Mapping[int, int]:
+        """Column → length of its rows, of matrices."""
         arrays = enumerate(self.columns.values())
-        self.lists = {k: array.shape[1] for k, array in arrays if array.ndim == 2}
+        return {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The columns' names, none if the file has none."""
-        return tuple(self.columns) if self.headed else ()
-
-    @property
-    def width(self) -> int:
-        """Number of columns."""
-        return len(self.columns)
-
-    def load(self, columns: Sequence[int], clock: int | None) -> dict[int, Column]:
-        """Return columns as float64; whole stamps stay whole."""
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+        """All rows of some columns; whole stamps stay whole."""
         each = list(self.columns.items())
         if len({len(each[c][1]) for c in columns}) > 1:
             lengths = ", ".join(f"{each[c][0]} {len(each[c][1])}" for c in columns)
@@ -184,7 +179,7 @@ class ArrayTable:
             whole = c == clock and array.dtype.kind in "iu" and array.dtype.itemsize == 8
             values = np.asarray(array).astype(np.int64 if whole else np.float64, copy=False)
             loaded[c] = values[:, 0] if values.ndim == 2 and c not in self.lists else values
-        return loaded
+        yield loaded
 
 
 def recognises(file: LogFile, layout: LogFormat) -> bool:
@@ -218,21 +213,20 @@ def picked(
 ) -> RawLog:
     """Load the picked columns of a table and scale them."""
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
-    clock = picks.clock.cells[0] if picks.clock else None
+    clock = picks.clock.cells if picks.clock else ()
     last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
-    kept = {cell.column for cell in picks.clock.cells} if picks.clock else set()
+    kept = {cell.column for cell in clock}
     kept |= set() if picks.origin is None else {picks.origin}
-    asked = sorted(kept.union(last, picks.constants)), clock.column if clock else None
-    columns: dict[int, list[Column]] = {}
+    columns: dict[int, list[Column]] = {c: [] for c in kept}
     constants: tuple[float, ...] = ()
 
-    def stacked(parts: Iterator[dict[int, Column]]) -> Iterator[dict[str, Array]]:
+    def stacked() -> Iterator[dict[str, Array]]:
         nonlocal constants
-        columns.clear()
-        for loaded in parts:
+        asked = sorted({*kept, *last, *picks.constants})
+        for loaded in table.blocks(asked, clock[0].column if clock else None):
             for column in kept:
-                columns.setdefault(column, []).append(loaded[column])
-            last_rows = (loaded[c][-1:] for c in picks.constants)
+                columns[column].append(loaded[column])
+            last_rows = [loaded[c][-1:] for c in picks.constants]
             constants = tuple(float(row[0]) if len(row) else np.nan for row in last_rows)
             arrays = {}
             for pick in signals:
@@ -242,11 +236,7 @@ def picked(
                     del loaded[column]
             yield arrays
 
-    arrays: dict[str, Array] = {}
-    if isinstance(table, LongTable) and table.rows > WHOLE_ROWS:
-        with suppress(LogError):  # in one piece it can be mended, or it is known what is wrong
-            arrays = joined(stacked(table.blocks(*asked)))
-    arrays = arrays or joined(stacked(table.load(*asked) for _ in range(1)))
+    arrays = joined(stacked())
     loaded = {c: np.concatenate(x) if len(x) > 1 else x[0] for c, x in columns.items()}
     rows = len(next(iter(arrays.values())))
     stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)

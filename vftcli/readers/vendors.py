@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -81,13 +81,24 @@ def binary_table(file: LogFile) -> ArrayTable:
 STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
 
 
-@dataclass
 class EchoTable(TextTable):
     """A table by ``ros2 topic echo --csv``: a message's fields in their order, without a header.
 
     Names, positions, velocities and efforts, as many of each or none, follow the header's stamp and
     frame.
     """
+
+    is_headed = False
+
+    def __init__(self, file: LogFile) -> None:
+        super().__init__(file)
+        fields = ("name", "position", "velocity", "effort")
+        count, more = self.joints, range(self.width - STAMP)
+        each = (
+            f"{fields[k // count]}{k % count}" if k < 4 * count else f"_{k - 4 * count}"
+            for k in more
+        )
+        self.names = ("sec", "nanosec", "frame_id", *each)
 
     @cached_property
     def joints(self) -> int:
@@ -100,19 +111,6 @@ class EchoTable(TextTable):
         if not stamped or is_number(cells[2]) or words != list(range(STAMP, STAMP + count)):
             return 0
         return count if count and values >= count and values % count == 0 else 0
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """The columns' names, as rostopic would print them."""
-        fields = ("name", "position", "velocity", "effort")
-        count, width = self.joints, self.width
-        named = [f"{fields[k // count]}{k % count}" for k in range(min(width - STAMP, 4 * count))]
-        more = [f"_{k}" for k in range(width - STAMP - len(named))]
-        return ("sec", "nanosec", "frame_id", *named, *more)
-
-    @property
-    def _header_is_comment(self) -> bool:
-        return True
 
 
 def joint_names(table: TextTable) -> tuple[str, ...]:
