@@ -30,8 +30,7 @@ class Channel:
     idl: bool = False  #: Whether the definition is in IDL.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Batch:
+class Batch(NamedTuple):
     """Messages of one channel, one behind the other."""
 
     channel: Channel  #: Whose messages they are.
@@ -41,29 +40,24 @@ class Batch:
     times: Integers  #: When each was recorded. (k,) [ns]
 
 
-class ChannelRun(NamedTuple):
-    """Messages of one channel as a library hands them out."""
-
-    channel: Channel | None  #: Whose they are, None where the file does not say.
-    times: list[int]  #: When each was recorded. (k,) [ns]
-    contents: list[bytes]  #: The bytes of each.
-
+#: Whose a message is, None where the file does not say; when it was recorded [ns]; its bytes.
+Message = tuple[Channel | None, int, bytes]
 
 BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(runs: Iterable[ChannelRun], ingest: "Ingest") -> Iterator[Batch]:
+def batched(messages: Iterable[Message], ingest: "Ingest") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
-    for channel, times, contents in runs:
+    for channel, time, content in messages:
         if channel is None:
             raise LogError(f"{ingest.path}: messages of an unknown topic; the file is damaged.")
-        _, all_times, all_contents = found.setdefault(id(channel), (channel, [], []))
-        all_times.extend(times)
-        all_contents.extend(contents)
-        held += sum(map(len, contents)) + MESSAGE_COST * len(contents)
+        _, times, contents = found.setdefault(id(channel), (channel, [], []))
+        times.append(time)
+        contents.append(content)
+        held += len(content) + MESSAGE_COST
         if held > BATCH_BYTES:
             yield from map(_batch, found.values())
             found, held = {}, 0
@@ -72,15 +66,10 @@ def batched(runs: Iterable[ChannelRun], ingest: "Ingest") -> Iterator[Batch]:
 
 def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
     channel, times, contents = found
-    ends = np.cumsum([len(content) for content in contents])
-    lengths = np.diff(ends, prepend=0)
-    return Batch(
-        channel=channel,
-        buffer=np.frombuffer(b"".join(contents), dtype=np.uint8),
-        offsets=ends - lengths,
-        lengths=lengths,
-        times=np.array(times).astype(np.int64),  # recorders that count past 2⁶³ wrap
-    )
+    lengths = np.array([len(content) for content in contents])
+    buffer, wrapped = np.frombuffer(b"".join(contents), dtype=np.uint8), np.array(times)
+    # Recorders that count past 2⁶³ wrap.
+    return Batch(channel, buffer, np.cumsum(lengths) - lengths, lengths, wrapped.astype(np.int64))
 
 
 @dataclass
@@ -104,23 +93,19 @@ class Census:
                 "the file is damaged."
             )
         if self.counted is not None and kept < self.counted:
-            remark = warning("messages-missing", kept=kept, counted=self.counted, by=counter)
+            ingest.note(warning("messages-missing", kept=kept, counted=self.counted, by=counter))
         elif self.counted_chunks is not None and chunks != self.counted_chunks:
-            remark = warning(
-                "chunks-missing", kept=kept, chunks=chunks, counted=self.counted_chunks
-            )
+            counted = self.counted_chunks
+            ingest.note(warning("chunks-missing", kept=kept, chunks=chunks, counted=counted))
         elif self.counted is None and missing > 0:
             size = self.data_end + missing
-            remark = warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size)
+            ingest.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size))
         elif left and self.closed:
-            remark = fact("index-cut", kept=kept, chunks=chunks)
+            ingest.note(fact("index-cut", kept=kept, chunks=chunks))
         elif left:
-            remark = warning("chunks-cut", kept=kept, rest_bytes=left)
+            ingest.note(warning("chunks-cut", kept=kept, rest_bytes=left))
         elif not self.closed:
-            remark = caution("recorder-stopped", kept=kept)
-        else:
-            return
-        ingest.note(remark)
+            ingest.note(caution("recorder-stopped", kept=kept))
 
 
 USUAL_RATIO = 15  #: Recorded numbers shrink by 3 to 15.
@@ -189,12 +174,12 @@ CONTAINERS = {
 def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
     """The messages of files, one behind the other; what a library raises is said in one line."""
     for file in files:
-        begins = next((magic for magic in CONTAINERS if file.head.startswith(magic)), None)
-        if begins is None:
+        found = next((x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None)
+        if found is None:
             raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
-        module, function = CONTAINERS[begins]
-        batches_of = getattr(import_module(f"vftcli.readers.bags.{module}"), function)
+        module, function = found
         try:
+            batches_of = getattr(import_module(f"vftcli.readers.bags.{module}"), function)
             for batch in batches_of(file, ingest):
                 yield batch
                 file.release()

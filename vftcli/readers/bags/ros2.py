@@ -24,8 +24,8 @@ from vftcli.readers.bags.container import (
     Batch,
     Census,
     Channel,
-    ChannelRun,
     Ingest,
+    Message,
     batched,
     chunk_file,
     file_of,
@@ -47,7 +47,7 @@ ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised 
 
 def mcap_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of an MCAP file, up to the last whole chunk."""
-    return batched(_Mcap(ingest).runs(file.content), ingest)
+    return batched(_Mcap(ingest).messages(file.content), ingest)
 
 
 def _records(
@@ -71,18 +71,14 @@ class _Mcap:
         self.channels: dict[int, Channel] = {}
         self.indexed = 0
 
-    def runs(self, content: memoryview) -> Iterator[ChannelRun]:
+    def messages(self, content: memoryview) -> Iterator[Message]:
         """The messages of the file, chunk by chunk, those outside chunks one by one."""
         census, end = self.census, MAGIC_SIZE
         for record, place in _records(file_of(content), len(content), inside=False):
             end = place
             if isinstance(record, DATA) and not census.closed:
                 census.data_end = end
-            if isinstance(record, records.Message):
-                census.kept += 1
-                channel = self.channels.get(record.channel_id)
-                yield ChannelRun(channel, [record.log_time], [record.data])
-            elif isinstance(record, records.Chunk):
+            if isinstance(record, records.Chunk):
                 census.chunks += 1
                 yield from self._chunk(record)
             elif isinstance(record, records.Footer):
@@ -96,13 +92,17 @@ class _Mcap:
                 end = len(content)
                 break
             else:
-                self._take(record, end)
+                yield from self._take(record, end)
         if self.indexed > census.chunks:
             census.counted_chunks = self.indexed
         census.tell(self.ingest, len(content) - end, "its statistics")
 
-    def _take(self, record: records.McapRecord, end: int) -> None:
-        if isinstance(record, records.Schema):
+    def _take(self, record: records.McapRecord, end: int) -> Iterator[Message]:
+        """Remember what a record says; the message that it is, if it is one."""
+        if isinstance(record, records.Message):
+            self.census.kept += 1
+            yield self.channels.get(record.channel_id), record.log_time, record.data
+        elif isinstance(record, records.Schema):
             self.schemas[record.id] = record
         elif isinstance(record, records.Channel):
             schema = self.schemas.get(record.schema_id, records.Schema(0, b"", "", ""))
@@ -123,27 +123,18 @@ class _Mcap:
         elif isinstance(record, records.DataEnd):
             self.census.closed, self.census.data_end = True, end - DATA_END_BYTES
 
-    def _chunk(self, chunk: records.Chunk) -> Iterator[ChannelRun]:
+    def _chunk(self, chunk: records.Chunk) -> Iterator[Message]:
         """The messages of a chunk, unpacked and checked."""
         file = chunk_file(self.ingest, chunk.compression, chunk.data, chunk.uncompressed_size)
         # A checksum of zero means that the writer made none.
         if chunk.uncompressed_crc and zlib.crc32(file.getbuffer()) != chunk.uncompressed_crc:
             raise LogError(f"{self.ingest.path}: a chunk does not match its checksum; damaged.")
-        found: dict[int, ChannelRun] = {}
         end, size = 0, len(file.getbuffer())
         for record, place in _records(file, size, inside=True):
             end = place
-            if isinstance(record, records.Message):
-                if (number := record.channel_id) not in found:
-                    found[number] = ChannelRun(self.channels.get(number), [], [])
-                found[number].times.append(record.log_time)
-                found[number].contents.append(record.data)
-            else:
-                self._take(record, 0)
+            yield from self._take(record, 0)
         if end < size:
             raise LogError(f"{self.ingest.path}: a record ends outside its chunk; damaged.")
-        self.census.kept += sum(len(run.contents) for run in found.values())
-        yield from found.values()
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -166,7 +157,7 @@ SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 def db3_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of a db3 file, in the order of recording."""
     with closing(_opened(file)) as db:
-        yield from batched(_runs(db, len(file.content), ingest), ingest)
+        yield from batched(_messages(db, len(file.content), ingest), ingest)
     journal = file.path.with_name(f"{file.path.name}-wal")
     if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
         ingest.note(warning("journal-left", journal=printable(journal.name), bytes=size))
@@ -196,7 +187,7 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
     return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
 
 
-def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[ChannelRun]:
+def _messages(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Message]:
     """The messages of a database of a size, one by one."""
     tables = _checked_tables(db, ingest)
     db.set_authorizer(_permission)
@@ -239,7 +230,7 @@ def _runs(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Channel
             ingest.claim(length if length >= 0 else MESSAGE_LIMIT)
             unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
             data = unpacker.decompress(content, max_output_size=MESSAGE_LIMIT)
-        yield ChannelRun(channels.get(number), [time], [data])
+        yield channels.get(number), time, data
 
 
 def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:

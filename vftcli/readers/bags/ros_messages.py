@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vftcli.readers.bags.container import Bytes, Channel
+from vftcli.readers.bags.container import Bytes, Channel, type_name
 from vftcli.signals.errors import LogError, OutputError
 
 #: The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB.
@@ -54,7 +54,7 @@ def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field,
     except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
         reason = str(error).split("\n", maxsplit=1)[0][:60]
         raise LayoutError(f"no message definition: {reason}") from None
-    return {short(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
+    return {type_name(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
 
 
 def fields_of(fields: Described) -> tuple[Field, ...]:
@@ -67,18 +67,12 @@ def _described(kind: Described) -> tuple[str, int | None]:
     if node == 1:  # a primitive with a bound
         return str(inner[0]), None
     if node == 2:  # another message
-        return short(str(inner)), None
+        return type_name(str(inner)), None
     element, bound = inner
     name, many = _described(element)
     if many is not None:
         raise LayoutError("an array of arrays")
     return name, int(bound) if node == 3 else -1
-
-
-def short(name: str) -> str:
-    """A type's name without the middle part: std_msgs/msg/Header → std_msgs/Header."""
-    parts = name.split("/")
-    return f"{parts[0]}/{parts[-1]}"
 
 
 #: The definitions of ROS 2's own types that are written, and of Franka's state.
@@ -125,7 +119,7 @@ def known_types() -> dict[str, tuple[Field, ...]]:
     found = {}
     for name, (_, fields) in get_typestore(Stores.ROS2_HUMBLE).fielddefs.items():
         try:
-            found[short(name)] = fields_of(fields)
+            found[type_name(name)] = fields_of(fields)
         except LayoutError:
             continue
     return found | own_types()
@@ -198,34 +192,30 @@ class Serialiser:
         self.met: set[str] = set()
 
     def walk(self, path: str, kind: str) -> None:
-        """Lay the fields of one message."""
+        """Lay the fields of one message: numbers, text, or other messages."""
         for field in self.types[kind]:
-            self._field(f"{path}.{field.name}" if path else field.name, field)
-
-    def _field(self, path: str, field: Field) -> None:
-        """Lay one field: numbers, text, or another message."""
-        self.met.add(path)
-        value = self.values.get(path)
-        if field.type in SIZES:
-            self._numbers(value, np.dtype(f"<{SIZES[field.type]}"), field.many)
-        elif field.type == "string":
-            texts: Any = [value or ""] if field.many is None else value or ()
-            if field.many == -1:
-                self._count(len(texts))
-            for text in texts:
-                raw = str(text).encode() + b"\0"
-                self._count(len(raw))
-                self.template += raw
-        elif field.many is None:
-            self.walk(path, field.type)
-        else:
-            self._count(0)  # sequences of messages stay empty
+            inner = f"{path}.{field.name}" if path else field.name
+            value: Any = self.values.get(inner)
+            self.met.add(inner)
+            if field.type in SIZES:
+                self._numbers(value, np.dtype(f"<{SIZES[field.type]}"), field.many)
+            elif field.type == "string":
+                texts = [value or ""] if field.many is None else value or ()
+                if field.many == -1:
+                    self._count(len(texts))
+                for text in texts:
+                    raw = str(text).encode() + b"\0"
+                    self._count(len(raw))
+                    self.template += raw
+            elif field.many is None:
+                self.walk(inner, field.type)
+            else:
+                self._count(0)  # sequences of messages stay empty
 
     def _numbers(self, value: Value | None, dtype: np.dtype[Any], many: int | None) -> None:
         given = np.zeros(0) if value is None else np.asarray(value, dtype=dtype)
-        width = 1 if many is None else many
-        if width < 0:
-            width = given.shape[-1]
+        width = given.shape[-1] if many == -1 else many or 1
+        if many == -1:
             self._count(width)
         if not width:
             return

@@ -68,8 +68,7 @@ class _Bag:
         channels: Connection → topic.
         chunk: The last chunk, until its messages were yielded.
         starts: Where messages begin in it, as the records behind it say.
-        listed: Chunks that the index at the end lists.
-        counted: Messages that it counts.
+        listed, counted: Chunks that the index at the end lists; messages that it counts.
     """
 
     def __init__(self, ingest: Ingest) -> None:
@@ -98,11 +97,14 @@ class _Bag:
             census.counted = self.counted if self.listed == census.counted_chunks else None
         elif op == RecordType.BAGHEADER:
             if header.get("encryptor"):
-                raise LogError(f"{self.ingest.path}: the bag is encrypted. Decrypt it first.")
+                raise self._refusal("the bag is encrypted. Decrypt it first.")
             census.closed = header.get_uint64("index_pos") > 0  # written when the bag is closed
             census.counted_chunks = header.get_uint32("chunk_count") if census.closed else None
         else:
-            raise LogError(f"{self.ingest.path}: an unknown record; the bag is damaged.")
+            raise self._refusal("an unknown record; the bag is damaged.")
+
+    def _refusal(self, why: str) -> LogError:
+        return LogError(f"{self.ingest.path}: {why}")
 
     def _connect(self, header: Header, data: bytes) -> None:
         about = _header(data)
@@ -120,9 +122,7 @@ class _Bag:
             return
         self.chunk, self.starts = None, []
         buffer = np.frombuffer(chunk.getbuffer(), dtype=np.uint8)
-        begins = (
-            np.sort(np.concatenate(starts)) if starts else _begins(chunk, len(buffer), self.ingest)
-        )
+        begins = np.sort(np.concatenate(starts)) if starts else self._begins(chunk, len(buffer))
         self.census.chunks += 1
         self.census.kept += len(begins)
         if not begins.size:
@@ -137,19 +137,22 @@ class _Bag:
         alike, header = np.delete(heads, varied, axis=1), _header(first[4:-4])
         settled = MESSAGE, first[conn : conn + 4], first[time : time + 8]
         if (header["op"], header["conn"], header["time"]) != settled or (alike != alike[0]).any():
-            raise LogError(f"{self.ingest.path}: heads of a chunk's messages differ; damaged.")
+            raise self._refusal("heads of a chunk's messages differ; damaged.")
         numbers, times = _words(heads, conn)[:, 0], _words(heads, time, 2) @ (10**9, 1)
         for place in np.sort(np.unique(numbers, return_index=True)[1]):
             number, rows = heads[place, conn : conn + 4].tobytes(), numbers == numbers[place]
             if number not in self.channels:
-                raise LogError(f"{self.ingest.path}: messages of an unknown topic; damaged.")
-            yield Batch(
-                channel=self.channels[number],
-                buffer=buffer,
-                offsets=data[rows],
-                lengths=lengths[rows],
-                times=times[rows],
-            )
+                raise self._refusal("messages of an unknown topic; damaged.")
+            channel = self.channels[number]
+            yield Batch(channel, buffer, data[rows], lengths[rows], times[rows])
+
+    def _begins(self, chunk: io.BytesIO, end: int) -> Integers:
+        begins, place = [], 0
+        while place < end:
+            if _record(chunk, self.ingest)[0]["op"] == MESSAGE:
+                begins.append(place)
+            place = chunk.tell()
+        return np.array(begins, dtype=np.int64)
 
     def _between(self, chunk: io.BytesIO, starts: Integers, ends: Integers) -> None:
         """Take up what lies between messages: nothing but connections."""
@@ -157,23 +160,11 @@ class _Bag:
             chunk.seek(start)
             while chunk.tell() < end:
                 header, data = _record(chunk, self.ingest)
-                if header["op"] == CONNECTION:
-                    self._connect(header, data)
-                else:
+                if header["op"] != CONNECTION:
                     break
+                self._connect(header, data)
             if chunk.tell() != end:
-                raise LogError(
-                    f"{self.ingest.path}: a chunk and its index count differently; it is damaged."
-                )
-
-
-def _begins(chunk: io.BytesIO, end: int, ingest: Ingest) -> Integers:
-    begins, place = [], 0
-    while place < end:
-        if _record(chunk, ingest)[0]["op"] == MESSAGE:
-            begins.append(place)
-        place = chunk.tell()
-    return np.array(begins, dtype=np.int64)
+                raise self._refusal("a chunk and its index count differently; it is damaged.")
 
 
 def _heads(buffer: Bytes, begins: Integers) -> Bytes:

@@ -12,7 +12,7 @@ from vftcli.readers.aliases import RESIDUAL_TURNED, effort_of, robot_of
 from vftcli.readers.bags.container import Ingest, Integers, batches, storage_files
 from vftcli.readers.bags.decode import Decoder, Stream
 from vftcli.readers.bags.documents import Documents
-from vftcli.readers.columns import SIGNALS
+from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import LogFormat
@@ -45,13 +45,10 @@ def aligned(
                 release(values)
     frame = gathering.take_wrench(streams)
     gathering.tell_left(streams, others)
-    names, hint = lead.names, robot_of(lead.names)
-    if not names:  # another topic about the arm may have them
-        width = lead.signals["q"].shape[1]
-        for stream in streams:
-            if len(stream.names) == width and (hint := robot_of(stream.names)) is not None:
-                names = stream.names
-                break
+    width = lead.signals["q"].shape[1]
+    # Another topic about the arm may have the names.
+    named = [s.names for s in streams if len(s.names) == width and robot_of(s.names)]
+    names = lead.names or next(iter(named), ())
     return RawLog(
         stamps=gathering.stamps,
         tick=gathering.tick,
@@ -59,7 +56,7 @@ def aligned(
         signals={name: v for name, v in gathering.signals.items() if request.wants(name)},
         wrench_frame=frame,
         joint_names=names,
-        robot_hint=hint,
+        robot_hint=robot_of(names),
         remarks=tuple(gathering.remarks),
         payload_mass=next(iter(lead.constants.get("mass", ())), None),
         payload_com=lead.constants.get("com"),
@@ -73,8 +70,6 @@ class Gathering:
         lead: The topic with the joints' positions.
         stamps, tick, words: Its best clock.
         host: Its header or receive stamps, on which other topics are aligned. (T,) [ns]
-        chosen: Signal → message field, "" for its own, and factor, as --columns says: -tau=effort,
-            current[mA]=effort, -tau.
         signals: Field of Recording → values at the leading topic's times. (T, k)
         used: Topics beside the leading one of which a signal was taken.
         remarks: What was chosen, and what looks suspicious.
@@ -84,46 +79,44 @@ class Gathering:
         self.lead, self.path = lead, path
         self.stamps, self.tick, self.words, self.host = clock_of(lead)
         self.said_of_wrench = request.spec.item("wrench")
-        # A wrench without a field is the one that is read anyway, of whichever topic.
-        self.chosen = {
-            SIGNALS[item.signal]: (item.pattern or "", item.factor)
-            for item in request.spec.items
-            if item.signal in SIGNALS and (item.signal != "wrench" or item.pattern)
-        }
         self.signals: dict[str, Array] = {}
         self.used: set[str] = set()
         self.remarks: list[Remark] = []
         self._take_lead()
-        self._settle_effort()
+        self._settle_effort(request.spec.items)
 
     def _take_lead(self) -> None:
         lead, width = self.lead, self.lead.signals["q"].shape[1]
         if lead.mixed:
             self.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
         for signal, value in lead.signals.items():
-            if signal == "wrench":
-                self.signals[signal] = value
-            elif value.shape[1] != width:
+            if signal != "wrench" and value.shape[1] != width:
                 continue
-            elif np.isnan(value[0]).all() and np.isnan(value).all():
-                if signal == "q":
-                    raise LogError(
-                        f"{self.path}: the positions in {lead.channel.topic} are NaN in all "
-                        f"{lead.messages} messages, so nothing was measured. Record another topic."
-                    )
-                # Drivers publish NaN for what they do not measure.
-                self.remarks.append(fact("signal-empty", signal=signal))
-            else:
+            if signal == "wrench" or not np.isnan(value[0]).all() or not np.isnan(value).all():
                 self.signals[signal] = value
+            elif signal == "q":
+                raise LogError(
+                    f"{self.path}: the positions in {lead.channel.topic} are NaN in all "
+                    f"{lead.messages} messages, so nothing was measured. Record another topic."
+                )
+            else:  # drivers publish NaN for what they do not measure
+                self.remarks.append(fact("signal-empty", signal=signal))
         if lead.kind.franka and "tau_ext" in self.signals:
             self.remarks.append(RESIDUAL_TURNED)
 
-    def _settle_effort(self) -> None:
-        """Decide what effort is: what --columns says, else current for UR joints, else torque."""
+    def _settle_effort(self, items: Sequence[Item]) -> None:
+        """Decide what effort is: what --columns says, else current for UR joints, else torque.
+
+        --columns names a field or none, as in -tau=effort, current[mA]=effort, -tau.
+        """
         there, lead = dict(self.signals), self.lead
-        for signal, (pattern, factor) in self.chosen.items():
+        for item in items:
+            # A wrench without a field is the one that is read anyway, of whichever topic.
+            signal = SIGNALS.get(item.signal)
+            if signal is None or (signal == "wrench" and not item.pattern):
+                continue
             own = "effort" if signal in EFFORTS and "effort" in there else signal
-            last = pattern.rpartition(".")[2] or own
+            last = (item.pattern or "").rpartition(".")[2] or own
             source = FIELDS.get(last, last)
             if source not in there:
                 fields = [next((f for f, s in FIELDS.items() if s == name), name) for name in there]
@@ -132,8 +125,8 @@ class Gathering:
                     f"{', '.join(fields)}."
                 )
             self.signals.pop(source, None)
-            self.signals[signal] = there[source] * factor + 0.0
-            code = "field-taken-turned" if factor < 0 else "field-taken"
+            self.signals[signal] = there[source] * item.factor + 0.0
+            code = "field-taken-turned" if item.factor < 0 else "field-taken"
             self.remarks.append(fact(code, field=last, signal=signal))
         if "effort" in self.signals:
             kind = effort_of(lead.names)
@@ -154,8 +147,7 @@ class Gathering:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
         name, lead = stream.channel.topic.removeprefix(OWN), self.lead
         value = stream.signals.get("wrench" if name == "wrench" else "effort")
-        own, _ = host_times(stream)
-        same = stream.messages == lead.messages and np.array_equal(own, self.host)
+        same = stream.messages == lead.messages and np.array_equal(host_times(stream), self.host)
         if value is None or not same or name not in {*SIGNALS, *SIGNALS.values()}:
             return
         field_name = SIGNALS.get(name, name)
@@ -167,7 +159,21 @@ class Gathering:
 
     def take_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
         """Take the wrench of a sensor or of the vendor; return what --columns or the bag states."""
-        frame, said = self._usual_wrench(streams), self.said_of_wrench
+        said = self.said_of_wrench
+        named = said is not None and said.pattern is not None
+        frame = FRANKA_FRAME if self.lead.kind.franka else None
+        # A sensor's topic goes before the vendor's, the fullest before the others.
+        found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
+        sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
+        sensor = max(sensors or found, key=lambda s: s.messages, default=None)
+        if sensor is None or named or (not sensors and "wrench" in self.lead.signals):
+            pass
+        elif sensor.channel.topic.startswith(OWN):
+            frame = WrenchFrame.of_conversion(sensor.frame)
+        elif (values := self.interpolated(sensor, "wrench")) is not None:
+            self.signals["wrench"] = values
+            # A frame_id is a link's name, of which the moment's point is the origin.
+            frame = WrenchFrame(sensor.frame, sensor.frame) if sensor.frame else None
         if said is None:
             return frame
         if "wrench" not in self.signals:
@@ -175,30 +181,9 @@ class Gathering:
                 f"{self.path}: --columns says something of a wrench, and no topic has one; leave "
                 "it out."
             )
-        if said.pattern is None:
+        if not named:
             self.signals["wrench"] = self.signals["wrench"] * said.factor + 0.0
         return frame if said.unit is None else WrenchFrame.parsed(said.unit)
-
-    def _usual_wrench(self, streams: Sequence[Stream]) -> WrenchFrame | None:
-        """Put a sensor's wrench in place of the vendor's estimate; return what is stated of it.
-
-        A sensor's topic goes before the vendor's, the fullest before the others.
-        """
-        frame = FRANKA_FRAME if self.lead.kind.franka else None
-        found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
-        sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
-        sensor = max(sensors or found, key=lambda s: s.messages, default=None)
-        vendors = not sensors and "wrench" in self.lead.signals
-        if sensor is None or vendors or "wrench" in self.chosen:
-            return frame
-        if sensor.channel.topic.startswith(OWN):
-            return WrenchFrame.of_conversion(sensor.frame)
-        values = self.interpolated(sensor, "wrench")
-        if values is None:
-            return frame
-        self.signals["wrench"] = values
-        # A frame_id is a link's name, of which the moment's point is the origin.
-        return WrenchFrame(sensor.frame, sensor.frame) if sensor.frame else None
 
     def interpolated(self, stream: Stream, signal: str) -> Array | None:
         """A smooth signal of another topic at the leading one's times, held at the ends. (T, k)
@@ -206,7 +191,7 @@ class Gathering:
         None, and a caution, where the other topic does not cover the leading one's time.
         """
         lead, times, topic = self.lead, self.host, stream.channel.topic
-        own, _ = host_times(stream)
+        own = host_times(stream)
         # One of the two may have receive stamps only: like is compared with like.
         if times is not lead.header:
             own = stream.receive
@@ -230,18 +215,16 @@ class Gathering:
 
     def tell_left(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
-        lead = self.lead
+        lead, topic = self.lead, self.lead.channel.topic
         for stream in streams:
             if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
-                there = tuple(stream.signals) or ("names",)
-                count, topic = stream.messages, lead.channel.topic
+                there, count = tuple(stream.signals) or ("names",), stream.messages
                 self.remarks.append(
                     caution("messages-left-out", messages=count, topic=topic, signals=there)
                 )
         topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
         topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
-        left = sorted(topics - {lead.channel.topic} - self.used)
-        left.sort(key=lambda topic: FORCES.search(topic) is None)
+        left = sorted(topics - {topic} - self.used, key=lambda t: (FORCES.search(t) is None, t))
         if left:
             self.remarks.append(fact("topics-left-out", topics=tuple(left[:6])))
 
@@ -308,11 +291,12 @@ def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
         Its stamps (T,), the length of their tick [s], which clock they are, and header or receive
         stamps (T,) [ns].
     """
-    host, words = host_times(stream)
-    robot = stream.robot
+    host, robot, topic = host_times(stream), stream.robot, stream.channel.topic
     if robot is None or not runs(robot):
+        unset = f"receive stamps of {topic} (its header stamps are unset or run back)"
+        words = unset if host is stream.receive else f"header stamps of {topic}"
         return host, 1e-9, words, host
-    words = f"robot clock (time of {stream.channel.topic})"
+    words = f"robot clock (time of {topic})"
     # Franka counts whole milliseconds, which seconds in float64 would blur.
     milliseconds = np.rint(robot * 1e3)
     if np.all(np.abs(robot * 1e3 - milliseconds) < 1e-3) and abs(robot[-1]) < 1e12:
@@ -326,13 +310,11 @@ def runs(stamps: Array | Integers) -> bool:
     return good and (len(stamps) < 2 or bool(stamps[-1] > stamps[0]))
 
 
-def host_times(stream: Stream) -> tuple[Integers, str]:
+def host_times(stream: Stream) -> Integers:
     """Header stamps if they are set and never run back, else receive stamps. (T,) [ns]"""
     header = stream.header
-    topic = stream.channel.topic
-    if header is not None and header[0] > 0 and runs(header):
-        return header, f"header stamps of {topic}"
-    return stream.receive, f"receive stamps of {topic} (its header stamps are unset or run back)"
+    is_set = header is not None and header[0] > 0 and runs(header)
+    return header if header is not None and is_set else stream.receive
 
 
 METADATA_BYTES = 1024 * 1024
@@ -348,7 +330,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     paths = [file.path / name for name in storage_files(file)]
     size = sum(path.stat().st_size for path in paths) if file.is_folder else len(file.content)
     ingest = Ingest(path=file.path, size=size)
-    decoder, documents = Decoder(ingest), Documents(ingest)
+    decoder, documents = Decoder(ingest), Documents(file.path)
     messages = 0
     for batch in batches([open_log(path) for path in paths] if paths else [file], ingest):
         messages += len(batch.offsets)
