@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from vftcli.readers.bags.container import type_name
 from vftcli.readers.bags.ros_messages import (
     DEFINITIONS,
     FRANKA,
@@ -16,7 +17,6 @@ from vftcli.readers.bags.ros_messages import (
     own_types,
     schema_text,
     serialised,
-    short,
     stamped,
 )
 from vftcli.signals.errors import OutputError
@@ -46,7 +46,7 @@ def test_the_fields_of_other_types_are_those_that_rosbags_parses(kind):
 def test_a_schema_embeds_every_type_it_needs(kind):
     parsed = get_types_from_msg(schema_text(kind), long_name(kind))
     needed = {field.type for name in parsed for field in fields_of(parsed[name][1])}
-    assert {name for name in needed if "/" in name} <= {short(name) for name in parsed}
+    assert {name for name in needed if "/" in name} <= {type_name(name) for name in parsed}
 
 
 @pytest.mark.slow
