@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -86,112 +86,145 @@ class Group(NamedTuple):
     twice: str = ""
 
 
+class NamedColumns:
+    """The columns of a headed table by what their names say.
+
+    Attributes:
+        groups: Columns by name without index, in lower case.
+    """
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+        self.groups: dict[str, Group] = {}
+        found: dict[str, dict[int, Cell]] = {}
+        twice: dict[str, str] = {}
+        by_joint = _joint_columns(table)
+        in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
+        for column, name in enumerate(table.names):
+            if column in in_joints:
+                continue
+            if column in table.lists:
+                found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
+            elif match := JOINT_FIRST.fullmatch(name):
+                by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
+            elif match := INDEXED.fullmatch(name):
+                index = int(match["a"] or match["b"] or match["c"])
+                stem = FIELD.sub("", match["stem"].lower(), count=1)
+                if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
+                    twice[stem] = name
+        for stem, cells in found.items():
+            indices = tuple(sorted(cells))  # not by place: a table may hold q_10 before q_2
+            ordered = tuple(cells[i] for i in indices)
+            self.groups[stem] = Group(ordered, indices, twice=twice.get(stem, ""))
+        for stem, of_joint in by_joint.items():
+            each = tuple(of_joint)
+            names = tuple(each[k] for k in kinematic_order(each))
+            ordered = tuple(of_joint[name] for name in names)
+            self.groups[stem] = Group(ordered, tuple(range(len(names))), names)
+
+    def cells(self, name: str) -> tuple[Cell, ...]:
+        """The cells of a group."""
+        group, path = self.groups[name.lower()], self.table.path
+        if group.twice:
+            raise LogError(
+                f"{path}: two columns could be {name} of one index: {group.twice!r} and another. "
+                "Name the columns with --columns."
+            )
+        if not group.cells:
+            raise LogError(
+                f"{path}: {name} holds no number in its first row, so its width cannot be told. "
+                "Cut the rows with empty lists out, or leave the column out with --columns."
+            )
+        return group.cells
+
+    def find(self, signal: str) -> Pick | None:
+        """The columns of the clock or a signal, None where none bears a name of it."""
+        if signal in {"t", "wrench"}:
+            return clock_pick(self.table) if signal == "t" else wrench_pick(self.table)
+        found = [name for name in ALIASES[signal] if name in self.groups]
+        if len(found) > 1:
+            raise LogError(
+                f"{self.table.path}: {' and '.join(found)} could both be {signal}. Say which with "
+                f"--columns, as in q=…,{signal if signal != 'torque' else 'tau'}={found[0]}_{{i}}."
+            )
+        for name in found:
+            cells, indices = self.cells(name), self.groups[name].indices
+            if indices != tuple(range(indices[0], indices[0] + len(indices))):
+                raise LogError(
+                    f"{self.table.path}: the columns of {name} are numbered "
+                    f"{', '.join(map(str, indices[:12]))}, with holes. Name them with --columns."
+                )
+            if name in TURNED:
+                return Pick(signal=signal, cells=cells, factor=-1.0, remark=RESIDUAL_TURNED)
+            return Pick(signal=signal, cells=cells)
+        return None
+
+    def stated(self, item: Item) -> Pick:
+        """The columns that an item of --columns means, by their names or by its own."""
+        pattern = item.pattern
+        if pattern is not None:
+            is_group = pattern.lower() in self.groups and pattern not in self.table.names
+            return pick_of(item, self.cells(pattern) if is_group else named_cells(self.table, item))
+        signal = SIGNALS.get(item.signal, item.signal)
+        found = self.find(signal)
+        if found is None and signal == "wrench" and (own := self.groups.get("actual_tcp_force")):
+            found = Pick(signal=signal, cells=own.cells)  # UR's
+        if found is None:
+            raise missing_column(self.table, item.signal, item.signal)
+        pick = pick_of(item, found.cells)
+        return replace(pick, factor=pick.factor * found.factor)
+
+    def others(self, stated: Sequence[Pick]) -> Iterator[Pick]:
+        """The signals beside those that a text names.
+
+        Where it names the positions, only what it leaves out and no estimate can do without:
+        velocities, and an effort where it names none; what two groups could be is left out.
+        """
+        known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
+        joints = next((len(pick.cells) for pick in stated if pick.signal == "q"), None)
+        if joints is None:
+            for signal in (*ALIASES, "wrench"):
+                pick = self.find(signal) if signal not in known else None
+                if pick is not None and (signal == "wrench" or used.isdisjoint(pick.cells)):
+                    yield pick
+            return
+        for wanted in (("dq",), EFFORTS):
+            fitting = []
+            for signal in wanted if known.isdisjoint(wanted) else ():
+                with suppress(LogError):
+                    pick = self.find(signal)
+                    if pick and len(pick.cells) == joints and used.isdisjoint(pick.cells):
+                        fitting.append(pick)
+            if len(fitting) == 1:
+                column = self.table.names[fitting[0].cells[0].column]
+                remark = fact("signal-by-name", signal=fitting[0].signal, column=column)
+                yield replace(fitting[0], remark=remark)
+
+
 def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[str, ...]]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
-    groups = grouped(table)
+    columns = NamedColumns(table)
+    groups = columns.groups
     rate = next((item.rate for item in stated if item.rate is not None), None)
     named = [item for item in stated if item.rate is None and item.signal != "_"]
-    own = {item.signal: _stated_pick(table, item, groups) for item in named}
-    clock = own.pop("t", None) or (None if rate is not None else clock_pick(table))
+    own = {item.signal: columns.stated(item) for item in named}
+    clock = own.pop("t", None) or (None if rate is not None else columns.find("t"))
     known = {pick.signal for pick in own.values()}
-    signals = list(own.values())
-    signals += (_missing if "q" in known else _found)(table, groups, signals)
-    joints = next((len(p.cells) for p in signals if p.signal == "q"), 0)
+    signals = [*own.values(), *columns.others(tuple(own.values()))]
+    q = next((pick.cells for pick in signals if pick.signal == "q"), ())
     # A group of another width is about something else: a gripper, a base.
     also = {"q", "wrench", *known}
-    signals = [p for p in signals if len(p.cells) == (joints or len(p.cells)) or p.signal in also]
-    origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
-    origin = None if origin in table.lists else origin
-    picks = checked(table, Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin))
-    q = next(pick.cells for pick in signals if pick.signal == "q")
+    signals = [p for p in signals if not q or len(p.cells) == len(q) or p.signal in also]
     names = next((g.joints for g in groups.values() if g.joints and g.cells == q), ())
     if effort_of(names) == "current" and not known & set(EFFORTS):
         efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
         for k, pick in enumerate(signals):
             if pick.signal == "torque" and pick.cells in efforts:
                 signals[k] = replace(pick, signal="current", remark=fact("effort-is-current"))
-        picks = replace(picks, signals=tuple(signals))
-    return picks, names
-
-
-def _found(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
-    known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
-    picks = [_pick_of(table, signal, groups) for signal in ALIASES if signal not in known]
-    found = [pick for pick in picks if pick is not None and used.isdisjoint(pick.cells)]
-    if "wrench" not in known and (wrench := wrench_pick(table)) is not None:
-        found.append(wrench)
-    return found
-
-
-def _missing(table: Table, groups: dict[str, Group], stated: Sequence[Pick]) -> list[Pick]:
-    """What a text that names the positions leaves out and no estimate can do without.
-
-    Velocities, and an effort where it names none; what two groups could be is left out.
-    """
-    known, used = {pick.signal for pick in stated}, {c for pick in stated for c in pick.cells}
-    joints = next(len(pick.cells) for pick in stated if pick.signal == "q")
-    found = []
-    for wanted in (("dq",), EFFORTS):
-        picks = []
-        for signal in wanted if known.isdisjoint(wanted) else ():
-            with suppress(LogError):
-                picks.append(_pick_of(table, signal, groups))
-        fitting = [p for p in picks if p is not None and len(p.cells) == joints]
-        fitting = [pick for pick in fitting if used.isdisjoint(pick.cells)]
-        if len(fitting) == 1:
-            columns = table.names[fitting[0].cells[0].column]
-            remark = fact("signal-by-name", signal=fitting[0].signal, column=columns)
-            found.append(replace(fitting[0], remark=remark))
-    return found
-
-
-def _stated_pick(table: Table, item: Item, groups: dict[str, Group]) -> Pick:
-    if item.pattern is not None:
-        group = groups.get(item.pattern.lower())
-        if group is not None and item.pattern not in table.names:
-            return pick_of(item, filled_cells(table, item.pattern, group))
-        return pick_of(item, named_cells(table, item))
-    signal = SIGNALS.get(item.signal, item.signal)
-    found = clock_pick(table) if signal == "t" else None
-    found = _pick_of(table, signal, groups) if signal in ALIASES else found
-    if signal == "wrench":
-        found = wrench_pick(table)
-        if found is None and (controllers := groups.get("actual_tcp_force")):  # UR's
-            found = Pick(signal=signal, cells=controllers.cells)
-    if found is None:
-        raise missing_column(table, item.signal, item.signal)
-    pick = pick_of(item, found.cells)
-    return replace(pick, factor=pick.factor * found.factor)
-
-
-def grouped(table: Table) -> dict[str, Group]:
-    """The columns of a table by name without index, in lower case."""
-    found: dict[str, dict[int, Cell]] = {}
-    twice: dict[str, str] = {}
-    by_joint = _joint_columns(table)
-    in_joints = {cell.column for cells in by_joint.values() for cell in cells.values()}
-    for column, name in enumerate(table.names):
-        if column in in_joints:
-            continue
-        if column in table.lists:
-            found.setdefault(name.lower(), {}).update(enumerate(cells_of(table, column)))
-        elif match := JOINT_FIRST.fullmatch(name):
-            by_joint.setdefault(match["stem"], {})[match["joint"]] = Cell(column)
-        elif match := INDEXED.fullmatch(name):
-            index = int(match["a"] or match["b"] or match["c"])
-            stem = FIELD.sub("", match["stem"].lower(), count=1)
-            if found.setdefault(stem, {}).setdefault(index, Cell(column)) != Cell(column):
-                twice[stem] = name
-    groups = {}
-    for stem, cells in found.items():
-        indices = tuple(sorted(cells))  # not by place: a table may hold q_10 before q_2
-        groups[stem] = Group(tuple(cells[i] for i in indices), indices, twice=twice.get(stem, ""))
-    for stem, cells_by_joint in by_joint.items():
-        each = tuple(cells_by_joint)
-        names = tuple(each[k] for k in kinematic_order(each))
-        cells_in_order = tuple(cells_by_joint[name] for name in names)
-        groups[stem] = Group(cells_in_order, tuple(range(len(names))), names)
-    return groups
+    origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
+    origin = None if origin in table.lists else origin
+    picks = Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin)
+    return checked(table, picks), names
 
 
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
@@ -215,44 +248,6 @@ def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:
         and list(joints.values()).count(joints[stem]) > 1
         and not any(AXES.fullmatch(joint) for joint in cells)
     }
-
-
-def _pick_of(table: Table, signal: str, groups: dict[str, Group]) -> Pick | None:
-    """The columns of a signal, None where none bears a name of it."""
-    found = [name for name in ALIASES[signal] if name in groups]
-    if not found:
-        return None
-    if len(found) > 1:
-        raise LogError(
-            f"{table.path}: {' and '.join(found)} could both be {signal}. Say which with "
-            f"--columns, as in q=…,{signal if signal != 'torque' else 'tau'}={found[0]}_{{i}}."
-        )
-    name = found[0]
-    group, cells = groups[name], filled_cells(table, name, groups[name])
-    first = group.indices[0]
-    if group.indices != tuple(range(first, first + len(group.indices))):
-        raise LogError(
-            f"{table.path}: the columns of {name} are numbered "
-            f"{', '.join(map(str, group.indices[:12]))}, with holes. Name them with --columns."
-        )
-    turned = name in TURNED
-    remark = RESIDUAL_TURNED if turned else None
-    return Pick(signal=signal, cells=cells, factor=-1.0 if turned else 1.0, remark=remark)
-
-
-def filled_cells(table: Table, name: str, group: Group) -> tuple[Cell, ...]:
-    """The cells of a group."""
-    if group.twice:
-        raise LogError(
-            f"{table.path}: two columns could be {name} of one index: {group.twice!r} and another. "
-            "Name the columns with --columns."
-        )
-    if not group.cells:
-        raise LogError(
-            f"{table.path}: {name} holds no number in its first row, so its width cannot be told. "
-            "Cut the rows with empty lists out, or leave the column out with --columns."
-        )
-    return group.cells
 
 
 def wrench_pick(table: Table) -> Pick | None:
@@ -355,16 +350,15 @@ def along_arm(
 
     Of an arm of six joints the wrench has as many columns, but they are no joints.
     """
-    order = kinematic_order(names)
-    if order == tuple(range(len(names))):
+    order = list(kinematic_order(names))
+    if order == list(range(len(names))):
         return names, signals
-    ordered = {
-        signal: value[:, list(order)]
-        if signal != "wrench" and value.ndim == 2 and value.shape[1] == len(names)
-        else value
+    of_joints = {
+        signal: value[:, order]
         for signal, value in signals.items()
+        if signal != "wrench" and value.ndim == 2 and value.shape[1] == len(names)
     }
-    return tuple(names[k] for k in order), ordered
+    return tuple(names[k] for k in order), signals | of_joints
 
 
 def effort_of(names: Sequence[str]) -> str:

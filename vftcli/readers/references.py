@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vftcli.readers.aliases import clock_pick, filled_cells, grouped, wrench_pick
+from vftcli.readers.aliases import NamedColumns
 from vftcli.readers.cleaning import measured, seconds, without_repeats
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
@@ -85,21 +85,18 @@ def _found(table: Table) -> Picks:
             f"{table.path}: a table without a header. Say what its {table.width} columns are with "
             "--reference-columns, as in t,tau_ext:6."
         )
-    groups = {name: g for name, g in grouped(table).items() if name.endswith(TORQUE)}
-    wrench = wrench_pick(table)
+    columns = NamedColumns(table)
+    groups = [name for name in columns.groups if name.endswith(TORQUE)]
+    wrench = columns.find("wrench")
     if len(groups) > 1 or not (groups or wrench):
         there = " and ".join(groups) or f"no column ends in {TORQUE} among {listed(table.names)}"
         raise LogError(
             f"{table.path}: the reference torques cannot be told: {there}. Name them with "
             "--reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
-    picks = [
-        Pick(signal=TORQUE, cells=filled_cells(table, name, group))
-        for name, group in groups.items()
-    ]
-    if wrench is not None:
-        picks.append(wrench)
-    return Picks(signals=tuple(picks), clock=clock_pick(table))
+    picks = [Pick(signal=TORQUE, cells=columns.cells(name)) for name in groups]
+    picks += [] if wrench is None else [wrench]
+    return Picks(signals=tuple(picks), clock=columns.find("t"))
 
 
 UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.
