@@ -20,6 +20,7 @@ from vftcli.signals.recording import Recording
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 PARTS = {
     "parquet.BLOCK_ROWS": 7,
+    "tables.BLOCK_ROWS": 7,
     "delimited.BLOCK_BYTES": 3000,
     "table.HELD": 500,
     "bags.container.BATCH_BYTES": 10_000,

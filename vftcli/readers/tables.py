@@ -32,6 +32,7 @@ from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
 RawField = Any  #: A further field of a RawLog.
+BLOCK_ROWS = 1 << 16  #: Rows of arrays that are taken at a time.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
 
 
@@ -171,15 +172,17 @@ class ArrayTable(Table):
         if len({len(each[c][1]) for c in columns}) > 1:
             lengths = ", ".join(f"{each[c][0]} {len(each[c][1])}" for c in columns)
             raise LogError(f"{self.path}: the arrays differ in length: {lengths} rows.")
-        loaded = {}
-        for c in columns:
-            name, array = each[c]
-            if array.dtype.kind not in "fiub":
-                raise LogError(f"{self.path}: {name} holds {array.dtype}, not numbers.")
-            whole = c == clock and array.dtype.kind in "iu" and array.dtype.itemsize == 8
-            values = np.asarray(array).astype(np.int64 if whole else np.float64, copy=False)
-            loaded[c] = values[:, 0] if values.ndim == 2 and c not in self.lists else values
-        yield loaded
+        for start in range(0, max(len(each[columns[0]][1]), 1), BLOCK_ROWS):
+            loaded = {}
+            for c in columns:
+                name, array = each[c]
+                if array.dtype.kind not in "fiub":
+                    raise LogError(f"{self.path}: {name} holds {array.dtype}, not numbers.")
+                whole = c == clock and array.dtype.kind in "iu" and array.dtype.itemsize == 8
+                values = np.asarray(array[start : start + BLOCK_ROWS])
+                values = values.astype(np.int64 if whole else np.float64, copy=False)
+                loaded[c] = values[:, 0] if values.ndim == 2 and c not in self.lists else values
+            yield loaded
 
 
 def recognises(file: LogFile, layout: LogFormat) -> bool:
@@ -214,34 +217,25 @@ def picked(
     """Load the picked columns of a table and scale them."""
     signals = tuple(p for p in picks.signals if request.wants(p.signal))
     clock = picks.clock.cells if picks.clock else ()
-    last = {cell.column: pick.signal for pick in signals for cell in pick.cells}
-    kept = {cell.column for cell in clock}
-    kept |= set() if picks.origin is None else {picks.origin}
-    columns: dict[int, list[Column]] = {c: [] for c in kept}
-    constants: tuple[float, ...] = ()
+    origin = () if picks.origin is None else (picks.origin,)
+    whole: dict[int, list[Column]] = {
+        column: [] for column in (*(cell.column for cell in clock), *origin, *picks.constants)
+    }
 
     def stacked() -> Iterator[dict[str, Array]]:
-        nonlocal constants
-        asked = sorted({*kept, *last, *picks.constants})
+        asked = sorted({*whole, *(cell.column for pick in signals for cell in pick.cells)})
         for loaded in table.blocks(asked, clock[0].column if clock else None):
-            for column in kept:
-                columns[column].append(loaded[column])
-            last_rows = [loaded[c][-1:] for c in picks.constants]
-            constants = tuple(float(row[0]) if len(row) else np.nan for row in last_rows)
-            arrays = {}
-            for pick in signals:
-                arrays[pick.signal] = _stacked(pick, loaded)
-                # Columns and what is picked of them have no room beside each other.
-                for column in [c for c in loaded if last.get(c) == pick.signal]:
-                    del loaded[column]
-            yield arrays
+            for column, parts in whole.items():
+                parts.append(loaded[column])
+            yield {pick.signal: _stacked(pick, loaded) for pick in signals}
 
     arrays = joined(stacked())
-    loaded = {c: np.concatenate(x) if len(x) > 1 else x[0] for c, x in columns.items()}
+    loaded = {c: np.concatenate(parts) for c, parts in whole.items()}
     rows = len(next(iter(arrays.values())))
     stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)
     if picks.origin is not None and len(stamps):
         more["origin"] = float(loaded[picks.origin][0]) * 1e-9 - float(stamps[0]) * tick
+    constants = tuple(float(loaded[c][-1]) for c in picks.constants if rows)
     if constants and np.isfinite(constants).all():
         more |= {"payload_mass": constants[0], "payload_com": constants[1:] or None}
     remarks = (*table.remarks, *(pick.remark for pick in signals if pick.remark))
