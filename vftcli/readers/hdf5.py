@@ -4,11 +4,12 @@ DROID's raw release is a folder of episodes, each a trajectory.h5 with its metad
 """
 
 import json
+import math
 import os
 import re
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import cached_property, partial
 from io import BytesIO
@@ -45,9 +46,7 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
     """Check that no chunk unpacks to more than a log's may."""
     if dataset.chunks is None:
         return
-    size = dataset.dtype.itemsize
-    for length in dataset.chunks:
-        size *= length
+    size = math.prod(dataset.chunks) * dataset.dtype.itemsize
     if size > limit:
         raise LogError(f"{name}: its chunks unpack to {size >> 20} MiB each, more than its rows.")
     settings = dataset.id.get_create_plist()
@@ -58,12 +57,8 @@ def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
             f"{name}: packed by HDF5's filters {filters}, of which deflate, shuffle, fletcher32 "
             "and lzf are read, once each; repack it: h5repack -f GZIP=4 OLD NEW"
         )
-    if DEFLATE in filters and DEFLATE_RATIO * dataset.id.get_storage_size() > limit:
-        _inflate_suspects(name, dataset, size, limit)
-
-
-def _inflate_suspects(name: str, dataset: Hdf5, size: int, limit: int) -> None:
-    """Inflate chunks that could unpack to more than `limit`, no further than to their `size`."""
+    if DEFLATE not in filters or DEFLATE_RATIO * dataset.id.get_storage_size() <= limit:
+        return
     suspects: list[tuple[int, ...]] = []
 
     def look(chunk: Hdf5) -> None:
@@ -73,12 +68,11 @@ def _inflate_suspects(name: str, dataset: Hdf5, size: int, limit: int) -> None:
     dataset.id.chunk_iter(look)
     for offset in suspects:
         _, packed = dataset.id.read_direct_chunk(offset)
-        try:
-            unpacked = zlib.decompressobj().decompress(packed, size + 1)
-        except zlib.error:
-            continue  # no more than this was unpacked; HDF5 says where it breaks off
-        if len(unpacked) > size:
-            raise LogError(f"{name}: a chunk unpacks to more than the {size} bytes that it holds.")
+        with suppress(zlib.error):  # no more than this was unpacked; HDF5 says where it breaks off
+            if len(zlib.decompressobj().decompress(packed, size + 1)) > size:
+                raise LogError(
+                    f"{name}: a chunk unpacks to more than the {size} bytes that it holds."
+                )
 
 
 #: Groups and datasets that are looked at, and groups inside groups; a log has some hundred.
@@ -142,7 +136,7 @@ def table_of(path: Path, content: Hdf5, fewest_rows: int = 2) -> Hdf5Table:
 
 def datasets_of(path: Path, content: Hdf5) -> Iterator[tuple[str, Hdf5]]:
     """Every dataset of an open file by its path, links to elsewhere and second ways left out."""
-    h5py = needed("h5py", "an HDF5 file")
+    import h5py
 
     seen: set[int] = set()
     waiting = [("", content["/"], 0)]
@@ -167,11 +161,9 @@ def datasets_of(path: Path, content: Hdf5) -> Iterator[tuple[str, Hdf5]]:
 
 def is_signal(dataset: Hdf5, fewest_rows: int) -> bool:
     """Whether a dataset may be a signal: numbers of the file's own, one or many a row."""
-    if dataset.dtype.kind not in "fiub" or dataset.shape is None or dataset.ndim not in {1, 2}:
-        return False
-    if dataset.shape[0] < fewest_rows or not all(dataset.shape):
-        return False
-    return not dataset.is_virtual and not dataset.external
+    shape = dataset.shape or (0,)
+    numbers = dataset.dtype.kind in "fiub" and len(shape) <= 2 and shape[0] >= fewest_rows
+    return bool(numbers and all(shape) and not dataset.is_virtual and not dataset.external)
 
 
 ALOHA_RATE = 50.0  #: ALOHA's recorder steps by DT = 0.02 s and stores no clock. [Hz]
@@ -237,20 +229,13 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     remarks = (fact("computed-torque-left-out"),) if computed else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
     raw = described(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
-    return replace(raw, robot_hint=robot_of(Path(table.path).parent))
-
-
-def robot_of(folder: Path) -> str | None:
-    """The profile that the serial number in a DROID episode's metadata settles."""
-    for path in sorted(folder.glob("metadata_*.json"))[:1]:
-        try:
-            with path.open("rb") as metadata:
-                about = json.loads(metadata.read(TOLD_LIMIT))
-            serial = str(about.get("robot_serial", "")).lower()
-        except (OSError, ValueError, RecursionError, AttributeError):
-            return None
-        return next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
-    return None
+    # The serial number in the episode's metadata begins with the robot's name.
+    serial = ""
+    for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:
+        with suppress(OSError, ValueError, RecursionError, AttributeError), path.open("rb") as file:
+            serial = str(json.loads(file.read(TOLD_LIMIT)).get("robot_serial", "")).lower()
+    hint = next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
+    return replace(raw, robot_hint=hint)
 
 
 def read_any(table: Hdf5Table, request: ReadChoice) -> RawLog:
@@ -296,13 +281,15 @@ LAYOUTS = (
     Layout("DROID", f"{DROID_STATE}joint_positions", read_droid),
 )
 
-ANY = Layout("HDF5", "", read_any)
 
+def layout_of(table: Hdf5Table) -> tuple[Layout, dict[int, str]]:
+    """How a file is laid out, and the group of each episode; as any other where two ways fit.
 
-def layout_of(table: Hdf5Table) -> tuple[Layout, tuple[str, ...]]:
-    """How a file is laid out, and the groups of its episodes; as any other where two ways fit."""
+    An episode has the number that its group's name ends with, or is counted from 0.
+    """
     found = [(x, groups) for x in LAYOUTS if (groups := x.groups(table.names))]
-    return found[0] if len(found) == 1 else (ANY, ("",))
+    layout, groups = found[0] if len(found) == 1 else (Layout("HDF5", "", read_any), ("",))
+    return layout, dict(zip(numbers_of(groups), groups, strict=True))
 
 
 def numbers_of(groups: Sequence[str]) -> tuple[int, ...]:
@@ -338,8 +325,13 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
         with opened(file) as content:
             table = table_of(file.path, content)
             layout, groups = layout_of(table)
-            each = [partial(layout.read, table.within(group)) for group in groups]
-            yield _placed(numbers_of(groups), [group.rstrip("/") for group in groups], each)
+            several = len(groups) > 1
+            yield {
+                number: partial(
+                    _placed, group.rstrip("/") * several, partial(layout.read, table.within(group))
+                )
+                for number, group in groups.items()
+            }
         return
     paths = [path for path in trajectories(file.path) if path is not None]
     if not paths:
@@ -349,21 +341,16 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
         raw = FORMATS["hdf5"].read(open_log(path), replace(request, episode=None))
         return replace(raw, part="", files=(path,))
 
-    places = [str(path.parent.relative_to(file.path)) for path in paths]
-    yield _placed(range(len(paths)), places, [partial(read, path) for path in paths])
+    places = [str(path.parent.relative_to(file.path)) * (len(paths) > 1) for path in paths]
+    each = zip(places, paths, strict=True)
+    yield {k: partial(_placed, place, partial(read, path)) for k, (place, path) in enumerate(each)}
 
 
-def _placed(
-    numbers: Sequence[int], places: Sequence[str], each: Sequence[Callable[[ReadChoice], RawLog]]
-) -> Episodes:
-    """Episodes by number; the place of one of several is said."""
-
-    def read(k: int, request: ReadChoice) -> RawLog:
-        raw = each[k](request)
-        said = (fact("episode-place", place=places[k]),) if len(places) > 1 else ()
-        return replace(raw, remarks=(*said, *raw.remarks))
-
-    return {number: partial(read, k) for k, number in enumerate(numbers)}
+def _placed(place: str, read: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
+    """An episode; the place of one of several is said."""
+    raw = read(request)
+    said = (fact("episode-place", place=place),) if place else ()
+    return replace(raw, remarks=(*said, *raw.remarks))
 
 
 def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
@@ -374,5 +361,4 @@ def episode_places(file: LogFile, columns: str | None) -> dict[int, str]:
         layout, groups = layout_of(table)
         anchor = (stated.pattern if stated is not None else None) or layout.anchor
         anchor = anchor or level_of(file.path, table.names, "/")
-    below = anchor[: anchor.rfind("/") + 1]
-    return dict(zip(numbers_of(groups), (group + below for group in groups), strict=True))
+    return {k: group + anchor[: anchor.rfind("/") + 1] for k, group in groups.items()}
