@@ -6,7 +6,7 @@ import hashlib
 import pytest
 import zstandard
 
-from vftcli.readers import opening
+from vftcli.readers import FORMATS, opening, read
 from vftcli.readers.opening import HEAD_BYTES, Digest, open_log
 from vftcli.signals.errors import LogError
 
@@ -60,3 +60,12 @@ def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):
         (tmp_path / "bag" / name).write_bytes(content)
     assert Digest((tmp_path / "bag",)).hexdigest() == hashlib.sha256(b"123").hexdigest()
     assert Digest((tmp_path / "bag" / "a",)).hexdigest() == hashlib.sha256(b"1").hexdigest()
+
+
+@pytest.mark.parametrize("name", [n for n, layout in FORMATS.items() if not layout.folder])
+def test_a_folder_read_as_a_format_of_files_is_refused_in_one_line(tmp_path, name):
+    (tmp_path / "log.csv").write_text("t,q_1\n0,1\n1,2\n", encoding="utf-8")
+    with pytest.raises(LogError, match=f"^{tmp_path}: [^\n]+$") as refusal:
+        read(tmp_path, format=name)
+    if name in {"parquet", "npz", "json", "mat"}:
+        assert "a folder, and the chosen format is of files" in str(refusal.value)

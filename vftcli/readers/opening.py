@@ -109,6 +109,11 @@ class LogFile:
     @cached_property
     def _unwrapped(self) -> tuple[memoryview, bool]:
         """The content, and whether a wrapped file ends before its packed data does."""
+        if self.is_folder:
+            raise LogError(
+                f"{self.path}: a folder, and the chosen format is of files. Give the file, or "
+                "leave log.format out."
+            )
         if self.wrapping is not None:
             content, whole = unpacked(self.path, self.wrapping)
             return memoryview(content), not whole
