@@ -343,13 +343,13 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
 
     def until(flags: Mask, row: int | None) -> float | None:
         """Time from a row to the first from there on that is set, None without any. [s]"""
-        found = None if row is None else first_true(flags, row)
+        found = first_true(flags, row)
         return None if row is None or found is None else float(t[found] - t[row])
 
     before = max(k - 3, 0)
     speed = np.linalg.norm(moved[k] - moved[before]) / max(t[k] - t[before], 1e-9)
     seen, ends = first_true(felt, k), first_true(~there, k)
-    lost = None if ends is None else first_true(~felt, ends)
+    lost = first_true(~felt, ends)
     turned = np.append(np.diff(np.linalg.norm(moved, axis=1)) <= 0.0, False)
     return Latency(
         axis=axis,
@@ -363,7 +363,8 @@ def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     )
 
 
-def first_true(flags: Mask, start: int) -> int | None:
+def first_true(flags: Mask, start: int | None) -> int | None:
     """First row from `start` on that is set, or None."""
-    found = np.flatnonzero(flags[start:])
-    return start + int(found[0]) if found.size else None
+    if start is None or not flags[start:].any():
+        return None
+    return start + int(np.argmax(flags[start:]))

@@ -5,7 +5,7 @@ A log is scored filtered and in motion, from its first to its last sample that m
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import polars as pl
@@ -30,36 +30,13 @@ from vftcli.signals.series import resample_columns
 #: One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
 #: counts the logs from 1, training first: two files of one name stay two logs.
 RESIDUALS = pl.Schema(
-    {
-        "log": pl.String,
-        "log_index": pl.Int64,
-        "role": pl.String,
-        "model": pl.String,
-        "joint": pl.Int64,
-        "rms_Nm": pl.Float64,
-        "samples": pl.Int64,
-    }
-)
-#: One row a number: its value, standard deviation, and what the profile said.
-PARAMETERS = pl.Schema(
-    {
-        "joint": pl.Int64,
-        "parameter": pl.String,
-        "value": pl.Float64,
-        "sd": pl.Float64,
-        "unit": pl.String,
-        "profile": pl.Float64,
-        "determined": pl.Boolean,
-    }
+    {"log": str, "log_index": int, "role": str, "model": str}
+    | {"joint": int, "rms_Nm": float, "samples": int}
 )
 #: One row a friction candidate: its cross-validated error.
-SHAPE_CHOICES = pl.Schema(
-    {"joint": pl.Int64, "friction": pl.String, "cv_rms_Nm": pl.Float64, "chosen": pl.Boolean}
-)
+SHAPE_CHOICES = pl.Schema({"joint": int, "friction": str, "cv_rms_Nm": float, "chosen": bool})
 #: One row a base parameter, or a friction coefficient estimated along with them.
-BASE = pl.Schema(
-    {"parameter": pl.String, "value": pl.Float64, "sd": pl.Float64, "determined": pl.Boolean}
-)
+BASE = pl.Schema({"parameter": str, "value": float, "sd": float, "determined": bool})
 #: Parameter → its unit.
 UNITS = {
     "torque_constant": "N·m/A",
@@ -91,7 +68,7 @@ REPEATED = 0.8
 
 
 class Number(NamedTuple):
-    """One identified number; a row of `PARAMETERS`."""
+    """One identified number."""
 
     joint: int  #: Joint, from 1; the last one for a load on the flange.
     parameter: str  #: Its key in the robot file, one of `UNITS`.
@@ -100,6 +77,10 @@ class Number(NamedTuple):
     unit: str  #: Unit of value, sd and profile.
     profile: float  #: The profile's number, nan where it has none.
     determined: bool  #: Whether the logs determine it; else it is not written.
+
+
+#: One row a number: its value, standard deviation, and what the profile said.
+PARAMETERS = pl.Schema(get_type_hints(Number))
 
 
 def number(

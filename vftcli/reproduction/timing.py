@@ -261,15 +261,13 @@ def dense_kalman_loop(
     With `rebuild` its matrices are made anew at every sample.
     """
     n = p.shape[1]
-    model, prior = kalman.model(step, n), kalman.first_prior(step, n)
-    densities = kalman.densities(n)
-    one, none, identity = np.ones(n), np.zeros(n), np.eye(2 * n)
-    A = in_pairs((one, model.a12), (none, model.a22))
-    B, C = step * identity[:, :n], identity[:n]
-    Q = in_pairs((model.q11, model.q12), (model.q12, model.q22))
-    R = np.diag(model.r)
-    P = in_pairs((prior.p11, prior.p12), (prior.p12, prior.p22))
-    x = np.concatenate([p[0], none])
+    prior, densities = kalman.first_prior(step, n), kalman.densities(n)
+    R = np.diag(kalman.model(step, n).r)
+    A, B, Q = held_matrices(step, densities.q_p, densities.q_tau)
+    P11, P12, P22 = (np.diag(part) for part in (prior.p11, prior.p12, prior.p22))
+    P = np.block([[P11, P12], [P12, P22]])
+    identity, x = np.eye(2 * n), np.concatenate([p[0], np.zeros(n)])
+    C = identity[:n]
     for k in range(len(p)):
         if rebuild:
             A, B, Q = held_matrices(step, densities.q_p, densities.q_tau)
@@ -281,8 +279,3 @@ def dense_kalman_loop(
         I_LC = identity - L @ C
         P = I_LC @ P @ I_LC.T + L @ R @ L.T
     return x
-
-
-def in_pairs(*rows: tuple[Array, Array]) -> Array:
-    """Matrix of two states a joint with these diagonals in four blocks. (2n, 2n)"""
-    return np.block([[np.diag(entry) for entry in row] for row in rows])

@@ -13,6 +13,7 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording, Source
 from vftcli.signals.remarks import fact
+from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import AXES, WrenchFrame
 from vftcli.simulation.arm import Arm
 from vftcli.simulation.scenario import Scenario
@@ -20,7 +21,6 @@ from vftcli.simulation.sensing import (
     Measured,
     Samples,
     check_sensing,
-    interpolate,
     measure_run,
     sample_run,
 )
@@ -201,12 +201,12 @@ def truth_of(arm: Arm, samples: Samples) -> Truth:
     """Evaluate the contacts at the log's sampling instants."""
     touching, made, chain = arm.touching, arm.made, arm.true.chain
     middle = (np.arange(made, dtype=float) + 0.5) * arm.scenario.step
-    wrenches = interpolate(samples.time, middle, arm.history.wrenches[:made])
-    walks = {k: interpolate(samples.time, middle, w[:made]) for k, w in touching.walks.items()}
+    time, wrenches = samples.time, arm.history.wrenches[:made].swapaxes(0, 1)
+    walks = {k: resample_columns(time, middle, w[:made]) for k, w in touching.walks.items()}
     tau_ext, flange = np.zeros(samples.q.shape), np.zeros((len(samples.time), 6))
     poses, contacts = link_poses(chain, samples.q), dict[str, Array]()
-    for k, contact in enumerate(touching.mounted):
-        joint, wrench = contact.joint, wrenches[:, k]
+    for contact, exerted in zip(touching.mounted, wrenches, strict=True):
+        joint, wrench = contact.joint, resample_columns(time, middle, exerted)
         turn = poses.rotation[:, joint - 1]
         if contact.lever is not None:
             flange += at_other_point(wrench, turn @ contact.turn @ contact.lever)

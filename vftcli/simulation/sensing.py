@@ -15,6 +15,8 @@ from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import rpy_matrix
+from vftcli.signals.series import resample_columns
+from vftcli.signals.steady_filter import steady_filter
 from vftcli.simulation.arm import Arm, JointSignals, rigid_torque
 from vftcli.simulation.scenario import SensingSpec
 from vftcli.simulation.trajectories import Reference
@@ -76,29 +78,18 @@ def sample_run(arm: Arm) -> Samples:
     time = np.minimum(stamp / (1.0 + spec.clock_drift), end)
     interval = 1.0 / rate / (1.0 + spec.clock_drift)
     names = ("q", "v", "target_q", "target_dq", "target_ddq")
-    signals = {name: interpolate(time, grid, getattr(history, name)) for name in names}
+    signals = {name: resample_columns(time, grid, getattr(history, name)) for name in names}
     for name in ("a", "friction"):
         middle = grid[:-1] + 0.5 * arm.scenario.step
-        signals[name] = interpolate(time, middle, getattr(history, name)[:-1])
+        signals[name] = resample_columns(time, middle, getattr(history, name)[:-1])
     # The mean over the interval, or the last step: exact, for torque is constant over a step.
     step, total = grid[1], np.zeros_like(history.tau)
     np.cumsum(history.tau[:-1] * step, axis=0, out=total[1:])
     span = max(interval if spec.torque == "average" else 0.0, step)
     begin, stop = np.maximum(time - span, 0.0), np.maximum(time, step)
-    grown = interpolate(stop, grid, total) - interpolate(begin, grid, total)
+    grown = resample_columns(stop, grid, total) - resample_columns(begin, grid, total)
     tau = np.asarray(grown / (stop - begin)[:, None])
     return Samples(time=time, stamp=stamp, tau=tau, **signals)
-
-
-def interpolate(time: Array, grid: Array, values: Array) -> Array:
-    """Interpolate columns of `values` (N, n), given on `grid` (N,), linearly at `time` (M,)."""
-    step = grid[1] - grid[0]
-    place = np.clip((time - grid[0]) / step, 0.0, len(grid) - 1.0)
-    left = np.minimum(np.floor(place + 1e-9).astype(int), len(grid) - 2)
-    share = np.clip(place - left, 0.0, 1.0)
-    share[share < 1e-9] = 0.0
-    share = share.reshape(-1, *([1] * (values.ndim - 1)))
-    return np.asarray(values[left] * (1.0 - share) + values[left + 1] * share)
 
 
 def noise_sizes(arm: Arm) -> tuple[Array, Array, Array]:
@@ -186,12 +177,8 @@ def first_order_low_pass(signal: Array, cutoff: float, step: float) -> Array:
     """First-order low-pass at `cutoff` [Hz] of a signal (M, n) sampled every `step` [s]."""
     # Exact discretisation of the first-order filter for an input held over the step.
     share = 1.0 - np.exp(-2.0 * np.pi * cutoff * step)
-    out = np.empty_like(signal)
-    state = signal[0].copy()
-    for k, row in enumerate(signal):
-        state = state + share * (row - state)
-        out[k] = state
-    return out
+    one = np.ones((1, signal.shape[1]))
+    return steady_filter((1.0 - share) * one[None], share * one, signal, signal[:1], one)[0]
 
 
 def read_force_sensor(arm: Arm, samples: Samples, wrench: Array) -> Array | None:
