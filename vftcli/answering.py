@@ -40,7 +40,7 @@ def errors_of(
     import polars as pl
 
     from vftcli.evaluation.errors import PoolMember, evaluate_pooled
-    from vftcli.outputs.tables import marked
+    from vftcli.outputs.error_tables import marked
 
     errors = [*(made.errors for made in analyses), *(made.errors for made in others)]
     judged = [

@@ -7,7 +7,8 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import SCHEMA
-from vftcli.outputs import tables
+from vftcli.outputs import error_tables as tables
+from vftcli.outputs.grids import pairs_text
 
 
 def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:
@@ -78,7 +79,7 @@ def test_pairs_name_the_better_first() -> None:
             "p": [0.01, 0.2],
         }
     )
-    lines = tables.pairs_text(rows).splitlines()
+    lines = pairs_text(rows).splitlines()
     assert lines[1].split() == [
         "a.csv",
         "J1",
@@ -123,14 +124,14 @@ def test_a_floor_nobody_knows_is_left_out(errors: pl.DataFrame) -> None:
 
 
 def test_json_has_null_for_unknown(errors: pl.DataFrame) -> None:
-    rows = json.loads(tables.to_json(errors.with_columns(bias_Nm=float("nan"))))
+    rows = json.loads(tables.FORMS["json"](errors.with_columns(bias_Nm=float("nan"))))
     assert [r["rmse_Nm"] for r in rows] == [0.55, 12.346, 2.0, None]
     assert {r["bias_Nm"] for r in rows} == {None}
     assert set(rows[0]) >= {"recording", "observer", "joint", "reference", "reference_floor_Nm"}
 
 
 def test_csv_reads_back(errors: pl.DataFrame) -> None:
-    rows = list(csv.DictReader(io.StringIO(tables.to_csv(errors))))
+    rows = list(csv.DictReader(io.StringIO(tables.FORMS["csv"](errors))))
     assert [r["rmse_Nm"] for r in rows] == ["0.55", "12.346", "2.0", ""]
 
 

@@ -6,14 +6,9 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation import WRENCH_SCHEMA
+from vftcli.outputs.error_tables import axis_grids, nothing_to_compare, paper_bounds
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.rmse_tables import (
-    axis_grids,
-    contact_grids,
-    drift_grid,
-    nothing_to_compare,
-    paper_bounds,
-)
+from vftcli.outputs.grids import contact_grids, drift_grid
 from vftcli.signals.wrench import AXES
 from vftcli.virtual_sensor.sensor_reading import Drift
 

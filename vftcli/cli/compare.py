@@ -92,9 +92,10 @@ def compare(
     from vftcli.batch.log_work import for_comparison
     from vftcli.cli.console import LeftOut, say_analysis, say_json
     from vftcli.evaluation import paired_significance
-    from vftcli.outputs import tables
+    from vftcli.outputs import error_tables as tables
+    from vftcli.outputs.error_tables import paper_bounds
+    from vftcli.outputs.grids import pairs_text
     from vftcli.outputs.report import jacobian_entry
-    from vftcli.outputs.rmse_tables import paper_bounds
     from vftcli.outputs.run_record import all_remarks
     from vftcli.pipeline import analyse_logs
     from vftcli.readers.library import Library
@@ -120,7 +121,7 @@ def compare(
             if a.reference is not None and analysis.talk.details
         ]
         if pairs:
-            echo(tables.pairs_text(pl.concat(pairs)))
+            echo(pairs_text(pl.concat(pairs)))
     elif table.json:
         every = [remark for a in analyses for remark in all_remarks(a)]
         judged = [jacobian_entry(made.log) for made in left_out.judged]

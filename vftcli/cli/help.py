@@ -248,7 +248,7 @@ def contents() -> Iterator[str]:
 def robots(name: str | None, tip: str | None) -> str:
     """The robot profiles by maker, or one robot and its sources."""
     from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import robot_text, robots_grid
+    from vftcli.outputs.grids import robot_text, robots_grid
     from vftcli.robots import MAKERS, load_robot
 
     if name is not None:

@@ -145,7 +145,7 @@ def find_gains(
     from vftcli.outputs.figures import write_tuned
     from vftcli.outputs.files import check_file
     from vftcli.outputs.grid import terminal
-    from vftcli.outputs.listings import tuned_grid
+    from vftcli.outputs.grids import tuned_grid
     from vftcli.readers.library import Library
 
     choice = logged.asked(Library([log]), observers=TUNED, **others)

@@ -114,9 +114,9 @@ def show_answers(
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.cli.console import canvas, show
-    from vftcli.outputs.rmse_tables import paper_bounds
+    from vftcli.outputs.error_tables import paper_bounds, to_terminal
+    from vftcli.outputs.grids import print_text
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
-    from vftcli.outputs.tables import print_text, to_terminal
 
     if len(analyses) + len(failed) > 1:
         show(logs_screen(analyses, canvas(), failed, every=details))
@@ -213,8 +213,8 @@ def write_by_jacobian(
 ) -> None:
     """Write what there is of a vendor's torques beside a Jacobian, where it is asked for."""
     from vftcli.cli.console import command_line, judge_by_jacobian, say, show
+    from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.report import write_jacobian_folder
-    from vftcli.outputs.tables import to_terminal
 
     if choice.wrench is None and choice.reference is None:
         raise found

@@ -84,7 +84,7 @@ def bench(
     """
     from vftcli.cli.console import say_json
     from vftcli.outputs import grid
-    from vftcli.outputs.listings import bench_grid
+    from vftcli.outputs.grids import bench_grid
     from vftcli.reproduction.timing import benchmark
 
     asked = length.choice()

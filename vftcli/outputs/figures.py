@@ -14,6 +14,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Curve, Tuned, tuning_curves
 from vftcli.outputs.charts import INK, Chart, ChartLine, colours_of_names, lines_of_names
+from vftcli.outputs.error_tables import block, logs_of
 from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
     LOWEST,
@@ -40,7 +41,6 @@ from vftcli.outputs.plots import (
     line_figure,
     plots_of,
 )
-from vftcli.outputs.rmse_tables import block, logs_of
 from vftcli.robots.robot_file import lines_of
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.packages import check_installed

@@ -72,12 +72,12 @@ class Column(NamedTuple):
         return GridCell(str(entry))
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Grid:
     """A table."""
 
-    columns: tuple[Column, ...]  #: The columns.
-    rows: tuple[Sequence[Entry], ...]  #: One entry a column.
+    columns: Sequence[Column]  #: The columns.
+    rows: Sequence[Sequence[Entry]]  #: One entry a column.
     title: str = ""  #: What the table is about, "" for none.
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
     unit: str = ""  #: Their unit, where it is one.
@@ -110,8 +110,8 @@ def keyed_grid(
     swatches: bool = False,
 ) -> Grid:
     """A table of rows for machines: of each the values of these keys, in their columns."""
-    entries = tuple(tuple(map(row.get, columns)) for row in rows)
-    return Grid(columns=tuple(columns.values()), rows=entries, title=title, swatches=swatches)
+    entries = [[*map(row.get, columns)] for row in rows]
+    return Grid([*columns.values()], entries, title, swatches=swatches)
 
 
 def words(*heads: str) -> tuple[Column, ...]:

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vftcli.outputs.charts import INK, QUIET, REFERENCE, Chart, ChartLine, drawn_line
+from vftcli.outputs.error_tables import DAGGER
 from vftcli.outputs.paper import sheet, shortened
-from vftcli.outputs.rmse_tables import DAGGER
 from vftcli.signals.arrays import Array
 
 if TYPE_CHECKING:

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.logged_jacobian import JacobianJudgement
-from vftcli.outputs import tables
+from vftcli.outputs import error_tables as tables
 from vftcli.outputs.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.contacts import contacts_csv, contacts_record
+from vftcli.outputs.error_tables import paper_bounds
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text, table_file
 from vftcli.outputs.paper import figure_files, write_figures
-from vftcli.outputs.rmse_tables import paper_bounds
 from vftcli.outputs.run_record import (
     CONVENTIONS,
     envelope,

@@ -20,6 +20,7 @@ from vftcli.observers.table import BEST
 from vftcli.outputs.answer import beginning
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
 from vftcli.outputs.choice import FULL, LEVELS
+from vftcli.outputs.error_tables import DAGGER, paper_bounds, to_markdown
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
     condition_charts,
@@ -41,9 +42,7 @@ from vftcli.outputs.rerun_arm import (
     send_force,
 )
 from vftcli.outputs.rerun_file import BAR, EDGES, LogLine, Tab, rerun_file, thinned
-from vftcli.outputs.rmse_tables import DAGGER, paper_bounds
 from vftcli.outputs.run_record import CONVENTIONS, all_remarks
-from vftcli.outputs.tables import to_markdown
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS, ExternalTorque

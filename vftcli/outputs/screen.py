@@ -21,10 +21,11 @@ from vftcli.outputs.believability import (
 )
 from vftcli.outputs.canvas import Canvas, force_bars, forces_of_list
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
+from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import Column, Grid, terminal
+from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
-from vftcli.outputs.rmse_tables import Block, blocks, contact_grids
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 

@@ -16,7 +16,7 @@ from vftcli.outputs.charts import (
     families_of,
     lines_of_names,
 )
-from vftcli.outputs.rmse_tables import blocks
+from vftcli.outputs.error_tables import blocks
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import COVERS
 from vftcli.signals.wrench import AXES, unit_of

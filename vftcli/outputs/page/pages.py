@@ -12,22 +12,21 @@ from vftcli.outputs.answer import hardest_words, otherwise
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
 from vftcli.outputs.charts import Chart
 from vftcli.outputs.contacts import by_force
-from vftcli.outputs.examination import rate_of
-from vftcli.outputs.grid import Grid, GridCell, words
-from vftcli.outputs.page import details, log_charts
-from vftcli.outputs.page.shell import page, part
-from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
-from vftcli.outputs.rmse_tables import (
+from vftcli.outputs.error_tables import (
     axis_grids,
     blocks,
-    contact_grids,
     detail_grids,
-    drift_grid,
     marks_on_page,
     nothing_to_compare,
     paper_bounds,
     rmse_grid,
 )
+from vftcli.outputs.examination import rate_of
+from vftcli.outputs.grid import Grid, GridCell, words
+from vftcli.outputs.grids import contact_grids, drift_grid
+from vftcli.outputs.page import details, log_charts
+from vftcli.outputs.page.shell import page, part
+from vftcli.outputs.quantity import DASH, at_least_shown, banded, counted, significant
 from vftcli.outputs.run_record import run_record
 from vftcli.signals.remarks import sentence
 from vftcli.virtual_sensor.frames import FRAMES

@@ -1,30 +1,49 @@
-"""Errors of torques and wrenches as grids: observers down, joints or axes across.
+"""Errors of torques and wrenches as tables for people, and as tidy rows for machines.
 
-Forces are in newtons, moments in newton-metres; contacts found and zero drift have theirs too.
+Observers stand below one another, joints or axes beside one another; forces are in newtons, moments
+in newton-metres.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from html import escape
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import polars as pl
 
-from vftcli.evaluation.errors import JointMeans, joint_means
-from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns, keyed_grid, words
+from vftcli.evaluation.errors import POOLED, JointMeans, joint_means
+from vftcli.outputs.examination import refused_codes
+from vftcli.outputs.grid import (
+    Column,
+    Entry,
+    Grid,
+    GridCell,
+    csv_rows,
+    escape_markdown,
+    joint_columns,
+    json_rows,
+    latex,
+    markdown,
+    terminal,
+    words,
+)
+from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.parsing import printable
 from vftcli.signals.wrench import AXES, unit_of
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
-    from vftcli.virtual_sensor.sensor_reading import Drift
 
 #: An RMSE within this factor of the reference's floor may be the reference's own.
 AT_FLOOR = 1.2
 
 DAGGER, LATEX_DAGGER = "†", r"$^\dagger$"
+OVERRIDDEN = "overridden"  #: Column of the codes with which results were wanted anyway.
 RESTS = "the joint rests most of the time; the reference keeps its stiction: do not trust it"
 
 #: What the page writes behind a number where the terminal has a star.
@@ -104,15 +123,9 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
 
 def block(rows: pl.DataFrame) -> Block:
     """The rows of one recording as a matrix."""
-    joints = rows["joint"].unique().sort().to_list()
-    observers = tuple(map(str, rows["observer"].unique(maintain_order=True)))
-    rmse, floor = np.full((len(observers), len(joints)), np.nan), np.full(len(joints), np.nan)
-    # Null is what polars has for unknown.
-    known = rows.with_columns(pl.col("rmse_Nm", "reference_floor_Nm").fill_null(float("nan")))
-    for row in known.iter_rows(named=True):
-        at = joints.index(row["joint"])
-        rmse[observers.index(row["observer"]), at] = row["rmse_Nm"]
-        floor[at] = row["reference_floor_Nm"]
+    joints, observers = rows["joint"].unique().sort(), rows["observer"].unique(maintain_order=True)
+    values = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in rows.iter_rows(named=True)}
+    floors = dict(rows.select("joint", "reference_floor_Nm").iter_rows())
     # Joints may differ in how many samples have a reference.
     counts = rows["samples"].drop_nulls().to_list() or [0]
     doubtful = rows.filter(~pl.col("reference_trusted").fill_null(True))["joint"].unique().sort()
@@ -121,19 +134,20 @@ def block(rows: pl.DataFrame) -> Block:
         recording=str(rows["recording"][0]),
         reference=str(rows["reference"][0]),
         joints=tuple(joints),
-        observers=observers,
-        rmse=rmse,
-        floor=floor,
-        samples=(int(min(counts)), int(max(counts))),
+        observers=tuple(observers),
+        # Null is what polars has for unknown.
+        rmse=np.array([[values.get((o, j)) for j in joints] for o in observers], dtype=float),
+        floor=np.array([floors[j] for j in joints], dtype=float),
+        samples=(min(counts), max(counts)),
         means=joint_means(rows),
-        missing={str(name): float(share) for name, share in missing.iter_rows() if share},
+        missing={name: share for name, share in missing.iter_rows() if share},
         untrusted=tuple(doubtful),
     )
 
 
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
-    rows: list[tuple[Entry, ...]] = []
+    rows: list[Sequence[Entry]] = []
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
@@ -145,16 +159,16 @@ def rmse_grid(table: Block) -> Grid:
         rows.append((name, *cells, table.means.errors.get(name)))
     if table.has_floor:
         rows.append(("floor", *map(float, table.floor), table.means.floor))
-    joints = tuple(
+    joints = (
         Column(head, symbol=f"$J_{{{j}}}${LATEX_DAGGER * (j in table.untrusted)}")
         for j, head in zip(table.joints, table.joint_heads, strict=True)
     )
     return Grid(
-        title=table.title,
+        (*words("observer"), *joints, Column("mean")),
+        rows,
+        table.title,
         quantity="RMSE",
         unit="N·m",
-        columns=(*words("observer"), *joints, Column("mean")),
-        rows=tuple(rows),
         summaries=int(table.has_floor),
         marked=True,
         notes=tuple(marks_in_words([table]).splitlines()),
@@ -162,39 +176,38 @@ def rmse_grid(table: Block) -> Grid:
     )
 
 
-def details(row: dict[str, Any]) -> dict[str, str]:
-    """Text below the RMSE table for one row, by the table's title."""
+#: Titles of the tables below that of the RMSE.
+DETAILS = (
+    "95 % interval of the RMSE, moving-block bootstrap [N·m]",
+    "lag of the estimate behind the reference, best fit [ms]",
+    "samples within the estimate's 95 % band, while the joint moves",
+    "p of being no worse than the best, paired bootstrap",
+)
+
+
+def details(row: Mapping[str, Any]) -> tuple[str, ...]:
+    """Texts in the tables of `DETAILS` for one row."""
     low, high, lag, p = (row[k] for k in ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "p_vs_best"))
     share, unknown = row.get("coverage_95"), low is None or high is None
-    return {
-        "95 % interval of the RMSE, moving-block bootstrap [N·m]": (
-            DASH if unknown else f"{significant(low)}–{significant(high)}"
-        ),
-        "lag of the estimate behind the reference, best fit [ms]": (
-            DASH if lag is None else minus(f"{round(1e3 * lag)}")
-        ),
-        "samples within the estimate's 95 % band, while the joint moves": (
-            DASH if share is None else f"{100 * share:.0f} %"
-        ),
-        "p of being no worse than the best, paired bootstrap": (
-            DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}"
-        ),
-    }
+    return (
+        DASH if unknown else f"{significant(low)}–{significant(high)}",
+        DASH if lag is None else minus(f"{round(1e3 * lag)}"),
+        DASH if share is None else f"{100 * share:.0f} %",
+        DASH if p is None else "best" if p >= 1.0 else f"{p:.3f}",
+    )
 
 
 def detail_grids(errors: pl.DataFrame) -> Iterator[Grid]:
     """Every further table of the RMSE table's shape that has something to say."""
     for group in logs_of(errors.filter(pl.col("p_vs_best").is_not_null()), "joint"):
         columns = *words("observer"), *joint_columns(group["joint"].unique().sort().to_list())
-        found: dict[str, dict[str, list[str]]] = {}
+        found: dict[str, list[tuple[str, ...]]] = {}
         for row in group.iter_rows(named=True):
-            for title, text in details(row).items():
-                found.setdefault(title, {}).setdefault(row["observer"], []).append(text)
-        for title, each in found.items():
-            if any(set(texts) != {DASH} for texts in each.values()):
-                rows = tuple((name, *texts) for name, texts in each.items())
-                above = f"{group['recording'][0]}: {title}"
-                yield Grid(title=above, columns=columns, rows=rows, swatches=True)
+            found.setdefault(row["observer"], []).append(details(row))
+        for k, title in enumerate(DETAILS):
+            rows = [(name, *(texts[k] for texts in each)) for name, each in found.items()]
+            if any(set(texts) != {DASH} for _, *texts in rows):
+                yield Grid(columns, rows, f"{group['recording'][0]}: {title}", swatches=True)
 
 
 def marks_in_words(found: Sequence[Block]) -> str:
@@ -213,14 +226,13 @@ def marks_in_words(found: Sequence[Block]) -> str:
     return "".join(f"{text}\n" for text in lines)
 
 
-def without_answer(found: Sequence[Block]) -> list[str]:
+def without_answer(found: Sequence[Block]) -> Iterable[str]:
     """Observers that leave samples without an answer, and their share of a joint's samples."""
-    lines = (
+    return dict.fromkeys(
         f"{name}: no answer in up to {100.0 * share:.2g} % of a joint's samples, each counted as 0"
         for table in found
         for name, share in table.missing.items()
     )
-    return list(dict.fromkeys(lines))
 
 
 def marks_on_page(found: Sequence[Block]) -> str:
@@ -264,21 +276,14 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
         found: dict[str, dict[str, float | None]] = {}
         for name, axis, value in values.iter_rows():
             found.setdefault(name, {})[axis] = value
-        rows: list[tuple[Entry, ...]] = [(name, *map(own.get, AXES)) for name, own in found.items()]
+        rows: list[Sequence[Entry]] = [(name, *map(own.get, AXES)) for name, own in found.items()]
         # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
         if reference == "sensor" and (limits := (bounds or {}).get(recording)):
             force, moment = limits
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
-        yield Grid(
-            title=f"{recording} against {reference}, wrench, {samples} unmasked samples",
-            quantity="RMSE",
-            columns=(
-                *words("observer"),
-                *(Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES),
-            ),
-            rows=tuple(rows),
-            swatches=True,
-        )
+        axes = (Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES)
+        title = f"{recording} against {reference}, wrench, {samples} unmasked samples"
+        yield Grid((*words("observer"), *axes), rows, title, quantity="RMSE", swatches=True)
 
 
 def compared_samples(rows: pl.DataFrame) -> int:
@@ -297,40 +302,95 @@ def nothing_to_compare(errors: pl.DataFrame) -> Iterator[str]:
             )
 
 
-#: Columns of the contact table, and how they are headed.
-CONTACTS = {
-    "recording": "recording",
-    "observer": "observer",
-    "signal": "told from",
-    "contacts": "contacts",
-    "listed_contacts": "rows",
-    "found_contacts": "found",
-    "missed_contacts": "missed",
-    "merged_contacts": "of them merged",
-    "split_contacts": "split",
-    "false_alarms": "false",
-    "false_alarms_per_h": "false alarms/h",
-    "detection_delay_s": "mean delay [s]",
-    "longest_delay_s": "longest [s]",
-}
+def marked(errors: pl.DataFrame, analyses: "Sequence[Analysis]") -> pl.DataFrame:
+    """The errors with a column `overridden` where results were wanted though they mean nothing.
+
+    It holds the codes of the findings, of all logs together in pooled rows; without any such
+    finding the table is as it was.
+    """
+    found = {a.recording.name: refused_codes(a.examinations) for a in analyses}
+    codes = {name: ", ".join(each) for name, each in found.items() if each}
+    if not codes:
+        return errors
+    every = {POOLED: "; ".join(f"{name}: {text}" for name, text in codes.items()), **codes}
+    column = pl.col("recording").replace_strict(every, default=None, return_dtype=pl.String)
+    return errors.with_columns(overridden=column)
 
 
-def contact_grids(errors: pl.DataFrame) -> Iterator[Grid]:
-    """How each observer tells contacts, one row a recording and observer; none if not asked."""
-    if "contacts" not in errors.columns:
-        return
-    rows = errors.filter(pl.col("contacts").is_not_null())
-    if len(rows):
-        columns = dict(zip(CONTACTS, words(*CONTACTS.values()), strict=True))
-        yield keyed_grid(columns, rows.iter_rows(named=True), "contacts against the reference")
+def doubts_of(errors: pl.DataFrame) -> list[str]:
+    """Lines above tables of meaningless errors, one a log."""
+    if OVERRIDDEN not in errors.columns:
+        return []
+    rows = errors.select("recording", OVERRIDDEN).unique(maintain_order=True).drop_nulls()
+    return [
+        f"MEANINGLESS unless these findings are wrong (--anyway): {name}: {codes}"
+        for name, codes in rows.iter_rows()
+        if name != POOLED
+    ]
 
 
-def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
-    """Zero drift per observer and axis, with five decimals as the paper prints it."""
-    title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
-    axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
-    columns = *words("observer"), *[Column("span [s]")] * spans, *axes
-    rows: tuple[tuple[Entry, ...], ...] = tuple(
-        (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
+def to_terminal(
+    errors: pl.DataFrame, bounds: PaperBounds | None = None, *, every: bool = True
+) -> str:
+    """The tables of the tidy error table as text, with the meaning of their marks."""
+    found = blocks(errors)
+    if not found:
+        return "no errors to show: the estimates and the reference have no sample in common\n"
+    above, below = (
+        "".join(f"{printable(line)}\n" for line in lines)
+        for lines in (doubts_of(errors), nothing_to_compare(errors))
     )
-    return Grid(title=title, columns=columns, rows=rows, swatches=True)
+    joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
+    details = detail_grids(errors) if every else ()
+    grids = (*details, *axis_grids(errors, bounds), *contact_grids(errors))
+    return above + "\n".join([joints + below, *map(terminal, grids)])
+
+
+def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
+    """All tables of the errors as GitHub Markdown, best value of each joint bold."""
+    found = blocks(errors)
+    lines = [*marks_in_words(found).splitlines(), *nothing_to_compare(errors)]
+    marks = [f"{escape_markdown(line)}\n" for line in lines]
+    below = [*detail_grids(errors), *axis_grids(errors, bounds)]
+    doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
+    return "\n".join(
+        [*doubts, *map(markdown, map(rmse_grid, found)), *marks, *map(markdown, below)]
+    )
+
+
+def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
+    """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
+
+    Logs of arms with as many joints share a table.
+    """
+    lines = [*doubts_of(errors), *nothing_to_compare(errors)]
+    doubts = "".join(f"% {printable(line)}\n" for line in lines)
+    arms = groupby(blocks(errors), key=lambda table: table.joints)
+    found = [alike(list(map(rmse_grid, tables))) for _, tables in arms]
+    if axes := list(axis_grids(errors, bounds)):
+        found.append(axes)
+    return doubts + "\n".join(latex(*grids) for grids in found)
+
+
+def alike(grids: Sequence[Grid]) -> Sequence[Grid]:
+    """Tables of several logs with equal heads: a log's dagger moves from them to its title."""
+    if len(grids) == 1:
+        return grids
+    found = []
+    for grid in grids:
+        doubtful = [column.head for column in grid.columns if DAGGER in column.head]
+        plain = [
+            c._replace(head=c.head.replace(DAGGER, ""), symbol=c.symbol.replace(LATEX_DAGGER, ""))
+            for c in grid.columns
+        ]
+        found.append(replace(grid, title=", ".join([grid.title, *doubtful]), columns=plain))
+    return found
+
+
+#: Name of a form → the text of the errors table in it.
+FORMS = {
+    "csv": lambda errors, _bounds=None: csv_rows(errors.to_dicts(), errors.columns),
+    "json": lambda errors, _bounds=None: json_rows(errors.to_dicts()),
+    "markdown": to_markdown,
+    "latex": to_latex,
+}

@@ -3,9 +3,7 @@ import polars as pl
 import pytest
 
 from vftcli.evaluation import SCHEMA
-from vftcli.outputs.grid import GridCell, latex, markdown, terminal
-from vftcli.outputs.page.shell import part
-from vftcli.outputs.rmse_tables import (
+from vftcli.outputs.error_tables import (
     blocks,
     detail_grids,
     details,
@@ -13,6 +11,8 @@ from vftcli.outputs.rmse_tables import (
     marks_in_words,
     rmse_grid,
 )
+from vftcli.outputs.grid import GridCell, latex, markdown, terminal
+from vftcli.outputs.page.shell import part
 
 
 def errors(*changed: dict[str, object]) -> pl.DataFrame:
@@ -118,7 +118,7 @@ def test_logs_of_one_label_stay_apart_also_with_other_joints() -> None:
 )
 def test_details_as_text(values: tuple[float | None, ...], texts: list[str]) -> None:
     keys = ("rmse_low_Nm", "rmse_high_Nm", "lag_s", "coverage_95", "p_vs_best")
-    assert list(details(dict(zip(keys, values, strict=True))).values()) == texts
+    assert list(details(dict(zip(keys, values, strict=True)))) == texts
 
 
 def test_a_detail_that_nobody_knows_has_no_table() -> None:

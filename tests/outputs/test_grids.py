@@ -3,7 +3,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.outputs.grid import terminal
-from vftcli.outputs.listings import friction_words, joints_grid, robots_grid, tuned_grid
+from vftcli.outputs.grids import joints_grid, robots_grid, tuned_grid
 from vftcli.robots import load_robot
 
 
@@ -27,9 +27,9 @@ def test_one_robot_joint_by_joint() -> None:
 
 
 def test_friction_is_told_with_its_numbers_and_how_far_to_trust_it() -> None:
-    text = friction_words(load_robot("panda"), 0)
-    assert text.startswith("sigmoid (amplitude 0.54615, ")
-    assert text.endswith("; published")
+    text = joints_grid(load_robot("panda")).rows[1][-1]
+    assert str(text).startswith("sigmoid (amplitude 0.54615, ")
+    assert str(text).endswith("; published")
 
 
 def test_the_list_of_robots_has_no_heading() -> None:

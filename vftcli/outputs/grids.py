@@ -1,0 +1,169 @@
+"""Tables that belong to no page: robots, gains, times, drifts, contacts found, pairs, prints."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal, words
+from vftcli.outputs.quantity import significant
+from vftcli.signals.wrench import AXES, unit_of
+
+if TYPE_CHECKING:
+    import polars as pl
+
+    from vftcli.evaluation.published import Comparison
+    from vftcli.observers.tuning import Tuned
+    from vftcli.robots.robot import Robot
+    from vftcli.virtual_sensor.sensor_reading import Drift
+
+SURE = 0.05  #: Below this p a difference between two observers is called sure.
+#: Columns of the contact table, and how they are headed.
+CONTACTS = {
+    "recording": "recording",
+    "observer": "observer",
+    "signal": "told from",
+    "contacts": "contacts",
+    "listed_contacts": "rows",
+    "found_contacts": "found",
+    "missed_contacts": "missed",
+    "merged_contacts": "of them merged",
+    "split_contacts": "split",
+    "false_alarms": "false",
+    "false_alarms_per_h": "false alarms/h",
+    "detection_delay_s": "mean delay [s]",
+    "longest_delay_s": "longest [s]",
+}
+
+
+def robots_grid(robots: "Iterable[Robot]") -> Grid:
+    """The robot profiles, one row each, without a heading."""
+    rows = []
+    for robot in robots:
+        friction = sorted({f.model for f in robot.friction}) or ["no friction model"]
+        joints, models = f"{robot.joints} joints", ", ".join(friction)
+        rows.append((robot.name, robot.title, joints, robot.torque_source, models))
+    # The widths keep the columns of one release where they were in the one before.
+    return Grid([Column("", words=True, width=width) for width in (6, 27, 9, 12, 0)], rows)
+
+
+def joints_grid(robot: "Robot") -> Grid:
+    """One robot joint by joint: masses, drives, limits, friction; units in the first row."""
+    chain, constants = robot.chain, robot.torque_constant
+    rows: list[Sequence[Entry]] = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
+    for j, joint in enumerate(chain.names):
+        table = robot.friction[j].table if robot.friction else {}
+        friction = "none"
+        if table:
+            model, trust = table.pop("model"), table.pop("confidence", "no confidence stated")
+            numbers = ", ".join(
+                f"{key} {' '.join(f'{v:g}' for v in (x if isinstance(x, list) else [x]))}"
+                for key, x in table.items()
+            )
+            friction = f"{model} ({numbers}); {trust}"
+        each = (chain.mass, chain.rotor_inertia, constants, robot.limits.tau_max)
+        known = ("-" if values is None else float(values[j]) for values in each)
+        rows.append((joint, *known, friction))
+    columns = (
+        Column("joint", words=True, width=16),
+        Column("mass", form=".3f", width=7),
+        Column("rotor", form=".3f", width=7),
+        Column("K", form=".4f", width=8),
+        Column("tau_max", form=".1f", width=7),
+        Column("friction", words=True),
+    )
+    return Grid(columns, rows)
+
+
+def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
+    """Gains that were found for each observer and what to expect of them, joint by joint."""
+    rows: list[Sequence[Entry]] = []
+    for line in tuned:
+        values = {
+            "ω [rad/s]": line.rate,
+            "delay [ms]": 1e3 * line.delay,
+            "expected rmse [N·m]": line.rmse,
+        }
+        # Without a threshold there is no alarm to count.
+        if with_alarms and line.alarms is not None:
+            values["false alarms [1/h]"] = line.alarms.round(3)
+        for k, (what, numbers) in enumerate(values.items()):
+            rows.append(("" if k else line.observer, what, *map(float, numbers)))
+    joints = joint_columns(len(tuned[0].rate), form=".3g", width=7)
+    return Grid((*words("observer"), Column("", words=True, width=22), *joints), rows)
+
+
+def robot_text(robot: "Robot") -> str:
+    """One robot in full: joints, drives, friction, gains, sources."""
+    head = f"{robot.title} ({robot.name}): {robot.joints} joints, torque from {robot.torque_source}"
+    lines = [head, "", *terminal(joints_grid(robot)).splitlines()]
+    for observer, gains in robot.gains.items():
+        lines += ["", *(f"{observer}.{key} = {value}" for key, value in gains.items())]
+    lines += ["", *(f"note: {note}" for note in robot.remarks)]
+    lines += [
+        f"source {source.get('id', '?')}: {source.get('what', '')}: {source.get('ref', '')}"
+        for source in robot.sources
+    ]
+    if robot.payloads:
+        lines.append(f"payloads: {', '.join(robot.payloads)} (--payload NAME)")
+    return "\n".join(lines)
+
+
+def bench_grid(result: Mapping[str, Any]) -> Grid:
+    """Times of dynamics and observers, beside the paper's on its laptop."""
+    dynamics = {"name": "dynamics", **result["dynamics"]}
+    columns = {
+        "name": Column("", words=True, width=15),
+        "total_s": Column("total", "ms", lambda seconds: f"{1e3 * seconds:.2f}"),
+        "per_sample_us": Column("per sample", "µs", ".3f"),
+        "paper_s": Column("paper, its laptop", "s", ".3f"),
+    }
+    return keyed_grid(columns, [dynamics, *result["observers"], *result["complete_log"]])
+
+
+def contact_grids(errors: "pl.DataFrame") -> Iterator[Grid]:
+    """How each observer tells contacts, one row a recording and observer; none if not asked."""
+    if "contacts" in errors.columns and len(rows := errors.drop_nulls("contacts")):
+        columns = dict(zip(CONTACTS, words(*CONTACTS.values()), strict=True))
+        yield keyed_grid(columns, rows.iter_rows(named=True), "contacts against the reference")
+
+
+def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
+    """Zero drift per observer and axis, with five decimals as the paper prints it."""
+    title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
+    axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
+    columns = *words("observer"), *[Column("span [s]")] * spans, *axes
+    rows: list[Sequence[Entry]] = [
+        (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
+    ]
+    return Grid(columns, rows, title, swatches=True)
+
+
+def pairs_text(table: "pl.DataFrame") -> str:
+    """The paired differences of all logs, as a terminal table."""
+    rows: list[Sequence[Entry]] = []
+    for row in table.iter_rows(named=True):
+        names, low, high = (row["observer"], row["other"]), row["low_Nm"], row["high_Nm"]
+        # First RMSE less second: above zero the second observer is the better.
+        if row["difference_Nm"] > 0:
+            names = names[::-1]
+        else:
+            low, high = -high, -low
+        interval, by = f"{significant(low)} to {significant(high)}", abs(row["difference_Nm"])
+        # A blank keeps the digits of those without a star below the others.
+        sure = f"{row['p']:.3f}{'*' if row['p'] < SURE else ' '}"
+        rows.append((row["recording"], f"J{row['joint']}", *names, by, interval, sure))
+    heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")
+    return (
+        f"{terminal(Grid((*words('recording'), *map(Column, heads)), rows))}*: p below {SURE:g}\n"
+    )
+
+
+def print_text(found: "Comparison") -> str:
+    """A printed table beside one's own: two lines an observer, and why they differ."""
+    rows: list[Sequence[Entry]] = []
+    for name in found.names:
+        rows.append((f"{name}, printed", *(f"{v:.4f}" for v in found.printed(name))))
+        rows.append((f"{name}, here", *map(float, found.ours[name])))
+    rows.append(("floor, here", *map(float, found.floor)))
+    columns = *words("observer"), *joint_columns(len(found.floor))
+    table = Grid(columns, rows, f"{found.recording} beside {found.published.title}, N·m")
+    return "\n".join([terminal(table), *(f"- {text}" for text in found.remarks), ""])
