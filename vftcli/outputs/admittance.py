@@ -1,10 +1,9 @@
-"""Outputs of an admittance replay: page, motion.parquet, comparison, figures, run.json.
+"""Outputs of an admittance replay: page, motion, comparison, figures, `run.json`, and lines.
 
 The page has Figs 6/9, 7/10, 12/13 and Tables III/IV of the paper for the user's log.
 """
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +15,7 @@ from vftcli.admittance.law import AXES, PER_AXIS, Controller
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance_tables import (
+    TITLE,
     comparison_csv,
     comparison_grid,
     latency_grid,
@@ -26,7 +26,9 @@ from vftcli.outputs.admittance_tables import (
 from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.grid import Grid, json_rows
+from vftcli.outputs.grid import (
+    json_rows,
+)
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import Drawing, figure_files, write_figures
 from vftcli.outputs.plots import NARROW, line_figure, plots_of
@@ -124,15 +126,15 @@ def admittance_record(
     p, logs = replay.parameters, [recording] if recording is not None else []
     loop: dict[str, Any] | None = None
     if run is not None:
+        made = run.simulation
         loop = {
             "controller": run.controller.name,
             "stable": run.stable,
             "zero_removed": run.zero,
             "poses_out_of_reach": int(np.count_nonzero(~run.reached)),
+            **({"scenario": made.scenario.name, "seed": made.seed} if made is not None else {}),
+            "latencies": latency_rows(run),
         }
-        if (made := run.simulation) is not None:
-            loop |= {"scenario": made.scenario.name, "seed": made.seed}
-        loop |= {"latencies": latency_rows(run)}
     found = {
         "rows": replay.rows,
         "examination": health_record(examinations),
@@ -188,7 +190,13 @@ def render_admittance(
         f"{lost} poses out of reach" if lost else "",
     )
     controllers = counted(len(replay.controllers), "admittance controller")
-    warnings = [sentence(remark) for remark in replay.remarks if remark.level == "warning"]
+    # A variable controller by the name that the charts' legend has for its α.
+    variable = [c for c in replay.controllers if c.kind == "variable"]
+    names = {(axis, c.alpha[k]): c.name for c in variable[::-1] for k, axis in enumerate(AXES)}
+    named = [
+        {**row, "controller": names.get((row["axis"], row["alpha"]), str(row["controller"]))}
+        for row in replay.rows
+    ]
     return page(
         "admittance.html",
         f"{title}: admittance",
@@ -196,10 +204,10 @@ def render_admittance(
         {controller.name: (colour, "") for controller, colour in painted(replay)},
         eyebrow=eyebrow,
         headline=f"The same force through {controllers}.",
-        warnings=warnings,
+        warnings=[sentence(remark) for remark in replay.remarks if remark.level == "warning"],
         run=run,
         latencies=None if run is None else latency_grid(run),
-        comparison=named_comparison(replay),
+        comparison=comparison_grid(named, TITLE),
         drawn=drawn,
         parameters=parameter_grid(replay),
         stability=stability_grid(replay),
@@ -207,20 +215,6 @@ def render_admittance(
         remarks=replay.remarks,
         record=record,
     )
-
-
-def named_comparison(replay: Replay) -> Grid:
-    """Every controller on one force, axis by axis (Figs 7 and 10)."""
-
-    def name_of(row: Mapping[str, Any]) -> str:
-        """A variable controller by the name that the charts' legend has for its α."""
-        k, alpha = AXES.index(row["axis"]), row["alpha"]
-        for controller in replay.controllers if alpha is not None else ():
-            if controller.kind == "variable" and controller.alpha[k] == alpha:
-                return controller.name
-        return str(row["controller"])
-
-    return comparison_grid(replay.rows, name_of, "The same force through every controller")
 
 
 def painted(replay: Replay) -> list[tuple[Controller, str]]:
@@ -251,13 +245,13 @@ def charts(replay: Replay, run: ClosedLoop | None = None) -> list[Chart]:
         force.insert(0, ChartLine("true force", padded(run.truth), dash="2 2"))
     limit = np.where(np.isfinite(p.speed_limit), p.speed_limit, np.nan)
     w, v = replay.lyapunov.corrected, replay.lyapunov.printed
-    found: tuple[tuple[str, str, Sequence[ChartLine], Array | None, str], ...] = (
+    found: list[tuple[str, str, Sequence[ChartLine], Array | None, str]] = [
         ("x", "Deviation", deviation, None, ""),
         ("force", "Force on the robot", force, np.asarray(p.threshold), "± threshold"),
         ("v", "Velocity", lines(replay.motion.v), limit, "± speed limit"),
         ("energy-w", "Lyapunov function W (recovery phases)", lines(w), None, ""),
         ("energy-v", "The printed V (52): it rises", lines(v), None, ""),
-    )
+    ]
     return [
         Chart(
             key,
@@ -284,18 +278,18 @@ def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, D
     moved = [k for k in range(len(AXES)) if np.nanmax(np.abs(replay.motion.x[:, :, k])) > 0.0]
     dragged = {row["axis"] for row in replay.rows}
     shown = [k for k in moved if AXES[k] in dragged] or moved
+
+    def draw(width: float) -> "Figure":
+        """Deviations under every controller, above them the force where there is one."""
+        deviation, force, *_ = charts(replay, run)
+        columns = min(len(shown), 3 if width > NARROW else 2)
+        drawn = [force, deviation] if np.any(replay.wrench) else [deviation]
+        plots = []
+        # The plots of an axis stand below one another.
+        for k in range(0, len(shown), columns):
+            for chart in drawn:
+                plots += plots_of(chart, only=shown[k : k + columns])
+        return line_figure(width, plots, columns=columns)
+
     title = f"Deviation of the flange from its target, {replay.robot.name}, base axes"
-    return {"release": Drawing(title, partial(release, replay, run, shown))} if shown else {}
-
-
-def release(replay: Replay, run: ClosedLoop | None, axes: list[int], width: float) -> "Figure":
-    """Deviations under every controller, above them the force where there is one."""
-    deviation, force, *_ = charts(replay, run)
-    columns = min(len(axes), 3 if width > NARROW else 2)
-    drawn = [force, deviation] if np.any(replay.wrench) else [deviation]
-    plots = []
-    # The plots of an axis stand below one another.
-    for k in range(0, len(axes), columns):
-        for chart in drawn:
-            plots += plots_of(chart, only=axes[k : k + columns])
-    return line_figure(width, plots, columns=columns)
+    return {"release": Drawing(title, draw)} if shown else {}

@@ -9,8 +9,10 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, csv_rows, keyed_grid, latex, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, csv_rows, keyed_grid, latex, terminal, words
 from vftcli.outputs.quantity import minus
+
+TITLE = "The same force through every controller"  #: Of the comparison.
 
 
 def number_form(form: str) -> Callable[[float], str]:
@@ -49,7 +51,7 @@ LATENCIES = {
 }
 #: What the headings of the LaTeX table mean.
 RETURNS = (
-    "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there"
+    "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there",
 )
 
 
@@ -63,19 +65,11 @@ def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:
     return terminal(comparison_grid(rows)).rstrip("\n") if rows else "no axis was dragged"
 
 
-def comparison_grid(
-    rows: Sequence[Mapping[str, Any]],
-    name_of: Callable[[Mapping[str, Any]], str] = lambda row: str(row["controller"]),
-    title: str = "",
-) -> Grid:
-    """Every controller on one force, below each other by axis and drag.
-
-    `name_of` tells what a row's controller is called.
-    """
+def comparison_grid(rows: Sequence[Mapping[str, Any]], title: str = "") -> Grid:
+    """Every controller on one force (Figs 7 and 10), below each other by axis and drag."""
     # Sorting keeps the order of the controllers within a drag.
     ordered = sorted(rows, key=lambda row: (AXES.index(row["axis"]), row["drag"]))
-    named = ({**row, "controller": name_of(row)} for row in ordered)
-    return keyed_grid(COLUMNS, named, title, swatches=True)
+    return keyed_grid(COLUMNS, ordered, title, swatches=True)
 
 
 def latency_rows(run: ClosedLoop) -> list[dict[str, Any]]:
@@ -149,7 +143,7 @@ def parameter_text(replay: Replay) -> str:
 def parameter_grid(replay: Replay) -> Grid:
     """Tables III and IV of the paper with the values used."""
     p = replay.parameters
-    rows: list[tuple[str | float, ...]] = []
+    rows: list[Sequence[Entry]] = []
     for k, axis in enumerate(AXES):
         force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
         limit = float(np.broadcast_to(p.speed_limit, 6)[k])
@@ -164,19 +158,13 @@ def parameter_grid(replay: Replay) -> Grid:
         "F_tsd": r"$F_\mathrm{tsd}$",
         "Ẋ_tsd": r"$\dot X_\mathrm{tsd}$",
     }
-    return Grid(
-        title=f"Values used; {p.source or 'the command line'}",
-        columns=(
-            Column("coordinates", words=True),
-            *(Column(h, form="g", symbol=s) for h, s in heads.items()),
-        ),
-        rows=tuple(rows),
-    )
+    columns = *words("coordinates"), *(Column(h, form="g", symbol=s) for h, s in heads.items())
+    return Grid(columns, rows, f"Values used; {p.source or 'the command line'}")
 
 
 def stability_grid(replay: Replay) -> Grid:
     """The numbers that decide before anything moves: the worst of the axes of each kind."""
-    rows: list[tuple[str | float, ...]] = []
+    rows: list[Sequence[Entry]] = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for controller in replay.controllers:
         for axes, part, unit in kinds:
@@ -185,24 +173,14 @@ def stability_grid(replay: Replay) -> Grid:
             numbers = (float(np.max(values[part])) for values in each)
             escape = f"{bound:.3g} {unit}" if np.isfinite(bound) else "none"
             rows.append((controller.name, axes, *numbers, escape))
-    return Grid(
-        title="2TsB/M + Ts²K/M, stable below 4",
-        columns=(
-            Column("controller", words=True),
-            Column("axes", words=True),
-            Column("drag phase", form=".3g"),
-            Column("recovery, at the limit", form=".3g"),
-            Column("escape bound"),
-        ),
-        rows=tuple(rows),
-        swatches=True,
-    )
+    phases = (Column(head, form=".3g") for head in ("drag phase", "recovery, at the limit"))
+    columns = *words("controller", "axes"), *phases, Column("escape bound")
+    return Grid(columns, rows, "2TsB/M + Ts²K/M, stable below 4", swatches=True)
 
 
 def latex_text(replay: Replay) -> str:
     """The parameters (Tables III and IV of the paper) and the comparison as LaTeX tables."""
     grids = [parameter_grid(replay)]
     if replay.rows:
-        found = comparison_grid(replay.rows, title="The same force through every controller")
-        grids.append(replace(found, notes=(RETURNS,)))
-    return "\n".join(latex(grid) for grid in grids)
+        grids.append(replace(comparison_grid(replay.rows, TITLE), notes=RETURNS))
+    return "\n".join(map(latex, grids))
