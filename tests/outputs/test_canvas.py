@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.outputs.canvas import PLAIN, Canvas
+from vftcli.outputs.screen import PLAIN, Canvas
 
 
 @pytest.mark.parametrize(("columns", "width"), [(40, 72), (88, 88), (240, 100)])

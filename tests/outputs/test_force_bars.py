@@ -7,10 +7,9 @@ from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ForceCourse
-from vftcli.outputs.canvas import (
+from vftcli.outputs.screen import (
     Canvas,
     column_peaks,
-    contact_numbers,
     force_bars,
     forces_of_list,
     seconds,
@@ -68,9 +67,9 @@ def test_seconds_count_in_round_steps() -> None:
 
 def test_numbers_stand_below_the_peaks_where_there_is_room() -> None:
     rows = [contact(number=1, peak=0.0), contact(number=2, peak=9.0), contact(number=3, peak=9.1)]
-    line = contact_numbers(T, rows, 60)
-    assert line.split() == ["1", "2"]  # the third would touch the second
-    assert line.index("2") == 30
+    line = force_bars(*pushed((8.0, 10.0, 5.0)), rows, Canvas(width=69))[-1]
+    assert line.split() == ["#", "1", "2"]  # the third would touch the second
+    assert line.index("2") - line.index("1") == 30
 
 
 def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:

@@ -9,11 +9,11 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.canvas import Canvas
 from vftcli.outputs.error_tables import blocks
 from vftcli.outputs.screen import (
     FILE_LINES,
     MOST_LINES,
+    Canvas,
     against,
     facts,
     log_screen,

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
     from vftcli.evaluation.logged_jacobian import JacobianJudgement
-    from vftcli.outputs.canvas import Canvas
+    from vftcli.outputs.screen import Canvas
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
@@ -123,7 +123,7 @@ def open_made(path: Path) -> None:
 
 def canvas() -> "Canvas":
     """What stdout can show: its width, its letters, whether in colour."""
-    from vftcli.outputs.canvas import Canvas
+    from vftcli.outputs.screen import Canvas
 
     stream = sys.stdout
     letters = (getattr(stream, "encoding", None) or "utf-8").lower().replace("-", "")

@@ -1,31 +1,37 @@
-"""A command's screen on its logs: the answer.
+"""A command's screen on its logs, and what a terminal can show of it.
 
-Facts, the answer in a sentence, |F| over time, the contacts, whether it can be believed, the errors
-against a reference, and what was written: forty lines at most, whatever the number of logs.
+Facts, the answer in a sentence, |F| over time as bars, the contacts, whether it can be believed,
+the errors against a reference, and what was written: forty lines at most, whatever the number of
+logs.
 """
 
+import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple, Self
+
+import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.contacts.contact_list import ContactList
+from vftcli.contacts.contact_list import Contact, ContactList
 from vftcli.outputs.answer import answer, otherwise
 from vftcli.outputs.believability import (
     MARKS,
     Ground,
+    Standing,
     grounds,
     headline,
     health,
     log_line,
     own_match,
 )
-from vftcli.outputs.canvas import Canvas, force_bars, forces_of_list
 from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
-from vftcli.outputs.grid import Column, Grid, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, GridCell, terminal
 from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
+from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import sentence
 
@@ -44,12 +50,60 @@ SUBJECT = 17  #: Columns of what a ground is about.
 MEASURED = ("paper-gains-measured", "paper-gains-measured-level")
 
 LEGEND = "± 95 %; force ON the robot, base axes; range: if it touched another possible place"
+NARROWEST, WIDEST = 72, 100  #: Columns that a screen uses at least, and at most.
+ROWS = 3  #: Lines of the bars.
+#: How full a letter is, from empty to full.
+STEPS, ASCII_STEPS = " ▁▂▃▄▅▆▇█", " .-=#"
+LABELS = 9  #: Seconds that are written below the bars, about.
+#: Style → ANSI code.
+STYLES = {"good": "32", "caution": "33", "bad": "31", "unknown": "2", "bold": "1", "bar": "36"}
+#: ASCII for a letter on a terminal without it.
+PLAIN = {
+    "·": "-", "–": "-", "−": "-", "…": "...", "±": "+/-", "≤": "<=", "→": "->", "°": " deg",
+    "✓": "+", "△": "!", "✗": "x", "┤": "|", "ω": "w", "τ": "tau", "×": "x", "≥": ">=", "√": "sqrt",
+    "₃": "3", "²": "2", "≈": "~", "’": "'",
+}  # fmt: skip
+
+
+class Canvas(NamedTuple):
+    """Abilities of a terminal."""
+
+    width: int = 80  #: Columns that are used.
+    unicode: bool = True  #: Whether it has more letters than ASCII.
+    colour: bool = False  #: Whether it has colours.
+
+    @classmethod
+    def of(cls, *, columns: int, unicode: bool, colour: bool) -> Self:
+        """The canvas of a terminal with so many columns."""
+        return cls(min(max(columns, NARROWEST), WIDEST), unicode, colour)
+
+    def painted(self, text: str, style: str) -> str:
+        """A text in a style, as it is where there are no colours."""
+        return f"\x1b[{STYLES[style]}m{text}\x1b[0m" if self.colour and text else text
+
+    def shown(self, text: str) -> str:
+        """A text in letters that the terminal has."""
+        if self.unicode:
+            return text
+        plain = "".join(PLAIN.get(letter, letter) for letter in text)
+        return plain.encode("ascii", "replace").decode()
+
+    def wrapped(self, text: str, indent: int, lines: int | None = None) -> list[str]:
+        """A text in lines behind an indent, cut behind so many of them; the first has none."""
+        found = textwrap.wrap(
+            text,
+            self.width - indent,
+            max_lines=lines,
+            placeholder=" …",
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+        return [line if k == 0 else " " * indent + line for k, line in enumerate(found or [""])]
 
 
 def short_screen(analysis: Analysis, canvas: Canvas) -> str:
     """Facts and the answer."""
-    head = canvas.painted(facts(analysis), "bold")
-    lines = [head, *answer_lines(analysis, canvas), *doubt_lines(analysis)]
+    lines = [*head_lines(analysis, canvas), *doubt_lines(analysis)]
     return canvas.shown("\n".join(lines)) + "\n"
 
 
@@ -57,15 +111,18 @@ def log_screen(
     analysis: Analysis, canvas: Canvas, *, most: int = MOST_LINES, every: bool = False
 ) -> str:
     """The screen of one log, of so many lines at most."""
-    head = [canvas.painted(facts(analysis), "bold"), "", *answer_lines(analysis, canvas)]
-    bars, found = bar_lines(analysis, canvas), grounds(analysis)
-    tail = [*doubt_lines(analysis), *against_lines(analysis, canvas)]
-    text = ""
+    first, *answered = head_lines(analysis, canvas)
+    force, listed, found = forces_of_list(analysis), analysis.contacts, grounds(analysis)
+    bars: list[str] = []
+    if force is not None and listed is not None:
+        shown = [] if listed.contacts[0].is_load else hardest_rows(listed.contacts)
+        bars = force_bars(analysis.t, force, shown, canvas)
+    tail, text = [*doubt_lines(analysis), *against_lines(analysis, canvas)], ""
     for each, rows in FORMS[:1] if every else FORMS[1:]:
-        believed, listed = belief_lines(found, canvas, each), analysis.contacts
         table = [] if listed is None else list_lines(listed, rows, canvas)
-        parts = [part for part in (head, bars, table, [*believed, *tail]) if part]
-        text = "\n\n".join("\n".join(block) for block in parts) + "\n"
+        believed = belief_lines(found, canvas, each)
+        parts = [part for part in ([first, "", *answered], bars, table, believed + tail) if part]
+        text = "\n\n".join("\n".join(part) for part in parts) + "\n"
         if text.count("\n") <= most:
             break
     return canvas.shown(text)
@@ -80,10 +137,10 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
     return canvas.shown("\n".join([*lines, *rows, "", end])) + "\n"
 
 
-def answer_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
-    """The answer in a sentence."""
-    lines = canvas.wrapped(printable(headline(analysis)), 2)
-    return [f"  {line.strip()}" for line in lines]
+def head_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
+    """The facts, and the answer in a sentence."""
+    answered = canvas.wrapped(printable(headline(analysis)), 2)
+    return [canvas.painted(facts(analysis), "bold"), *(f"  {line.strip()}" for line in answered)]
 
 
 def facts(analysis: Analysis) -> str:
@@ -106,11 +163,7 @@ def doubt_lines(analysis: Analysis) -> list[str]:
 
 
 def written_lines(
-    folder: Path,
-    names: Iterable[str],
-    canvas: Canvas,
-    *,
-    several: bool = False,
+    folder: Path, names: Iterable[str], canvas: Canvas, *, several: bool = False
 ) -> list[str]:
     """Written files, if present, and the page to open."""
     there = [name for name in names if (folder / name).exists()]
@@ -121,15 +174,6 @@ def written_lines(
         page = printable(str(folder / "index.html"))
         lines.append(f"Open: {page}        More here: --details")
     return lines
-
-
-def bar_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
-    """|F| over time, none where no force is listed."""
-    force, found = forces_of_list(analysis), analysis.contacts
-    if force is None or found is None:
-        return []
-    shown = [] if found.contacts[0].is_load else hardest_rows(found.contacts)
-    return force_bars(analysis.t, force, shown, canvas)
 
 
 def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str]:
@@ -144,10 +188,7 @@ def list_lines(found: ContactList, most: int | None, canvas: Canvas) -> list[str
     if most is None and found.candidates:
         lines += ["", "Candidates, too little evidence to list:"]
         lines += terminal(contact_grid(found.candidates), canvas.shown).splitlines()
-    if rest:
-        lines.append(rest)
-    if found.hardest is not None:
-        lines.append(f"({LEGEND})")
+    lines += [rest] * bool(rest) + [f"({LEGEND})"] * (found.hardest is not None)
     return [f"  {line}" if line else "" for line in lines]
 
 
@@ -169,8 +210,7 @@ def ground_lines(
     ground: Ground, canvas: Canvas, most: int | None, about: str = ""
 ) -> Iterator[str]:
     """One ground: its mark, what it is about, what is known of it; then its remedy."""
-    subject = f"{about}: {ground.subject}" if about else ground.subject
-    indent = SUBJECT + 5
+    subject, indent = f"{about}: {ground.subject}" if about else ground.subject, SUBJECT + 5
     first, *more = canvas.wrapped(printable(ground.sentence), indent, most)
     mark = canvas.painted(canvas.shown(ground.mark), ground.standing)
     if len(subject) > SUBJECT:
@@ -189,14 +229,14 @@ def against_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """The errors against a reference on one line, and beside a printed table on another."""
     if analysis.errors is None:
         return []
-    first = [against(block, analysis) for block in blocks(analysis.errors)[:1]]
-    lines = [line for text in first for line in canvas.wrapped(text, 2)]
+    lines = []
+    for block in blocks(analysis.errors)[:1]:
+        lines += canvas.wrapped(against(block, analysis), 2)
     for grid in contact_grids(analysis.errors):
         lines += terminal(grid).splitlines()
-    if analysis.published is not None:
-        told = next((f": {sentence(each)}" for each in analysis.published.remarks), "")
-        text = f"Beside {analysis.published.published.title}{told} → --details"
-        lines += canvas.wrapped(text, 2)
+    if (found := analysis.published) is not None:
+        first = next((f": {sentence(each)}" for each in found.remarks), "")
+        lines += canvas.wrapped(f"Beside {found.published.title}{first} → --details", 2)
     return lines
 
 
@@ -228,7 +268,13 @@ def logs_screen(
 ) -> str:
     """The screen of several logs: one line a log, then the worst findings."""
     found = [(analysis, grounds(analysis)) for analysis in analyses]
-    lines = [canvas.painted(logs_facts(analyses, len(failed)), "bold"), ""]
+    arms = dict.fromkeys(analysis.robot.name for analysis in analyses)
+    free = dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs)
+    facts_of_all = [f"{len(analyses) + len(failed)} logs", " and ".join(arms)]
+    facts_of_all += [f"{len(failed)} left out"] * bool(failed)
+    facts_of_all += [f"free motion from {', '.join(free)}"] * bool(free)
+    head = printable(" · ".join(filter(None, facts_of_all)))
+    lines = [canvas.painted(head, "bold"), ""]
     shown = found
     if not every and len(found) > MOST_LOGS:
         # The worst and hardest, in the order of the logs.
@@ -253,18 +299,6 @@ def logs_screen(
     return canvas.shown("\n".join(lines)) + "\n"
 
 
-def logs_facts(analyses: Sequence[Analysis], failed: int) -> str:
-    """Number of logs, their arms, and the free motion behind the sizes."""
-    arms = list(dict.fromkeys(analysis.robot.name for analysis in analyses))
-    free = list(dict.fromkeys(r.recording.name for a in analyses for r in a.motion.runs))
-    parts = [f"{len(analyses) + failed} logs", " and ".join(arms)]
-    if failed:
-        parts.append(f"{failed} left out")
-    if free:
-        parts.append(f"free motion from {', '.join(free)}")
-    return printable(" · ".join(part for part in parts if part))
-
-
 def log_table(
     found: Sequence[tuple[Analysis, tuple[Ground, ...]]],
     failed: Mapping[str, str],
@@ -273,25 +307,92 @@ def log_table(
     """One line a log: what touched the arm, and whether the log is sound."""
     judged = any(analysis.errors is not None for analysis, _ in found)
     heads = ("log", "span", "contacts", "hardest", "else", *["error"] * judged)
-    rows = []
+
+    def healthy(standing: Standing, text: str) -> GridCell:
+        """The last entry of a line, in its colour."""
+        said = canvas.shown(f"{MARKS[standing]} {text}")
+        return GridCell("", mark=canvas.painted(said, standing))
+
+    rows: list[Sequence[Entry]] = []
     for analysis, all_grounds in found:
         summary, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
         if listed is not None and listed.detectable_force is not None and listed.tells_untouched:
             rest = at_least_shown(listed.detectable_force)
         errors = [e for block in blocks(analysis.errors)[:1] for e in block.means.errors.values()]
         error = f"{significant(errors[0], 2)} N·m" if errors else DASH
-        span = f"{summary.duration:.1f} s"
-        row = [summary.name, span, summary.contacts, summary.hardest, rest, error]
-        rows.append(row[: len(heads)])
-    rows += [[name, *[""] * (len(heads) - 1)] for name in failed]
-    columns = tuple(Column(head, words=head in {"log", "hardest"}) for head in heads)
-    head, *table = terminal(Grid(columns=columns, rows=tuple(rows)), canvas.shown).splitlines()
-    room = max(len(line) for line in (head, *table)) + 2
-    worst = [health(each) for _, each in found]
-    states = [(g.standing, "sound" if g.standing == "good" else g.subject) for g in worst]
-    states += [("bad", "left out")] * len(failed)
-    lines = [f"{head:<{room}}health"]
-    for line, (standing, words) in zip(table, states, strict=True):
-        text = canvas.painted(canvas.shown(f"{MARKS[standing]} {words}"), standing)
-        lines.append(f"{line:<{room}}{text}")
+        span, worst = f"{summary.duration:.1f} s", health(all_grounds)
+        row = [summary.name, span, summary.contacts, summary.hardest, rest, error][: len(heads)]
+        state = "sound" if worst.standing == "good" else worst.subject
+        rows.append((*row, healthy(worst.standing, state)))
+    rows += [(name, *[""] * (len(heads) - 1), healthy("bad", "left out")) for name in failed]
+    columns = (Column(h, words=h in {"log", "hardest", "health"}) for h in (*heads, "health"))
+    return terminal(Grid(tuple(columns), rows), canvas.shown).splitlines()
+
+
+def forces_of_list(analysis: Analysis) -> Array | None:
+    """|F| of the listed contacts along a log, zero outside of them; None without any. (T,) [N]"""
+    if analysis.contacts is None or analysis.contacts.hardest is None:
+        return None
+    t, force = analysis.t, np.zeros(len(analysis.t))
+    for contact in analysis.contacts.contacts:
+        if (course := contact.course) is not None:
+            inside = (t >= contact.start) & (t <= contact.stop)
+            force[inside] = np.interp(t[inside], course.t, course.force)
+    return force
+
+
+def force_bars(t: Array, force: Array, contacts: Sequence[Contact], canvas: Canvas) -> list[str]:
+    """|F| [N] over time [s] as bars, seconds and the contacts' numbers below them. (T,)"""
+    top = float(force.max())
+    labels = [f"{top * row / (ROWS - 1):.0f}" for row in range(ROWS)]
+    left = max(map(len, labels))
+    columns = canvas.width - left - 8
+    levels = column_peaks(t, force, columns) / max(top, 1e-9)
+    steps = STEPS if canvas.unicode else ASCII_STEPS
+    full = len(steps) - 1
+    # The lowest step is the line on which nothing touches.
+    height = np.maximum(np.ceil(levels * ROWS * full), 1).astype(int)
+    lines = [f"  {'N':>{left}}"]
+    for row in range(ROWS - 1, -1, -1):
+        letters = "".join(steps[k] for k in np.clip(height - row * full, 0, full))
+        bar = canvas.painted(letters.rstrip(), "bar")
+        lines.append(f"  {labels[row]:>{left}} {canvas.shown('┤')}{bar}")
+    indent = " " * (left + 4)
+    lines.append(f"{indent}{seconds(t, columns)}")
+    # Each number below its peak.
+    share = columns / max(float(t[-1] - t[0]), 1e-9)
+    each = ((int((c.peak - t[0]) * share), str(c.number)) for c in contacts)
+    if numbers := placed(each, columns):
+        lines.append(f"  {'#':>{left}}  {numbers}")
     return lines
+
+
+def column_peaks(t: Array, force: Array, columns: int) -> Array:
+    """The largest |F| in each of so many equal spans of time. (columns,) [N]"""
+    edges = np.linspace(t[0], t[-1], columns + 1)
+    # A span without a sample gets the line between its neighbours.
+    peaks = np.interp(0.5 * (edges[1:] + edges[:-1]), t, force)
+    place = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, columns - 1)
+    np.maximum.at(peaks, place, force)
+    return peaks
+
+
+def seconds(t: Array, columns: int) -> str:
+    """The line of seconds below so many columns."""
+    span = float(t[-1] - t[0])
+    raw = span / LABELS
+    decade = 10.0 ** np.floor(np.log10(raw)) if raw > 0 else 1.0
+    step = next(decade * m for m in (1, 2, 5, 10) if decade * m >= raw)
+    each = [k * step for k in range(int(np.floor(span / step + 1e-9)) + 1)]
+    share = columns / max(span, 1e-9)
+    return placed(((round(x * share), f"{t[0] + x:g}") for x in each), columns) + " s"
+
+
+def placed(texts: Iterable[tuple[int, str]], columns: int) -> str:
+    """A line with texts at their places, but for those that something is in the way of."""
+    line = [" "] * (columns + 8)
+    for at, text in texts:
+        around = line[max(at - 1, 0) : at + len(text) + 1]
+        if at + len(text) < len(line) and set(around) == {" "}:
+            line[at : at + len(text)] = text
+    return "".join(line).rstrip()
