@@ -1,13 +1,12 @@
 """Thresholds as tables, as rows for machines, and as the calls of the robots' own interfaces."""
 
-from collections.abc import Callable, Iterable, Sequence
-from itertools import product
+from collections.abc import Callable, Sequence
 from math import ceil, isnan
 from typing import Any
 
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal, words
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of
 
@@ -29,69 +28,47 @@ def thresholds_text(
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
     """Every threshold with its interval, and the tail it comes from."""
-    return Grid(
-        title=f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis",
-        columns=(
-            Column("", words=True, width=3),
-            Column("threshold"),
-            Column("", words=True, width=3),
-            Column("95 %"),
-            Column("tail from"),
-            Column("λ", unit="1/h", form=".0f"),
-            Column("k"),
-            Column("log", unit="h"),
-            Column("needed by", words=True),
-        ),
-        rows=tuple(
-            (name, level, unit, *tail_entries(one)) for name, unit, level, one in thresholds.named
-        ),
+    rows: list[Sequence[Entry]] = []
+    for name, unit, level, one in thresholds.named:
+        span, t = DASH.join(map(significant, one.interval)), one.tail
+        tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.count), t.hours)
+        rows.append((name, level, unit, span, *tail, one.log))
+    columns = (
+        Column("", words=True, width=3),
+        Column("threshold"),
+        Column("", words=True, width=3),
+        *map(Column, ("95 %", "tail from")),
+        Column("λ", "1/h", ".0f"),
+        Column("k"),
+        Column("log", "h"),
+        *words("needed by"),
     )
-
-
-def tail_entries(one: SignalThreshold) -> tuple[Entry, ...]:
-    """Interval and tail of a threshold: 95 %, u, λ, k, hours, the log."""
-    span, t = DASH.join(map(significant, one.interval)), one.tail
-    tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.count), t.hours)
-    return span, *tail, one.log
+    title = f"exceeded without contact {thresholds.rate:g} × an hour by any joint, or any axis"
+    return Grid(columns, rows, title)
 
 
 def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
     """False alarms of every free log at the thresholds of the others."""
-    return Grid(
-        title="each log at the thresholds of the others: false alarms",
-        columns=(
-            Column("log", words=True),
-            Column("", unit="h"),
-            Column("due"),
-            Column("any joint"),
-            *joint_columns(len(counted[0].joints)),
-            Column("any axis"),
-        ),
-        rows=tuple(
-            (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
-            for one in counted
-        ),
-    )
+    joints = joint_columns(len(counted[0].joints))
+    any_of = (Column("any joint"), *joints, Column("any axis"))
+    columns = *words("log"), Column("", "h"), Column("due"), *any_of
+    rows: list[Sequence[Entry]] = [
+        (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
+        for one in counted
+    ]
+    return Grid(columns, rows, "each log at the thresholds of the others: false alarms")
 
 
 def check_grid(check: ThresholdDetection) -> Grid:
     """The contacts of a log, and their evidence."""
     missed = {True: "on already", False: "missed"}
-    return Grid(
-        title=f"{check.log}: what they would have detected",
-        columns=(
-            Column("#"),
-            Column("from", unit="s", form=".2f"),
-            Column("to", unit="s", form=".2f"),
-            Column("|F|", unit="N"),
-            Column("delay", unit="ms", form=".0f"),
-            Column("by", words=True),
-        ),
-        rows=tuple(
-            (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or missed[c.already_above])
-            for k, c in enumerate(check.contacts, start=1)
-        ),
-    )
+    times = (Column(head, "s", ".2f") for head in ("from", "to"))
+    columns = Column("#"), *times, Column("|F|", "N"), Column("delay", "ms", ".0f"), *words("by")
+    rows = [
+        (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or missed[c.already_above])
+        for k, c in enumerate(check.contacts, start=1)
+    ]
+    return Grid(columns, rows, f"{check.log}: what they would have detected")
 
 
 def check_line(check: ThresholdDetection) -> str:
@@ -115,30 +92,27 @@ def check_line(check: ThresholdDetection) -> str:
     return ", ".join(words)
 
 
-def threshold_row(shown: str, of: str, level: float, one: SignalThreshold) -> dict[str, Any]:
-    """A threshold for machines, the unit in the names."""
-    unit, tail = of.replace("·", ""), one.tail
-    joint = shown.startswith("J")
-    return {
-        "joint" if joint else "axis": int(shown[1:]) if joint else shown,
-        f"threshold_{unit}": None if isnan(level) else level,
-        f"interval_{unit}": list(one.interval),
-        "rate_per_h": one.rate,
-        "log": one.log,
-        f"tail_from_{unit}": tail and tail.start,
-        f"tail_excess_{unit}": tail and tail.excess,
-        "tail_rate_per_h": tail and tail.rate,
-        "tail_maxima": tail and tail.count,
-        "hours": tail and tail.hours,
-    }
-
-
 def thresholds_record(
     thresholds: Thresholds, counted: Sequence[CountedAlarms], checks: Sequence[ThresholdDetection]
 ) -> dict[str, Any]:
-    """All of it for machines."""
+    """All of it for machines, the unit in the names."""
+    rows = []
+    for shown, of, level, one in thresholds.named:
+        unit, tail, joint = of.replace("·", ""), one.tail, shown.startswith("J")
+        row = {
+            "joint" if joint else "axis": int(shown[1:]) if joint else shown,
+            f"threshold_{unit}": None if isnan(level) else level,
+            f"interval_{unit}": list(one.interval),
+            "rate_per_h": one.rate,
+            "log": one.log,
+            f"tail_from_{unit}": tail and tail.start,
+            f"tail_excess_{unit}": tail and tail.excess,
+            "tail_rate_per_h": tail and tail.rate,
+            "tail_maxima": tail and tail.count,
+            "hours": tail and tail.hours,
+        }
+        rows.append(row)
     count, axes = len(thresholds.joints), len(thresholds.axes)
-    rows = [threshold_row(*each) for each in thresholds.named]
     return {
         "rate_per_h": thresholds.rate,
         "joints": rows[:count],
@@ -152,6 +126,18 @@ def thresholds_record(
 
 def check_record(check: ThresholdDetection) -> dict[str, Any]:
     """A check for machines."""
+    contacts = [
+        {
+            "number": number,
+            "start_s": contact.start,
+            "stop_s": contact.stop,
+            "peak_force_N": contact.peak_force,
+            "delay_s": contact.delay,
+            "by": contact.by or None,
+            "alarm_was_on": contact.already_above,
+        }
+        for number, contact in enumerate(check.contacts, start=1)
+    ]
     return {
         "log": check.log,
         "reference": check.reference,
@@ -162,18 +148,7 @@ def check_record(check: ThresholdDetection) -> dict[str, Any]:
         "largest_missed_N": check.largest_missed,
         "false_alarms": check.false_alarms,
         "untouched_h": check.untouched_h,
-        "contacts": [
-            {
-                "number": number,
-                "start_s": contact.start,
-                "stop_s": contact.stop,
-                "peak_force_N": contact.peak_force,
-                "delay_s": contact.delay,
-                "by": contact.by or None,
-                "alarm_was_on": contact.already_above,
-            }
-            for number, contact in enumerate(check.contacts, start=1)
-        ],
+        "contacts": contacts,
         "remarks": list(check.remarks),
     }
 
@@ -196,19 +171,18 @@ def are_known(thresholds: Sequence[SignalThreshold]) -> bool:
 
 def lower(thresholds: Sequence[SignalThreshold]) -> list[float]:
     """The thresholds themselves: what is beyond is a contact. [N·m, N]"""
-    return rounded_up(one.value for one in thresholds)
+    # Rounding down would raise more alarms.
+    return [ceil(one.value * SHARES) / SHARES for one in thresholds]
 
 
 def upper(thresholds: Sequence[SignalThreshold]) -> list[float]:
-    """The upper ends of their intervals, where the robot stops. [N·m, N]"""
-    return rounded_up(
-        one.value if isnan(one.interval[1]) else one.interval[1] for one in thresholds
-    )
+    """The upper ends of their intervals, where they are known: there the robot stops. [N·m, N]"""
+    ends = ((one, one.interval[1]) for one in thresholds)
+    return lower([one if isnan(end) else one._replace(value=end) for one, end in ends])
 
 
-def rounded_up(values: Iterable[float]) -> list[float]:
-    """Thresholds as a call states them; rounding down would raise more alarms."""
-    return [ceil(value * SHARES) / SHARES for value in values]
+#: Side of a threshold → its numbers as a call has them.
+SIDES = {"lower": lower, "upper": upper}
 
 
 def doubt(thresholds: Thresholds) -> str:
@@ -219,24 +193,23 @@ def doubt(thresholds: Thresholds) -> str:
 
 def libfranka_call(thresholds: Thresholds) -> str:
     """`set_collision_behavior` of pylibfranka; the C++ call has these four lists too."""
-    lists = {
-        "lower_torque_thresholds": lower(thresholds.joints),
-        "upper_torque_thresholds": upper(thresholds.joints),
-        "lower_force_thresholds": lower(thresholds.axes),
-        "upper_force_thresholds": upper(thresholds.axes),
-    }
-    lines = [f"    {values},  # {name}\n" for name, values in lists.items()]
+    lines = [
+        f"    {rounded(ones)},  # {side}_{quantity}_thresholds\n"
+        for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
+        for side, rounded in SIDES.items()
+    ]
     return f"{doubt(thresholds)}robot.set_collision_behavior(\n{''.join(lines)})\n"
 
 
 def franka_ros_parameters(thresholds: Thresholds) -> str:
     """`collision_config` of franka_control_node.yaml."""
-    each = (("torque", thresholds.joints), ("force", thresholds.axes))
-    lines = [doubt(thresholds), "collision_config:\n"]
-    for (quantity, ones), phase in product(each, ("acceleration", "nominal")):
-        lines.append(f"  lower_{quantity}_thresholds_{phase}: {lower(ones)}\n")
-        lines.append(f"  upper_{quantity}_thresholds_{phase}: {upper(ones)}\n")
-    return "".join(lines)
+    lines = [
+        f"  {side}_{quantity}_thresholds_{phase}: {rounded(ones)}\n"
+        for quantity, ones in (("torque", thresholds.joints), ("force", thresholds.axes))
+        for phase in ("acceleration", "nominal")
+        for side, rounded in SIDES.items()
+    ]
+    return "".join([doubt(thresholds), "collision_config:\n", *lines])
 
 
 def ur_script(thresholds: Thresholds) -> str:
