@@ -14,7 +14,7 @@ from vftcli.identification.result import Identification, Trace
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal
+from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
 from vftcli.outputs.paper import Drawing, figure_files, write_figures
@@ -111,8 +111,16 @@ def render_identification(
         "Identified numbers": parameter_grid(found),
         "Friction models compared": shape_choice_grid(found.shape_choices),
     }
-    if found.base is not None:
-        grids[f"Base parameters ({len(found.base)})"] = base_grid(found.base)
+    if (base := found.base) is not None:
+        columns = {
+            "parameter": Column("parameter", words=True),
+            "value": Column("value (SI)", form=signed),
+            "sd": Column("sd", form=signed),
+            "determined": Column("determined"),
+        }
+        above = "Weighted least squares, before physical consistency"
+        rows = base.iter_rows(named=True)
+        grids[f"Base parameters ({len(base)})"] = keyed_grid(columns, rows, above)
     traces = [(trace, SPARE[k % len(SPARE)]) for k, trace in enumerate(found.traces)]
     return page(
         "identification.html",
@@ -143,12 +151,11 @@ def velocity_plot(
     sizes = np.concatenate([np.abs(t.residual[:, j]) for t, _ in coloured])
     # A few samples at reversals are far off; they are drawn at the edge.
     high = float(np.quantile(sizes, 0.995)) or 1.0
-    across, up = Span(-speed, speed), Span(-high, high)
-    scales, drawn = Scales(Box(height=180), across, up), []
+    scales, drawn = Scales(Box(height=180), Span(-speed, speed), Span(-high, high)), []
     for trace, colour in coloured:
         pick = np.unique(np.linspace(0, len(trace.motion.t) - 1, DOTS).astype(int))
         x = scales.across(trace.motion.dq[pick, j])
-        y = scales.up(np.clip(trace.residual[pick, j], *up))
+        y = scales.up(np.clip(trace.residual[pick, j], -high, high))
         # One path of strokes without length: 600 circles a log and joint would make a slow page.
         dots = (polyline(dot[None]) for dot in np.column_stack([x, y]))
         drawn.append((colour, "".join(dots)))
@@ -165,18 +172,15 @@ def torque_charts(found: Identification) -> tuple[Chart, ...]:
     """Measured and predicted torque of one log, and what is left."""
     if not found.traces:
         return ()
-    trace, n = shown_trace(found), found.robot.joints
+    trace, units = shown_trace(found), ("N·m",) * found.robot.joints
     measured = ChartLine("measured", trace.measured)
     predicted = ChartLine("predicted", trace.predicted, SPARE[1], "5 2")
     panels, families = joint_panels(trace.measured), families_of(found.robot.limits.tau_max)
-    left = ChartLine("measured − predicted", trace.residual)
-    return tuple(
-        Chart(key, title, ("N·m",) * n, panels, trace.motion.t, lines, families=families)
-        for key, title, lines in (
-            ("torque", "Drive torque, filtered", (measured, predicted)),
-            ("left", "Measured − predicted", (left,)),
-        )
+    left, lines = ChartLine("measured − predicted", trace.residual), (measured, predicted)
+    chart = Chart(
+        "torque", "Drive torque, filtered", units, panels, trace.motion.t, lines, families
     )
+    return chart, chart._replace(key="left", title="Measured − predicted", series=(left,))
 
 
 def identification_figures(found: Identification) -> dict[str, Drawing]:
@@ -184,21 +188,17 @@ def identification_figures(found: Identification) -> dict[str, Drawing]:
     drawings = {}
     if found.traces:
         name = shown_trace(found).motion.recording.name
-        plots = plots_of(torque_charts(found)[0])
-        drawings["torque"] = Drawing(
-            f"{name}: drive torque, filtered, measured and predicted",
-            partial(line_figure, plots=plots),
-        )
+        title = f"{name}: drive torque, filtered, measured and predicted"
+        draw = partial(line_figure, plots=plots_of(torque_charts(found)[0]))
+        drawings["torque"] = Drawing(title, draw)
     # The last number of a row of the table is the mean.
     rows = [DotRow(str(name), np.array(v[:-1])) for name, *v in residual_grid(found).rows]
     if rows:
         joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
         plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
         paints = {row.name: SPARE[k % len(SPARE)] for k, row in enumerate(rows)}
-        drawings["residuals"] = Drawing(
-            "RMS of the measured less the predicted torque",
-            partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)"),
-        )
+        draw = partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)")
+        drawings["residuals"] = Drawing("RMS of the measured less the predicted torque", draw)
     return drawings
 
 
@@ -212,18 +212,13 @@ def residual_grid(found: Identification) -> Grid:
     """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
     # The place in the command distinguishes two logs of one label.
     keys = ("log_index", "log", "role", "model")
-    rows: list[tuple[Entry, ...]] = []
+    rows: list[Sequence[Entry]] = []
     for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
         values = part["rms_Nm"].to_list()
         rows.append((", ".join(map(str, names)), *values, sum(values) / len(values)))
-    numbers = (*joint_columns(found.robot.joints), Column("mean"))
-    return Grid(
-        columns=(
-            Column("residual rms [N·m]", words=True, width=44),
-            *(column._replace(form=".3f", width=6) for column in numbers),
-        ),
-        rows=tuple(rows),
-    )
+    first = Column("residual rms [N·m]", words=True, width=44)
+    joints = joint_columns(found.robot.joints, form=".3f", width=6)
+    return Grid((first, *joints, Column("mean", form=".3f", width=6)), rows)
 
 
 def parameter_grid(found: Identification) -> Grid:
@@ -250,23 +245,9 @@ def known_form(form: str) -> Callable[[float], str]:
 
 def shape_choice_grid(choices: pl.DataFrame) -> Grid:
     """Friction models' errors on stretches left out of the fit."""
-    return Grid(
-        title="RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen",
-        columns=(Column("friction", words=True), *map(Column, ("joint", "RMS [N·m]", ""))),
-        rows=tuple(
-            (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
-            for r in choices.iter_rows(named=True)
-        ),
-    )
-
-
-def base_grid(base: pl.DataFrame) -> Grid:
-    """Base parameters as the least squares gave them."""
-    columns = {
-        "parameter": Column("parameter", words=True),
-        "value": Column("value (SI)", form=signed),
-        "sd": Column("sd", form=signed),
-        "determined": Column("determined"),
-    }
-    title = "Weighted least squares, before physical consistency"
-    return keyed_grid(columns, base.iter_rows(named=True), title)
+    rows = [
+        (r["friction"], f"J{r['joint']}", r["cv_rms_Nm"], "chosen" if r["chosen"] else "")
+        for r in choices.iter_rows(named=True)
+    ]
+    title = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
+    return Grid((*words("friction"), *map(Column, ("joint", "RMS [N·m]", ""))), rows, title)
