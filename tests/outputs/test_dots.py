@@ -3,8 +3,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vftcli.outputs.paper import paper_style
-from vftcli.outputs.plots import DotPlot, DotRow, dot_figure
+from vftcli.outputs.paper import DotPlot, dot_figure, paper_style
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 
@@ -13,7 +12,7 @@ LARGE, SMALL = np.array([5.0, 2.0]), np.array([0.4, np.nan])
 
 def plot(title: str = "a.csv", joints: tuple[str, ...] = ("J1", "J2")) -> DotPlot:
     """Two observers on two joints; the second's number on J2 is not known."""
-    rows = [DotRow("gmo", LARGE, 0.9 * LARGE, 1.2 * LARGE), DotRow("best", SMALL)]
+    rows = [("gmo", LARGE, np.outer((0.9, 1.2), LARGE)), ("best", SMALL, None)]
     return DotPlot(title, joints, rows, np.array([0.5, np.nan]))
 
 
@@ -47,7 +46,7 @@ def test_observers_are_told_apart_without_colour() -> None:
 
 
 def test_numbers_of_one_size_stand_on_an_axis_from_zero() -> None:
-    alone = plot()._replace(rows=[DotRow("gmo", LARGE)], floor=np.full(2, np.nan))
+    alone = plot()._replace(rows=[("gmo", LARGE, None)], floor=np.full(2, np.nan))
     (axes,) = drawn([alone]).axes
     assert axes.get_yscale() == "linear"
     assert axes.get_ylim()[0] == 0.0

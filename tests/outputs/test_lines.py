@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from vftcli.outputs.charts import DASHES, INK, QUIET, REFERENCE, SPARE, Chart, ChartLine
-from vftcli.outputs.paper import paper_style
-from vftcli.outputs.plots import Plot, line_figure, plots_of
+from vftcli.outputs.paper import Plot, line_figure, paper_style, plots_of
 
 pytest.importorskip("matplotlib", reason="no figure is drawn without matplotlib")
 

@@ -30,8 +30,7 @@ from vftcli.outputs.grid import (
     json_rows,
 )
 from vftcli.outputs.page.shell import page
-from vftcli.outputs.paper import Drawing, figure_files, write_figures
-from vftcli.outputs.plots import NARROW, line_figure, plots_of
+from vftcli.outputs.paper import NARROW, Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.quantity import counted
 from vftcli.outputs.run_record import (
     envelope,

@@ -27,19 +27,16 @@ from vftcli.outputs.page.log_charts import (
     wrench_chart,
 )
 from vftcli.outputs.paper import (
-    WIDTHS,
-    Drawing,
-    figure_files,
-    paper_style,
-    write_figures,
-)
-from vftcli.outputs.plots import (
     NARROW,
+    WIDTHS,
     DotPlot,
-    DotRow,
+    Drawing,
     dot_figure,
+    figure_files,
     line_figure,
+    paper_style,
     plots_of,
+    write_figures,
 )
 from vftcli.robots.robot_file import lines_of
 from vftcli.signals.errors import ParameterError
@@ -201,7 +198,7 @@ def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     plots = [error_plot(rows) for rows in groups]
     if not 0 < len(plots) <= MOST:
         return {}
-    paints = colours_of_names(list(dict.fromkeys(r.name for plot in plots for r in plot.rows)))
+    paints = colours_of_names(list(dict.fromkeys(row[0] for plot in plots for row in plot.rows)))
     title = "RMSE of the external torque with its 95 % interval"
     draw = partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)")
     return {"errors": Drawing(title, draw)}
@@ -211,14 +208,10 @@ def error_plot(rows: "pl.DataFrame") -> DotPlot:
     """The rows of one log and reference as dots."""
     import polars as pl
 
-    found = block(rows)
-    low, high = (
-        block(rows.with_columns(rmse_Nm=pl.col(end))).rmse
-        for end in ("rmse_low_Nm", "rmse_high_Nm")
-    )
-    dots = zip(found.observers, found.rmse, low, high, strict=True)
-    title = f"{found.recording}, {found.reference}"
-    return DotPlot(title, found.joint_heads, [DotRow(*row) for row in dots], found.floor)
+    found, ends = block(rows), ("rmse_low_Nm", "rmse_high_Nm")
+    intervals = np.stack([block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ends], 1)
+    dots = list(zip(found.observers, found.rmse, intervals, strict=True))
+    return DotPlot(f"{found.recording}, {found.reference}", found.joint_heads, dots, found.floor)
 
 
 def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:

@@ -17,8 +17,15 @@ from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
-from vftcli.outputs.paper import Drawing, figure_files, write_figures
-from vftcli.outputs.plots import DotPlot, DotRow, dot_figure, line_figure, plots_of
+from vftcli.outputs.paper import (
+    DotPlot,
+    Drawing,
+    dot_figure,
+    figure_files,
+    line_figure,
+    plots_of,
+    write_figures,
+)
 from vftcli.outputs.quantity import DASH, counted, signed
 from vftcli.outputs.run_record import (
     CONVENTIONS,
@@ -192,11 +199,11 @@ def identification_figures(found: Identification) -> dict[str, Drawing]:
         draw = partial(line_figure, plots=plots_of(torque_charts(found)[0]))
         drawings["torque"] = Drawing(title, draw)
     # The last number of a row of the table is the mean.
-    rows = [DotRow(str(name), np.array(v[:-1])) for name, *v in residual_grid(found).rows]
+    rows = [(str(name), np.array(v[:-1]), None) for name, *v in residual_grid(found).rows]
     if rows:
         joints = [f"J{j}" for j in range(1, found.robot.joints + 1)]
         plot = DotPlot(found.robot.name, joints, rows, np.full(len(joints), np.nan))
-        paints = {row.name: SPARE[k % len(SPARE)] for k, row in enumerate(rows)}
+        paints = {name: SPARE[k % len(SPARE)] for k, (name, *_) in enumerate(rows)}
         draw = partial(dot_figure, plots=[plot], paints=paints, label="Residual rms (N·m)")
         drawings["residuals"] = Drawing("RMS of the measured less the predicted torque", draw)
     return drawings

@@ -1,4 +1,4 @@
-"""Look and files of a figure for a paper: widths, type, equal bytes.
+"""Figures for a paper: their look and files, lines of the page's charts, dots of many numbers.
 
 Nothing here loads matplotlib before a figure is drawn; it is an extra (``vftcli[figures]``).
 """
@@ -9,12 +9,18 @@ from contextlib import contextmanager
 from itertools import product
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
+from vftcli.outputs.charts import INK, QUIET, REFERENCE, Chart, ChartLine, drawn_line
+from vftcli.outputs.error_tables import DAGGER
 from vftcli.outputs.files import OutputFolder
+from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
 from vftcli.signals.version import VERSION
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from numpy.typing import NDArray
 
@@ -25,22 +31,14 @@ RESOLUTION = 600  #: Of PNG: what the IEEE asks of drawings in black and white. 
 #:
 #: PDF embeds it as TrueType; SVG holds its letters as paths, which need no font. A dollar sign in a
 #: log's name is a dollar sign.
-STYLE = {
+STYLE: dict[str, Any] = {
     "font.family": ["STIXGeneral", "DejaVu Sans"],
     "font.size": 8.0,
     "axes.labelsize": 8.0,
     "axes.titlesize": 8.0,
-    "xtick.labelsize": 7.0,
-    "ytick.labelsize": 7.0,
     "legend.fontsize": 7.0,
     "text.parse_math": False,
     "axes.linewidth": 0.5,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
-    "xtick.major.width": 0.5,
-    "ytick.major.width": 0.5,
-    "xtick.minor.width": 0.3,
-    "ytick.minor.width": 0.3,
     "lines.linewidth": 0.8,
     "legend.frameon": False,
     "legend.handlelength": 2.4,
@@ -54,10 +52,45 @@ STYLE = {
     "svg.fonttype": "path",
     "svg.hashsalt": "vftcli",
 }
+TICKS = {"labelsize": 7.0, "direction": "in", "major.width": 0.5, "minor.width": 0.3}
+STYLE |= {f"{axis}tick.{key}": value for axis in "xy" for key, value in TICKS.items()}
 
 #: Width of a letter in a legend, of a line's sample beside it, and height of its lines. [in]
 LETTER, SAMPLE, LINE = 0.043, 0.41, 0.15
 LONGEST = 44  #: Letters of a name in a figure; the end of a longer one is cut off.
+#: Stretches of a line in one plot, two samples each: finer than a printer tells in two inches.
+STRETCHES = 500
+#: Below this width a figure is one column wide [in]; height of a row of plots, by whether it is
+#: wide. [in]
+NARROW, HIGH = 5.0, {False: 0.95, True: 1.15}
+#: Marks in turn: their shapes differ, for print without colours.
+MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
+#: Width of a digit of a contact's number, and room between two numbers: where there is less, the
+#: second is left out. [in]
+DIGIT, BETWEEN = 0.046, 0.02
+SPREAD = 0.66  #: Share of a joint's room that its dots take.
+RANGE = 10.0  #: Numbers that differ by more than this factor stand on a logarithmic axis.
+PLOTTED = 0.75  #: About which share of a plot's room its axes take.
+AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
+
+Look = dict[str, Any]  #: What matplotlib draws with.
+BAND_LOOK: Look = {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
+#: Where the number of a contact stands above a plot.
+ABOVE: Look = {
+    "xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points",
+    "ha": "center", "va": "bottom", "fontsize": 6.5,
+}  # fmt: skip
+#: Where the label of an axis hangs in a place without a plot.
+BELOW: Look = {
+    "xycoords": "axes fraction", "xytext": (0, -12), "textcoords": "offset points",
+    "ha": "center", "va": "top",
+}  # fmt: skip
+WHISKER_LOOK: Look = {"elinewidth": 0.6, "capsize": 1.4, "capthick": 0.6}
+CONTACT_LOOK: Look = {"facecolor": "0.9", "linewidth": 0.0}
+#: Colours of the page that follow its theme → theirs on white paper.
+PAINTS = {INK: "black", REFERENCE: "0.65"}
+#: Dashes of the page → those on paper, where they are too much like others.
+PAPER_DASHES = {"4 2": "9 3 2 3 2 3"}
 
 
 class Drawing(NamedTuple):
@@ -81,10 +114,17 @@ def write_figures(
     form: str,
     before: str = "figures/",
 ) -> None:
-    """Write figures in both widths."""
+    """Write figures in both widths, without date and machine, so that their bytes stay equal."""
+    maker = f"vftcli {VERSION}"
+    own: dict[str, dict[str, str | None]] = {
+        "pdf": {"Creator": maker, "CreationDate": None},
+        "svg": {"Creator": maker, "Date": None},
+        "png": {"Software": maker},
+    }
     for (name, drawing), (width, inches) in product(drawings.items(), WIDTHS.items()):
+        path = folder / f"{before}{name}-{width}.{form}"
+        about = {"Title": printable(drawing.title)} | own[form]
         with paper_style():
-            path, about = folder / f"{before}{name}-{width}.{form}", metadata(form, drawing.title)
             drawing.draw(inches).savefig(path, format=form, dpi=RESOLUTION, metadata=about)
 
 
@@ -97,17 +137,6 @@ def paper_style() -> Iterator[None]:
         # A log's name may hold letters that no font of a paper has.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         yield
-
-
-def metadata(form: str, title: str) -> dict[str, str | None]:
-    """A file's metadata: no date and no machine, so that its bytes stay equal."""
-    maker = f"vftcli {VERSION}"
-    own: dict[str, dict[str, str | None]] = {
-        "pdf": {"Creator": maker, "CreationDate": None},
-        "svg": {"Creator": maker, "Date": None},
-        "png": {"Software": maker},
-    }
-    return {"Title": printable(title)} | own[form]
 
 
 def sheet(
@@ -137,3 +166,233 @@ def shortened(name: str) -> str:
     """A name as a figure has room for it."""
     text = printable(name)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 1]}…"
+
+
+class Plot(NamedTuple):
+    """One plot of a figure."""
+
+    chart: Chart  #: What it is a panel of.
+    panel: int  #: Which, from 0.
+    #: A chart whose same panel is drawn over it with an axis of its own, or None.
+    over: Chart | None = None
+
+
+def plots_of(
+    chart: Chart, over: Chart | None = None, only: Sequence[int] | None = None
+) -> list[Plot]:
+    """Every panel of a chart, or only some, as plots."""
+    return [Plot(chart, j, over) for j in (range(len(chart.panels)) if only is None else only)]
+
+
+def line_figure(
+    width: float,
+    plots: Sequence[Plot],
+    *,
+    numbers: Mapping[int, float] | None = None,
+    marks: Mapping[str, tuple[Array, Array]] | None = None,
+    columns: int | None = None,
+    below: str | None = None,
+) -> "Figure":
+    """Plots row by row under one legend, in this width. [in]
+
+    Above the first row stand numbers at their times [s]; a name has a mark in each plot, across and
+    up, 2 × (n,). `columns` plots are beside one another, None for what fits; `below` is the name of
+    the horizontal axis, None for what its unit says.
+    """
+    wide = width > NARROW
+    usual = 2 if not wide else 4 if len(plots) > 6 else 3
+    columns = min(len(plots), columns or usual)
+    labels = legend_handles(plots, list(marks or ()))
+    figure, grid = sheet(width, len(plots), columns, HIGH[wide], labels)
+    if numbers:
+        figure.set_figheight(figure.get_figheight() + 0.12)
+    for k, (axes, plot) in enumerate(zip(grid, plots, strict=False)):
+        draw_plot(axes, plot, ends_row=(k + 1) % columns == 0)
+        axes.set_ylabel(f"{plot.chart.panels[plot.panel]} ({plot.chart.units[plot.panel]})")
+        last = k + columns >= len(grid)
+        if last or (k + columns < len(plots) and plots[k + columns].chart.unit != plot.chart.unit):
+            axes.set_xlabel(below or AXES[plot.chart.unit])
+        else:
+            axes.tick_params(labelbottom=False)
+        if numbers and k < columns:
+            write_numbers(axes, numbers, PLOTTED * width / columns)
+        for n, (x, y) in enumerate((marks or {}).values()):
+            axes.plot(x[plot.panel], y[plot.panel], **dot_look(n))
+    # A place without a plot has the numbers and the label of the axis above it.
+    for axes, plot in zip(grid[len(plots) :], plots[len(plots) - columns :], strict=False):
+        set_scale(axes, plot.chart)
+        axes.patch.set_visible(False)
+        axes.spines[:].set_visible(False)
+        axes.yaxis.set_visible(False)
+        # Numbers inside of the empty place take no room of their own.
+        axes.tick_params(which="both", bottom=False, labelbottom=False)
+        axes.tick_params(labeltop=True, pad=-10.0)
+        axes.annotate(below or AXES[plot.chart.unit], (0.5, 1.0), **BELOW)
+    figure.align_ylabels(list(grid[: len(plots)]))
+    return figure
+
+
+def draw_plot(axes: "Axes", plot: Plot, *, ends_row: bool = True) -> None:
+    """One panel with its contacts, bands and lines, and what is drawn over it."""
+    from matplotlib.ticker import MaxNLocator
+
+    chart, j = plot.chart, plot.panel
+    for start, stop in chart.spans:
+        axes.axvspan(start, stop, **CONTACT_LOOK)
+    if chart.band is not None and np.isfinite(chart.band[j]):
+        for sign in (1.0, -1.0):
+            axes.axhline(sign * chart.band[j], **BAND_LOOK)
+    for series in chart.series:
+        if series.shown:
+            t, y, halves = drawn_line(chart, series, j, STRETCHES)
+            for half, style in zip(halves, ribbon_looks(series), strict=False):
+                axes.fill_between(t, y - half, y + half, **style)
+            axes.plot(t, y, **look(series))
+    set_scale(axes, chart)
+    axes.set_ylim(*chart.ends(j))
+    axes.yaxis.set_major_locator(MaxNLocator(4))
+    if (over := plot.over) is not None:
+        right = axes.twinx()
+        draw_plot(right, Plot(over, j))
+        if ends_row:
+            right.set_ylabel(f"{over.title} ({over.units[j]})")
+        else:
+            right.tick_params(labelright=False)
+
+
+def set_scale(axes: "Axes", chart: Chart) -> None:
+    """The horizontal axis of a chart."""
+    from matplotlib.ticker import FormatStrFormatter, NullFormatter
+
+    if chart.log:
+        axes.set_xscale("log")
+        axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+        axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set_xlim(float(chart.x[0]), float(chart.x[-1]))
+
+
+def dot_look(k: int, paint: str = "black", edge: float = 0.7, fill: str = "white") -> Look:
+    """Look of the marks of one name: distinct by shape."""
+    shape = {"marker": MARKS[k % len(MARKS)], "markersize": 3.6, "markerfacecolor": fill}
+    return {"color": paint, "linestyle": "none", "markeredgewidth": edge, **shape}
+
+
+def ribbon_looks(series: ChartLine) -> tuple[Look, Look]:
+    """Looks of the band about a line: itself, and where no contact is listed."""
+    own = {"facecolor": look(series)["color"], "alpha": 0.25, "linewidth": 0.0}
+    return own, own | {"facecolor": "0.4"}
+
+
+def look(series: ChartLine) -> Look:
+    """Look of a line: dashes or width distinguish it in grey too."""
+    dashes = PAPER_DASHES.get(series.dash, series.dash).split()
+    return {
+        "color": PAINTS.get(series.colour, series.colour),
+        "linestyle": (0, tuple(0.6 * float(part) for part in dashes)) if dashes else "solid",
+        "linewidth": 1.8 if series.colour == REFERENCE else 0.9,
+        "solid_capstyle": "butt",
+    }
+
+
+def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any]:
+    """Everything that the legend names: lines, their ribbon, bands, contacts; alone, no line."""
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    found: dict[str, Any] = {}
+    charts = {id(c): c for plot in plots for c in (plot.chart, plot.over) if c is not None}
+    for chart in charts.values():
+        shown = [series for series in chart.series if series.shown]
+        found |= {shortened(series.name): Line2D([], [], **look(series)) for series in shown}
+        for series in shown:
+            if series.half is not None:
+                own, grey = ribbon_looks(series)
+                found["95 % band"] = Patch(**own)
+                if series.quiet is not None:
+                    found[QUIET] = Patch(**grey)
+        if chart.band is not None:
+            found[chart.band_label] = Line2D([], [], **BAND_LOOK)
+        if chart.spans:
+            found["contact"] = Patch(**CONTACT_LOOK)
+    for k, name in enumerate(marks):
+        found[f"{name}, chosen"] = Line2D([], [], **dot_look(k))
+    return found if len(found) > 1 else {}
+
+
+def write_numbers(axes: "Axes", numbers: Mapping[int, float], inches: float) -> None:
+    """Numbers of contacts above a plot of about this width, as far as they have room."""
+    start, stop = axes.get_xlim()
+    taken = -np.inf
+    for number, at in numbers.items():
+        half = 0.5 * DIGIT * len(str(number)) * (stop - start) / inches
+        if at - half >= taken:
+            axes.annotate(str(number), (at, 1.0), **ABOVE)
+            taken = at + half + BETWEEN * (stop - start) / inches
+
+
+class DotPlot(NamedTuple):
+    """One plot."""
+
+    title: str  #: Which log.
+    joints: Sequence[str]  #: Names below. (n,)
+    #: Name, numbers (n,), NaN where not known, and both ends of their intervals (2, n) or None.
+    rows: Sequence[tuple[str, Array, Array | None]]
+    floor: Array  #: The reference's own error, NaN where it is not known. (n,)
+
+
+def dot_figure(
+    width: float, plots: Sequence[DotPlot], paints: Mapping[str, str], label: str
+) -> "Figure":
+    """Plots under one legend, their logs' names above them where there are several.
+
+    `paints` has the colour of every row by its name; `label` is the vertical axis with its unit.
+    """
+    from matplotlib.lines import Line2D
+
+    columns = 1 if width <= NARROW or len(plots) == 1 else 2
+    # Every second name is hollow.
+    looks = {
+        name: dot_look(k, paint, 0.8, "white" if k % 2 else paint)
+        for k, (name, paint) in enumerate(paints.items())
+    }
+    handles: dict[str, Any] = {shortened(n): Line2D([], [], **how) for n, how in looks.items()}
+    if any(np.isfinite(plot.floor).any() for plot in plots):
+        handles["floor of the reference"] = Line2D([], [], color="black", linewidth=1.2)
+    figure, grid = sheet(width, len(plots), columns, 1.7 if len(plots) == 1 else 1.45, handles)
+    for axes, plot in zip(grid, plots, strict=False):
+        draw_dots(axes, plot, looks)
+        axes.set_ylabel(label)
+        doubtful = any(DAGGER in joint for joint in plot.joints)
+        axes.set_xlabel(f"Joint{f' ({DAGGER} rests: reference not to be trusted)' * doubtful}")
+        if len(plots) > 1:
+            axes.set_title(shortened(plot.title), fontsize=7.0, pad=3.5)
+    for axes in grid[len(plots) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def draw_dots(axes: "Axes", plot: DotPlot, looks: Mapping[str, Look]) -> None:
+    """The dots of one log, side by side at each joint, and the floor below them."""
+    from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+    places = np.arange(len(plot.joints), dtype=np.float64)
+    step = SPREAD / max(len(plot.rows), 1)
+    axes.hlines(plot.floor, places - 0.42, places + 0.42, color="black", linewidth=1.2)
+    for k, (name, values, ends) in enumerate(plot.rows):
+        across, whiskers = places + step * (k - 0.5 * (len(plot.rows) - 1)), None
+        if ends is not None:
+            # An interval of resampled errors need not hold the error itself.
+            whiskers = np.nan_to_num(np.maximum([values - ends[0], ends[1] - values], 0.0))
+        axes.errorbar(across, values, yerr=whiskers, **WHISKER_LOOK, **looks[name])
+    axes.set_xticks(places, list(plot.joints))
+    axes.set_xlim(-0.5, len(places) - 0.5)
+    axes.tick_params(axis="x", length=0.0)
+    shown = np.concatenate([plot.floor, *(values for _, values, _ in plot.rows)])
+    shown = shown[np.isfinite(shown)]
+    if shown.size and shown.min() > 0.0 and shown.max() > RANGE * shown.min():
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter(FormatStrFormatter("%g"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
+    else:
+        axes.set_ylim(bottom=0.0)

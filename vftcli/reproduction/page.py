@@ -10,8 +10,7 @@ import numpy as np
 from vftcli.outputs.files import SEAL, OutputFolder
 from vftcli.outputs.grid import Column, Grid, GridCell, markdown
 from vftcli.outputs.page.shell import page
-from vftcli.outputs.paper import Drawing, figure_files, write_figures
-from vftcli.outputs.plots import line_figure, plots_of
+from vftcli.outputs.paper import Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.quantity import DASH, minus, significant
 from vftcli.outputs.run_record import envelope, seal
 from vftcli.reproduction.jobs import Job
