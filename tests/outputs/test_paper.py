@@ -74,7 +74,7 @@ def test_a_png_has_600_dots_an_inch_and_an_svg_needs_no_font(tmp_path: Path) -> 
 
 @pytest.mark.slow
 def test_a_command_without_figures_loads_no_matplotlib(loaded) -> None:
-    rooms = ("log.figures", "admittance", "identification", "log.report")
+    rooms = ("figures", "admittance", "identification", "report")
     modules = (f"vftcli.outputs.{room}" for room in rooms)
     assert "matplotlib" not in loaded(", ".join(("vftcli.cli.report", *modules)))
 
