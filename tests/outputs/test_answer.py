@@ -7,7 +7,7 @@ import pytest
 from contact_rows import contact, contact_list
 
 from vftcli.contacts.contact_list import CarriedLoad, Unexplained
-from vftcli.outputs.answer import answer, direction, hardest_words, place_words, reason
+from vftcli.outputs.contacts import answer, direction, hardest_words, place_words, reason
 from vftcli.signals.remarks import caution
 
 

@@ -10,7 +10,6 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.doctor.examination import in_words
 from vftcli.doctor.fit import RobotMatch
-from vftcli.outputs.answer import otherwise
 from vftcli.outputs.believability import (
     Ground,
     grounds,
@@ -19,6 +18,7 @@ from vftcli.outputs.believability import (
     joint_words,
     resting,
 )
+from vftcli.outputs.contacts import otherwise
 from vftcli.outputs.screen import facts
 from vftcli.robots import load_robot
 from vftcli.robots.friction import dry_friction

@@ -5,8 +5,13 @@ import io
 
 from contact_rows import contact, contact_list
 
-from vftcli.outputs.answer import answer
-from vftcli.outputs.contacts import contact_grid, contacts_csv, contacts_record, hardest_rows
+from vftcli.outputs.contacts import (
+    answer,
+    contact_grid,
+    contacts_csv,
+    contacts_record,
+    hardest_rows,
+)
 from vftcli.outputs.run_record import jsonable
 from vftcli.signals.remarks import caution
 

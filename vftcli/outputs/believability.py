@@ -15,7 +15,7 @@ from vftcli.analysis import Analysis
 from vftcli.doctor.examination import REFUSING, in_words
 from vftcli.doctor.fit import RobotMatch
 from vftcli.evaluation.errors import joint_means
-from vftcli.outputs.answer import answer, free_words, hardest_words
+from vftcli.outputs.contacts import answer, free_words, hardest_words
 from vftcli.outputs.quantity import DASH, counted, percent
 from vftcli.robots import PROFILES
 from vftcli.robots.friction import dry_friction

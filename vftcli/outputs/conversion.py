@@ -20,8 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.answer import beginning, contact_name
-from vftcli.outputs.contacts import contacts_record
+from vftcli.outputs.contacts import beginning, contact_name, contacts_record
 from vftcli.outputs.files import atomic, check_file, table_file
 from vftcli.outputs.run_record import jsonable
 from vftcli.readers.bags.ros_messages import (

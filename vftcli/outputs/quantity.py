@@ -40,9 +40,9 @@ def at_least_shown(force: float) -> str:
     return f"{force:.0f} N" if force >= 0.95 else f"{force:.1g} N"
 
 
-def ranged(low: float, high: float) -> str:
+def ranged(low: float, high: float, unit: str = " N") -> str:
     """Between which forces something lies. [N]"""
-    return f"{low:.0f}–{high:.0f} N"
+    return f"{low:.0f}–{high:.0f}{unit}"
 
 
 def counted(count: int, noun: str) -> str:

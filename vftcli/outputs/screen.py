@@ -14,7 +14,6 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
-from vftcli.outputs.answer import answer, otherwise
 from vftcli.outputs.believability import (
     MARKS,
     Ground,
@@ -25,7 +24,7 @@ from vftcli.outputs.believability import (
     log_line,
     own_match,
 )
-from vftcli.outputs.contacts import MOST_ROWS, contact_grid, hardest_rows
+from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, otherwise
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
 from vftcli.outputs.grid import Column, Entry, Grid, GridCell, terminal

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.errors import JointMeans
-from vftcli.outputs.answer import hardest_words, otherwise
 from vftcli.outputs.believability import MARKS, LogSummary, grounds, headline, log_line
 from vftcli.outputs.charts import Chart
-from vftcli.outputs.contacts import by_force
+from vftcli.outputs.contacts import by_force, hardest_words, otherwise
 from vftcli.outputs.error_tables import (
     axis_grids,
     blocks,

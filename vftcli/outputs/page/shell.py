@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor import in_words
-from vftcli.outputs.answer import direction, force_size, place_words, reason
 from vftcli.outputs.charts import QUIET, Chart, ChartLine, LineStyle, Span, drawn_line
+from vftcli.outputs.contacts import direction, force_size, place_words, reason
 from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.quantity import at_least_shown, counted, minus, ranged
 from vftcli.signals.arrays import Array
