@@ -38,6 +38,14 @@ FEWEST = 6  #: Fewest stretches of one contact's line.
 LETTER = 7.5  #: Width of a letter: labels must not overlap.
 SIZE, EDGE = np.array([84.0, 64.0]), 9.0  #: Size of the arm's drawing, and margin.
 ARROW, HEAD = 20.0, 5.0  #: Arrow in the drawing's plane, and its head.
+#: Headings of the tables of contacts: vectors, and what follows them.
+VECTORS = ("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]")
+EVIDENCE = (
+    "log-likelihood ratio [nats]",
+    "margin of the place [nats]",
+    "vendor |F| [N]",
+    "sensor |F| [N]",
+)
 #: Headings of the table of what was computed on the log.
 COMPUTED = (
     "90 % of a step [ms]",
@@ -168,22 +176,21 @@ def arm_drawing(analysis: Analysis, contact: Contact) -> ArmDrawing:
     hit = [drawn[-1:] if link == 0 else drawn[link : link + 2] for link in contact.places]
     shaft: list[Array] = []
     if hit and contact.wrench is not None:
-        force = np.array([contact.wrench[:3] @ across, -contact.wrench[2]])
-        size = max(float(np.linalg.norm(contact.wrench[:3])), 1e-12)
-        shaft = arrow(np.vstack(hit).mean(axis=0), force / size)
+        force = contact.wrench[:3]
+        direction = np.array([force @ across, -force[2]]) / max(float(np.linalg.norm(force)), 1e-12)
+        shaft = arrow(np.vstack(hit).mean(axis=0), direction)
     return ArmDrawing(SIZE, drawn, hit, shaft)
 
 
 def side_of(points: Array) -> Array:
     """Horizontal direction of the arm's farthest reach, to the right. (3,)"""
     flat = points[:, :2] - points[:, :2].mean(axis=0)
-    direction = np.linalg.svd(flat, full_matrices=False)[2][0]
-    # The arm reaches to the right; an upright one shows along y.
+    # An upright arm shows along y.
     if np.linalg.norm(flat) < 1e-9:
         return np.array([1.0, 0.0, 0.0])
-    if direction @ (points[-1, :2] - points[0, :2]) < 0:
-        direction = -direction
-    return np.append(direction, 0.0)
+    direction = np.linalg.svd(flat, full_matrices=False)[2][0]
+    reach = direction @ (points[-1, :2] - points[0, :2])
+    return np.append(-direction if reach < 0 else direction, 0.0)
 
 
 def arrow(tip: Array, direction: Array) -> list[Array]:
@@ -200,54 +207,30 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     """Moments, impulses, evidence and joint torques of every contact."""
     if not found.contacts:
         return ()
-    forces = ("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]")
-    rest = (
-        "log-likelihood ratio [nats]",
-        "margin of the place [nats]",
-        "vendor |F| [N]",
-        "sensor |F| [N]",
-    )
-    wrenches = Grid(
-        title="Wrench at the peak, base axes, the moment about the flange point",
-        columns=(Column("#"), *words(*forces), *map(Column, rest)),
-        rows=tuple(map(wrench_row, found.contacts)),
-    )
-    torques = Grid(
-        title="Joint torque at the peak in N·m, ± its standard deviation",
-        columns=(
-            Column("#"),
-            *joint_columns(len(found.contacts[0].joint_torque)),
-            Column("at rest"),
-        ),
-        rows=tuple(
-            (
-                str(c.number),
-                *(
-                    banded(tau, sd, ".2f", "")
-                    for tau, sd in zip(c.joint_torque, c.joint_torque_sd, strict=True)
-                ),
-                c.at_rest,
-            )
-            for c in found.contacts
-        ),
-    )
-    return wrenches, torques
-
-
-def wrench_row(contact: Contact) -> tuple[Entry, ...]:
-    """One contact's numbers."""
-    wrench, sd = contact.wrench, contact.wrench_sd
-    vectors: list[Array | None] = [None] * 4
-    if wrench is not None and sd is not None:
-        vectors = [wrench[:3], sd[:3], wrench[3:], sd[3:]]
-    vectors += [contact.mean_force, contact.impulse]
+    wrenches: list[Sequence[Entry]] = []
+    torques: list[Sequence[Entry]] = []
+    for c in found.contacts:
+        vectors: list[Array | None] = [None] * 4
+        if c.wrench is not None and c.wrench_sd is not None:
+            vectors = [c.wrench[:3], c.wrench_sd[:3], c.wrench[3:], c.wrench_sd[3:]]
+        shown = (None if v is None else vector(v) for v in (*vectors, c.mean_force, c.impulse))
+        rest = (c.evidence, c.lead, c.vendor_force, c.sensor_force)
+        wrenches.append((str(c.number), *shown, *rest))
+        each = zip(c.joint_torque, c.joint_torque_sd, strict=True)
+        torque = (banded(tau, sd, ".2f", "") for tau, sd in each)
+        torques.append((str(c.number), *torque, c.at_rest))
+    number, joints = Column("#"), joint_columns(len(found.contacts[0].joint_torque))
     return (
-        str(contact.number),
-        *(None if v is None else vector(v) for v in vectors),
-        contact.evidence,
-        contact.lead,
-        contact.vendor_force,
-        contact.sensor_force,
+        Grid(
+            (number, *words(*VECTORS), *map(Column, EVIDENCE)),
+            wrenches,
+            "Wrench at the peak, base axes, the moment about the flange point",
+        ),
+        Grid(
+            (number, *joints, Column("at rest")),
+            torques,
+            "Joint torque at the peak in N·m, ± its standard deviation",
+        ),
     )
 
 
@@ -292,41 +275,32 @@ def bias_grid(table: pl.DataFrame) -> Grid:
 
 def observers_view(analysis: Analysis) -> dict[str, Any]:
     """What each observer's parameters are and mean."""
-    heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
-    names = [observer.name for observer in analysis.observers]
-    rows: list[tuple[Entry, ...]] = []
-    for name in names:
+    rows: list[Sequence[Entry]] = []
+    used = {}
+    for observer in analysis.observers:
+        name, tuning = observer.name, analysis.tunings.get(observer.name)
         what = OBSERVERS[name].title if name in OBSERVERS else ""
-        tuning = analysis.tunings.get(name)
-        if tuning is None:
-            rows.append((name, what, *[None] * 5))
-            continue
-        columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
-        shown = (GridCell("", html=joint_values(column)) for column in columns)
-        rows.append((name, what, *shown, tuning.parameter_count))
-    grid = Grid(
-        title="What the parameters mean at this log's sample time; one value a joint where they "
-        "differ",
-        columns=(*words("observer", "What"), *map(Column, heads)),
-        rows=tuple(rows),
-        swatches=True,
+        meant: list[Entry] = [None] * 5
+        if tuning is not None:
+            columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
+            meant = [GridCell("", html=joint_values(column)) for column in columns]
+            meant.append(tuning.parameter_count)
+        rows.append((name, what, *meant))
+        # The record has parameters as JSON can hold them, also those of a wrapped observer.
+        used[name] = observer_record(observer, None)["parameters"]
+    heads = ("ω_n [rad/s]", "ζ", "delay [ms]", "−3 dB [Hz]", "to tune")
+    title = (
+        "What the parameters mean at this log's sample time; one value a joint where they differ"
     )
-    # The record has parameters as JSON can hold them, also those of a wrapped observer.
-    used = [observer_record(observer, None)["parameters"] for observer in analysis.observers]
-    return {
-        "grid": grid,
-        "names": ", ".join(names),
-        "parameters": dict(zip(names, used, strict=True)),
-    }
+    grid = Grid((*words("observer", "What"), *map(Column, heads)), rows, title, swatches=True)
+    return {"grid": grid, "names": ", ".join(used), "parameters": used}
 
 
 def joint_values(values: Array) -> str:
     """One number where all joints agree to three digits, else one line a run of equal joints."""
-    texts = [significant(float(value)) for value in values]
     # Compared as printed: values that look equal are one.
-    runs = [
-        (text, [j for j, _ in run]) for text, run in groupby(enumerate(texts, 1), itemgetter(1))
-    ]
+    texts = enumerate(map(significant, values.tolist()), 1)
+    runs = [(text, [j for j, _ in run]) for text, run in groupby(texts, itemgetter(1))]
     return part("parts/joint_values", runs)
 
 
@@ -335,54 +309,37 @@ def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:
     found = facts(analysis.observers, analysis.tunings, analysis.motion.log, analysis.errors)
     if not found:
         return ()
-    guide = Grid(
-        title="Which observer for what (Sec. IV-A)",
-        columns=words("For", "what decides", "best here", "the paper advises"),
-        rows=tuple(
-            (a.purpose, a.criterion, ", ".join(a.best) or DASH, a.paper) for a in advice(found)
-        ),
+    advised = [(a.purpose, a.criterion, ", ".join(a.best) or DASH, a.paper) for a in advice(found)]
+    heads = words("For", "what decides", "best here", "the paper advises")
+    rows: list[Sequence[Entry]] = []
+    for f in found:
+        numbers = map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse))
+        rows.append((f.name, *numbers, f.parameter_count))
+    columns = *words("observer"), *map(Column, COMPUTED)
+    return (
+        Grid(heads, advised, "Which observer for what (Sec. IV-A)"),
+        Grid(columns, rows, "Computed on this log", swatches=True),
     )
-    computed = Grid(
-        title="Computed on this log",
-        columns=(*words("observer"), *map(Column, COMPUTED)),
-        rows=tuple(
-            (
-                f.name,
-                *map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse)),
-                f.parameter_count,
-            )
-            for f in found
-        ),
-        swatches=True,
-    )
-    return guide, computed
 
 
 def beside_print(comparison: Comparison) -> Grid:
     """Printed and computed errors side by side."""
-    columns = words("observer")
-    # Print and computation stand side by side, joint by joint, or nobody compares them.
+    columns = list(words("observer"))
     for j in range(1, len(comparison.floor) + 1):
         columns += (Column(f"J{j} print", form=".2f"), Column("here"))
-    both = [
-        (name, np.column_stack([comparison.printed(name), comparison.ours[name]]).ravel())
-        for name in comparison.names
-    ]
-    return Grid(
-        title=f"RMSE in N·m: {comparison.published.title}",
-        columns=columns,
-        rows=tuple((name, *values.tolist()) for name, values in both),
-        swatches=True,
-    )
+    rows: list[Sequence[Entry]] = []
+    for name in comparison.names:
+        both = np.column_stack([comparison.printed(name), comparison.ours[name]])
+        rows.append((name, *both.ravel().tolist()))
+    return Grid(columns, rows, f"RMSE in N·m: {comparison.published.title}", swatches=True)
 
 
 def budget_grid(budgets: Sequence[Budget]) -> Grid:
     """Where every observer's error comes from, cause by cause. [N·m]"""
-    rows: list[tuple[Entry, ...]] = [
+    rows: list[Sequence[Entry]] = [
         (budget.name, cause, *map(float, values))
         for budget in budgets
         # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
         for cause, values in (*budget.parts.items(), ("all but stiction at rest", budget.total))
     ]
-    joints = joint_columns(len(budgets[0].total))
-    return Grid(columns=(*words("observer", "cause"), *joints), rows=tuple(rows))
+    return Grid((*words("observer", "cause"), *joint_columns(len(budgets[0].total))), rows)

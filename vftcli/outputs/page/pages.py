@@ -189,8 +189,7 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
 
 def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first; a click on a head sorts by it."""
-    rows = tuple(map(overview_row, sorted(lines, key=lambda line: line.rank)))
-    return Grid(columns=words(*HEADS), rows=rows)
+    return Grid(words(*HEADS), [*map(overview_row, sorted(lines, key=lambda line: line.rank))])
 
 
 def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
@@ -212,17 +211,17 @@ def render_batch(lines: Sequence[LogSummary], failures: "pl.DataFrame") -> str:
     touched = sum(line.contacts not in {DASH, "0", "load"} for line in lines)
     listed = sum(line.contacts != DASH for line in lines)
     count = failures.height
-    rows = tuple(
+    rows = [
         (*where, GridCell(line, html=part("parts/wrapped", line)))
         for *where, line in failures.select("log", "stage", "error", "line").iter_rows()
-    )
+    ]
     return page(
         "logs.html",
         f"{len(lines)} logs" + (f", {touched} of {listed} touched." if listed else "."),
         scripts=["sort.js"],
         eyebrow=(f"{len(lines) + count} logs", ", ".join(sorted({line.robot for line in lines}))),
         words=f"{counted(count, 'log')} could not be analysed." if count else "",
-        failures=Grid(columns=words("Log", "Stage", "Error", "Why"), rows=rows),
+        failures=Grid(words("Log", "Stage", "Error", "Why"), rows),
         count=count,
         overview=overview(lines),
     )
@@ -236,26 +235,21 @@ def batch_lines(table: "pl.DataFrame", pages: Mapping[str, str]) -> Iterator[Log
         return
     best = {str(log): least_error(joint_means(rows)) for (log,), rows in table.group_by("log")}
     for row in table.unique("log", keep="first", maintain_order=True).iter_rows(named=True):
-        yield batch_line(row, pages.get(row["log"], ""), best.get(row["log"], DASH))
-
-
-def batch_line(row: Mapping[str, Any], page: str, error: str) -> LogSummary:
-    """One log's line, from the first of its rows."""
-    force, band, count = row["hardest_N"], row["hardest_band_N"], row["contacts"]
-    hardest = DASH
-    if force is not None:
-        hardest = f"{banded(force, band)} at {row['hardest_s']:.1f} s"
-        hardest = hardest if force > band else f"unknown ({hardest})"
-    return LogSummary(
-        row["log"],
-        row["robot"],
-        row["duration_s"],
-        DASH if count is None else "load" if row["load"] else str(count),
-        hardest,
-        force or 0.0,
-        row["told_N"],
-        row["health"],
-        row["reason"],
-        page,
-        error,
-    )
+        force, band, count = row["hardest_N"], row["hardest_band_N"], row["contacts"]
+        hardest = DASH
+        if force is not None:
+            hardest = f"{banded(force, band)} at {row['hardest_s']:.1f} s"
+            hardest = hardest if force > band else f"unknown ({hardest})"
+        yield LogSummary(
+            row["log"],
+            row["robot"],
+            row["duration_s"],
+            DASH if count is None else "load" if row["load"] else str(count),
+            hardest,
+            force or 0.0,
+            row["told_N"],
+            row["health"],
+            row["reason"],
+            pages.get(row["log"], ""),
+            best.get(row["log"], DASH),
+        )
