@@ -5,9 +5,9 @@ readers without a script; with a script the plotting library draws the chosen on
 Of a long log the lowest and the highest sample of every stretch stay.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,6 +88,11 @@ class Chart(NamedTuple):
     unit: str = "s"  #: Unit of the horizontal axis.
     log: bool = False  #: Whether the horizontal axis is logarithmic.
     lowest: float | None = None  #: Least end of the vertical axis, None for what the lines need.
+
+    @classmethod
+    def of_one(cls, key: str, title: str, unit: str, x: Array, lines: Iterable[ChartLine]) -> Self:
+        """A chart of one panel, which has its title."""
+        return cls(key, title, (unit,), (title,), x, tuple(lines))
 
     def ends(self, panel: int) -> Span:
         """Ends of a panel's vertical axis, with some room: those of all panels of its family.

@@ -19,7 +19,7 @@ from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
-    legend_name,
+    reference_name,
     response_charts,
     spectra_chart,
     torque_chart,
@@ -125,9 +125,12 @@ def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "F
     spans = [(c.start, c.stop) for c in found.contacts if not c.is_load]
     clock = [*t] or [0.0, found.duration, *(at for span in spans for at in span)]
     ends = np.array([min(clock), max(clock)])
-    title, least = "Force on the robot", np.array([found.detectable_force or np.nan])
-    chart = Chart("force", title, ("N",), ("|F|",), ends, tuple(lines), band=least, spans=spans)
-    chart = chart._replace(band_label="detectable force", lowest=0.0)
+    chart = Chart.of_one("force", "|F|", "N", ends, lines)._replace(
+        band=np.array([found.detectable_force or np.nan]),
+        band_label="detectable force",
+        spans=spans,
+        lowest=0.0,
+    )
     return on_paper(partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found)))
 
 
@@ -164,7 +167,7 @@ def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> 
     if analysis.reference is not None:
         # Of a file only that it is one: its path has no room.
         kind = analysis.reference.name.split(":")[0]
-        plain[legend_name(analysis, "reference")] = f"reference ({kind})"
+        plain[reference_name(analysis)] = f"reference ({kind})"
     own = [line.name for line in chart.series if line.name in wanted]
     series = tuple(
         line._replace(

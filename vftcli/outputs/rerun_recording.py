@@ -25,7 +25,7 @@ from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
     condition_charts,
     estimate_lines,
-    legend_name,
+    reference_name,
     torque_chart,
     wrench_chart,
 )
@@ -120,7 +120,7 @@ def plot_groups(analysis: Analysis) -> dict[str, Iterable[Chart]]:
     lines = [line if line.name == last else line._replace(half=None) for line in found]
     bare = tuple(line._replace(half=None) for line in found)
     if reference is not None:
-        name = legend_name(analysis, "reference")
+        name = reference_name(analysis)
         lines.insert(0, ChartLine(name, reference.tau, REFERENCE))
     torque = torque_chart(analysis)._replace(series=tuple(lines))
     groups["Joint torques"] = (plot_of(torque, j, f"/tau_ext/J{j + 1}") for j in joints)
@@ -202,7 +202,7 @@ def force_plot(analysis: Analysis) -> Chart | None:
         if felt:
             when = np.array([c.peak for c in felt])
             lines.append(ChartLine("peaks", force[:, None], COLOURS[BEST], x=when))
-    return Chart("/force", title, ("N",), (title,), analysis.t, tuple(lines))
+    return Chart.of_one("/force", title, "N", analysis.t, lines)
 
 
 def span_lines(t: Array, found: ContactList, level: float) -> Iterator[ChartLine]:
@@ -239,11 +239,11 @@ def motion_plots(analysis: Analysis) -> Iterator[Chart]:
         ("/drive_torque", "drive torque", "N·m", drive_torque(recording, analysis.robot)),
     ):
         if values is not None:
-            lines = tuple(
+            lines = (
                 ChartLine(f"J{j + 1}", values[:, j : j + 1], SPARE[j % len(SPARE)])
                 for j in range(values.shape[1])
             )
-            yield Chart(key, title, (unit,), (title,), analysis.t, lines)
+            yield Chart.of_one(key, title, unit, analysis.t, lines)
 
 
 def summary(analysis: Analysis) -> str:

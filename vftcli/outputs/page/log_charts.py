@@ -97,7 +97,7 @@ def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
     if analysis.reference is None:
         return ()
     tau, moving = analysis.reference.tau, analysis.reference.moving
-    whole = ChartLine(legend_name(analysis, "reference"), tau, REFERENCE)
+    whole = ChartLine(reference_name(analysis), tau, REFERENCE)
     if moving is None or np.all(moving | ~np.isfinite(tau)):
         return (whole,)
     trusted = np.where(moving, tau, np.nan)
@@ -106,11 +106,10 @@ def reference_lines(analysis: Analysis) -> tuple[ChartLine, ...]:
     return (whole._replace(values=trusted), ChartLine(name, resting, "#8a94a0", "1.5 3"))
 
 
-def legend_name(analysis: Analysis, name: str) -> str:
-    """A series' name in the legend: the reference's says which it is."""
-    if name == "reference" and analysis.reference is not None:
-        return f"reference ({analysis.reference.name})"
-    return name
+def reference_name(analysis: Analysis) -> str:
+    """The reference in a legend, which says what it is."""
+    reference = analysis.reference
+    return f"reference ({reference.name})" if reference is not None else "reference"
 
 
 def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
@@ -121,7 +120,9 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
     step, n = analysis.recording.median_step, analysis.recording.joints
     frequency = np.geomspace(1e-2, 0.5 / step, FREQUENCIES)
     styles = observer_styles(analysis)
-    columns: tuple[list[ChartLine], ...] = ([], [], [])
+    lines: dict[tuple[str, str], list[ChartLine]] = {
+        ("Gain", "dB"): [], ("Phase", "°"): [], ("Delay", "ms"): []
+    }  # fmt: skip
     for observer in analysis.observers:
         response = observer.frequency_response(frequency, step, n)[:, :1]
         # Unwrapped, or a delay would jump by a period wherever the phase passes −180°.
@@ -129,14 +130,13 @@ def response_charts(analysis: Analysis) -> tuple[Chart, ...]:
         decibel = 20.0 * np.log10(np.maximum(np.abs(response), QUIETEST))
         # A phase of −φ degrees at f is a delay of φ / (360 f).
         delay = -1e3 * phase / (360.0 * frequency[:, None])
-        for column, values in zip(columns, (decibel, phase, delay), strict=True):
-            column.append(ChartLine(observer.name, values, *styles[observer.name]))
-    heads = (("Gain", "dB"), ("Phase", "°"), ("Delay", "ms"))
+        for own, values in zip(lines.values(), (decibel, phase, delay), strict=True):
+            own.append(ChartLine(observer.name, values, *styles[observer.name]))
     gain, *others = (
-        over_frequency(title.lower(), title, unit, frequency, lines)._replace(
+        over_frequency(title.lower(), title, unit, frequency, own)._replace(
             panels=(f"{title}, joint 1",)
         )
-        for (title, unit), lines in zip(heads, columns, strict=True)
+        for (title, unit), own in lines.items()
     )
     return gain._replace(lowest=LOWEST), *others
 
@@ -167,7 +167,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
             # Samples outside of every listed contact.
             lines[k] = line._replace(quiet=smoothed.unlisted(analysis.t))
     reference = [w for w in analysis.wrenches if w.name == "reference"]
-    below = [ChartLine(legend_name(analysis, w.name), w.known, REFERENCE) for w in reference]
+    below = [ChartLine(reference_name(analysis), w.known, REFERENCE) for w in reference]
     return Chart(
         "wrench",
         f"Wrench in {found[0].frame} axes",
@@ -186,39 +186,30 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     if sensed is None or not sensed.wrenches:
         return
     # σ_min and the mask follow from the pose: all observers share them.
-    first, least = sensed.wrenches[0], sensed.sensor.least_sigma
-    styles = observer_styles(analysis)
-
-    def chart(key: str, title: str, unit: str, lines: Sequence[ChartLine]) -> Chart:
-        """A chart of one panel."""
-        return Chart(key, title, (unit,), (title,), analysis.t, tuple(lines))
-
+    first, t, styles = sensed.wrenches[0], analysis.t, observer_styles(analysis)
     if first.sigma_min is not None:
         lines = [ChartLine("σ_min of J", first.sigma_min[:, None])]
-        yield chart("sigma_min", "What the pose can tell: σ_min", "m", lines)._replace(
-            band=np.array([least]), band_label="masked below", lowest=0.0
+        title, least = "What the pose can tell: σ_min", np.array([sensed.sensor.least_sigma])
+        yield Chart.of_one("sigma_min", title, "m", t, lines)._replace(
+            band=least, band_label="masked below", lowest=0.0
         )
     if sensed.hides:
         title = f"|force| by {sensed.sensor.solver} in the masked samples, not to be believed"
+        sizes = ((w, np.linalg.norm(w.values[:, :3], axis=1)) for w in sensed.wrenches)
         lines = [
-            ChartLine(
-                w.name,
-                np.where(w.hidden, np.linalg.norm(w.values[:, :3], axis=1), np.nan)[:, None],
-                *styles[w.name],
-            )
-            for w in sensed.wrenches
+            ChartLine(w.name, np.where(w.hidden, size, np.nan)[:, None], *styles[w.name])
+            for w, size in sizes
             if w.hidden.any()
         ]
-        yield chart("blow-up", title, "N", lines)
+        yield Chart.of_one("blow-up", title, "N", t, lines)
     if first.null_space is not None:
         lines = [
             ChartLine(w.name, w.null_space[:, None], *styles[w.name])
             for w in sensed.wrenches
             if w.null_space is not None
         ]
-        limit = sensed.null_space_limit
-        title = "Torque that no wrench at the flange explains"
-        yield chart("null_space", title, "N·m", lines)._replace(
+        limit, title = sensed.null_space_limit, "Torque that no wrench at the flange explains"
+        yield Chart.of_one("null_space", title, "N·m", t, lines)._replace(
             band=None if limit is None else np.array([limit]), band_label="free part"
         )
 
@@ -235,21 +226,18 @@ def refined_charts(analysis: Analysis) -> list[Chart]:
 
 def spectra_chart(found: Spectra) -> Chart:
     """Spectra of the raw disturbance over both parts of the log; 0 Hz is left out."""
-
-    def level(power: Array) -> Array:
-        """Power in decibels; the least number above 0 replaces zero."""
-        decibels: Array = 10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
-        return decibels
-
-    free = level(found.free)
+    # In decibels; the least number above 0 replaces zero.
+    free, loaded = (
+        10.0 * np.log10(np.maximum(power[1:], np.finfo(float).tiny))
+        for power in (found.free, found.loaded)
+    )
     lines = (
         ChartLine("free part, S_n", free, FREE),
-        ChartLine("loaded part, S_d", level(found.loaded), LOADED, "5 2"),
+        ChartLine("loaded part, S_d", loaded, LOADED, "5 2"),
     )
     title = "Spectrum of the disturbance, dB of 1 (N·m)²/Hz"
-    families = (1,) * free.shape[1]
     chart = over_frequency("spectra", title, "dB", found.frequency[1:], lines)
-    return chart._replace(families=families)
+    return chart._replace(families=(1,) * free.shape[1])
 
 
 def tuning_chart(curves: Mapping[str, Curve], styles: Mapping[str, LineStyle]) -> Chart:
