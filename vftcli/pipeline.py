@@ -11,7 +11,7 @@ from vftcli.doctor.examination import Examiner
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.table import BEST, NOT_SHOWN
+from vftcli.observers.table import BEST, LogSpectra
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.references import refuse_estimates
@@ -255,7 +255,7 @@ def observe(
 
     log, run, step = motion.log, choice.observers.run, motion.log.recording.median_step
     own = choice.observers.gains_of_log
-    shown = NOT_SHOWN if baselines is None else baselines.spectra(gains=own)
+    shown = LogSpectra() if baselines is None else baselines.spectra(gains=own)
     observers, remarks = choice.observers.build(log.robot, step, shown)
     printed = (caution("as-printed"),) if choice.observers.as_printed else ()
     return Analysis(

@@ -37,9 +37,7 @@ def looped(
             model.a22[k] ** 2 * p22 + model.q22[k],
         )
         found.append(joseph(prior, model.r[k]))
-    p11, p12, p22 = (np.array([getattr(g.posterior, n) for g in found]) for n in Covariance._fields)
-    l1, l2 = (np.array([getattr(g, n) for g in found]) for n in ("l1", "l2"))
-    return Gains(l1, l2, Covariance(p11, p12, p22), np.array([g.S for g in found]))
+    return Gains(*np.moveaxis(np.array(found), 1, 0))
 
 
 def joseph(prior: Covariance, r: np.ndarray) -> Gains:
@@ -48,12 +46,9 @@ def joseph(prior: Covariance, r: np.ndarray) -> Gains:
     S = p11 + r
     # 1 − L₁ as a quotient: the difference would lose every digit of a small r.
     l1, l2, rest = p11 / S, p12 / S, r / S
-    posterior = Covariance(
-        rest**2 * p11 + l1**2 * r,
-        rest * (p12 - l2 * p11) + l1 * l2 * r,
-        p22 - 2.0 * l2 * p12 + l2**2 * p11 + l2**2 * r,
-    )
-    return Gains(l1, l2, posterior, S)
+    p22 = p22 - 2.0 * l2 * p12 + l2**2 * p11 + l2**2 * r
+    p12 = rest * (p12 - l2 * p11) + l1 * l2 * r
+    return Gains(l1, l2, rest**2 * p11 + l1**2 * r, p12, p22, S)
 
 
 SETTINGS = {

@@ -12,12 +12,12 @@ from vftcli.signals.arrays import (
     check_series,
     check_shape,
     frozen,
-    frozen_mask,
     handed_over,
     is_uniform,
     median,
     number_array,
     seal,
+    seal_mask,
 )
 from vftcli.signals.errors import ClockError, ShapeError
 
@@ -51,9 +51,11 @@ def test_handing_over_seals_the_owner_too() -> None:
 class Sealed:
     values: object
     maybe: object = None
+    mask: object = None
 
     def __post_init__(self) -> None:
         seal(self, "values", "maybe")
+        seal_mask(self, "mask")
 
 
 def test_a_type_seals_its_arrays_and_leaves_what_is_none() -> None:
@@ -65,9 +67,10 @@ def test_a_type_seals_its_arrays_and_leaves_what_is_none() -> None:
 
 
 def test_a_mask_is_boolean() -> None:
-    mask = frozen_mask(np.array([0.0, 2.0, -1.0]))
-    assert mask.tolist() == [False, True, True]
-    assert not mask.flags.writeable
+    made = Sealed([1], mask=np.array([0.0, 2.0, -1.0]))
+    assert isinstance(made.mask, np.ndarray)
+    assert made.mask.tolist() == [False, True, True]
+    assert not made.mask.flags.writeable
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_shape, frozen, seal, spread
+from vftcli.signals.arrays import Array, frozen, seal, spread
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import NUMBER, assignment, check_known, set_value
 from vftcli.signals.remarks import Remark, Where, warning
@@ -207,9 +207,7 @@ class Controller:
     parameters: Admittance  #: What it was built from.
 
     def __post_init__(self) -> None:
-        seal(self, "alpha", "rate", "damping")
-        for name in ("alpha", "rate", "damping"):
-            check_shape(getattr(self, name), (6,), name, "the controller")
+        seal(self, "alpha", "rate", "damping", shape=(6,), called="the controller")
 
     @property
     def name(self) -> str:

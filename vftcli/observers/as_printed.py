@@ -17,7 +17,7 @@ and so does the covariance: all four entries are carried, and the gain is its le
 
 import numpy as np
 
-from vftcli.observers.kalman_model import Covariance, Densities, Discrete, Gains, KalmanState
+from vftcli.observers.kalman_model import Densities, Discrete, Gains, KalmanState
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import DynamicsTerms, one_sample_earlier
 from vftcli.signals.steady_filter import filtered
@@ -78,7 +78,7 @@ def printed_steady(model: Discrete, d: Densities) -> Gains:
     """Gains that a constant sample time settles to, the covariance's lower left left out."""
     prior = settled_prior(model, d)
     (l1, l2), ((p11, p12), (_, p22)) = updated(prior, model.r)
-    return Gains(l1, l2, Covariance(p11, p12, p22), prior[0, 0] + model.r)
+    return Gains(l1, l2, p11, p12, p22, prior[0, 0] + model.r)
 
 
 def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) -> Array:

@@ -151,8 +151,7 @@ class ObserverChoice(Choice):
     @property
     def of_robot_file(self) -> bool:
         """Whether all observers run with unchanged gains of the robot's file."""
-        changed = self.settings or self.gains_file is not None or self.match is not None
-        return self.gains == PAPER_GAINS and not changed
+        return self.gains == PAPER_GAINS and not self.settings
 
     def beside_print(self) -> "ObserverChoice":
         """The choice beside a printed table: without a default `best`."""
@@ -173,7 +172,7 @@ class ObserverChoice(Choice):
         from vftcli.observers import table
         from vftcli.signals.remarks import caution
 
-        shown, gains = shown or table.NOT_SHOWN, robot.gains
+        shown, gains = shown or table.LogSpectra(), robot.gains
         table.check_gains(gains, str(robot.path or robot.name))
         if self.gains_of_log:
             gains = table.overlay_gains(gains, shown.gains or {})

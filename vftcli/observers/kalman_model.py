@@ -19,7 +19,7 @@ References:
     difference of two solutions of a Riccati equation.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -57,21 +57,6 @@ class Discrete(NamedTuple):
     q12: Array
     q22: Array
     r: Array
-
-
-def forward_euler(step: Array, d: Densities) -> Discrete:
-    """Forward Euler (41): A = I + Ts·A_c, Q̂ = Ts·diag(Q_p, Q_τ); aTs ≤ 2: stable."""
-    shape = np.broadcast_shapes(np.shape(step), d.r.shape)
-    step = np.broadcast_to(step, shape)
-    return Discrete(
-        step=step,
-        a12=step,
-        a22=1.0 - step * d.decay,
-        q11=step * d.q_p,
-        q12=np.zeros(shape),
-        q22=step * d.q_tau,
-        r=np.broadcast_to(d.r, shape),
-    )
 
 
 def zero_order_hold(step: Array, d: Densities) -> Discrete:
@@ -112,9 +97,7 @@ def zero_order_hold(step: Array, d: Densities) -> Discrete:
     )
 
 
-Discretisation = Callable[[Array, Densities], Discrete]
-DISCRETISATIONS: dict[str, Discretisation] = {"fe": forward_euler, "zoh": zero_order_hold}
-
+SCHEMES = ("fe", "zoh")  #: Discretisations: forward Euler and zero-order hold.
 #: How R and Q are read; (42) as printed counts Ts twice, (44) does not.
 NOISE_CONVENTIONS = {
     "density": "Q = Q̂, R = R/Ts: densities, the same filter at every rate",
@@ -124,16 +107,22 @@ NOISE_CONVENTIONS = {
 
 
 def discretise(scheme: str, convention: str, step: Array, d: Densities) -> Discrete:
-    """The model of a key of `DISCRETISATIONS` and one of `NOISE_CONVENTIONS`.
+    """The model of one of `SCHEMES` and one of `NOISE_CONVENTIONS`.
 
-    At one sample time [s], or at one a sample as a column (T, 1).
+    At one sample time [s], or at one a sample as a column (T, 1). Forward Euler (41) is
+    A = I + Ts·A_c, Q̂ = Ts·diag(Q_p, Q_τ), stable for aTs ≤ 2.
     """
-    if scheme == "fe" and (worst := float(np.max(step * d.decay))) > 2.0:
+    if scheme == "zoh":
+        model = zero_order_hold(step, d)
+    elif (worst := float(np.max(step * d.decay))) > 2.0:
         raise ParameterError(
             f"kfo-fe is unstable: decay·Ts = {worst:.3g} is above 2; "
             "choose a smaller kfo.decay or the observer kfo-zoh"
         )
-    model = DISCRETISATIONS[scheme](step, d)
+    else:
+        r = np.broadcast_to(d.r, np.broadcast_shapes(np.shape(step), d.r.shape))
+        held, decay = np.broadcast_to(step, r.shape), 1.0 - step * d.decay
+        model = Discrete(held, held, decay, held * d.q_p, np.zeros(r.shape), held * d.q_tau, r)
     if convention == "discrete":
         return model
     model = model._replace(r=model.r / model.step)
@@ -156,8 +145,15 @@ class Gains(NamedTuple):
 
     l1: Array  #: L₁ of the momentum.
     l2: Array  #: L₂ of the torque. [1/s]
-    posterior: Covariance  #: Covariance after the update.
+    p11: Array  #: Covariance after the update, entry by entry.
+    p12: Array
+    p22: Array
     S: Array  #: Variance of the innovation.
+
+    @property
+    def posterior(self) -> Covariance:
+        """Covariance after the update."""
+        return Covariance(self.p11, self.p12, self.p22)
 
 
 class KalmanState(NamedTuple):
@@ -211,7 +207,7 @@ def update(prior: Covariance, r: Array) -> Gains:
     l1, l2 = prior.p11 / S, prior.p12 / S
     # Joseph's form: an error of L₂ counts squared. R L₁ is (1 − L₁)P₁₁ with every digit.
     p22 = prior.p22 - l2 * (2.0 * prior.p12 - l2 * S)
-    return Gains(l1, l2, Covariance(r * l1, r * l2, p22), S)
+    return Gains(l1, l2, r * l1, r * l2, p22, S)
 
 
 def closed_loop(gains: Gains, model: Discrete) -> Array:
@@ -243,20 +239,14 @@ def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gain
         guess: Where blocks start before they know better, the stationary posterior. (n,)
     """
     first = update(prior, model.r[0])
-    rows = [flat(first)[:, None]]
+    rows = [np.array(first)[:, None]]
     entering = first.posterior
     for span in spans(len(model.r), begins=True):
         fold = Fold.of(span.stop - span.start)
         gains = settle(Discrete(*(fold.fold(entry[span]) for entry in model)), entering, guess)
         entering = Covariance(*map(fold.last, gains.posterior))
-        rows.append(fold.unfold(flat(gains)))
-    l1, l2, *posterior, S = np.concatenate(rows, axis=1)
-    return Gains(l1, l2, Covariance(*posterior), S)
-
-
-def flat(gains: Gains) -> Array:
-    """L₁, L₂, P₁₁, P₁₂, P₂₂ and S in one array. (6, …)"""
-    return np.array([gains.l1, gains.l2, *gains.posterior, gains.S])
+        rows.append(fold.unfold(np.array(gains)))
+    return Gains(*np.concatenate(rows, axis=1))
 
 
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
@@ -289,19 +279,17 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             if np.max(change) <= SETTLED:
                 break
     each, P = list[Gains](), Covariance(*starts)
-    for step in steps_of(model):
+    for step in map(Discrete._make, zip(*model, strict=True)):
         each.append(update(predict(P, step), step.r))
         P = each[-1].posterior
-    l1, l2, posterior, S = zip(*each, strict=True)
-    P = Covariance(*(np.stack(entry) for entry in zip(*posterior, strict=True)))
-    return Gains(np.stack(l1), np.stack(l2), P, np.stack(S))
+    return Gains(*map(np.stack, zip(*each, strict=True)))
 
 
 def block_response(model: Discrete, P: Covariance) -> tuple[Array, Array, Array]:
     """Posterior at each block's end from a start, Φ and O. (3, n, blocks), (2, 2, n, blocks) × 2"""
     information, phi = np.zeros((2, 2, 2, *P.p11.shape))
     phi[0, 0] = phi[1, 1] = 1.0
-    for step in steps_of(model):
+    for step in map(Discrete._make, zip(*model, strict=True)):
         gains = update(predict(P, step), step.r)
         P = gains.posterior
         u = phi[0] + step.a12 * phi[1]
@@ -311,15 +299,10 @@ def block_response(model: Discrete, P: Covariance) -> tuple[Array, Array, Array]
     return np.stack(P), phi, information
 
 
-def steps_of(model: Discrete) -> Iterator[Discrete]:
-    """The models at each position of the blocks. (n, blocks) each"""
-    return (Discrete(*entries) for entries in zip(*model, strict=True))
-
-
 def kalman_steps(
     terms: DynamicsTerms,
     d: Array,
-    model_of: Callable[[Densities, Array], Discrete],
+    model_of: Callable[[Array, Densities], Discrete],
     densities: Densities,
     guess: Covariance,
     state: KalmanState,
@@ -331,7 +314,7 @@ def kalman_steps(
     Args:
         terms: The block.
         d: The filter's input. (T, n) [N·m·s]
-        model_of: The discrete model of some joints at some sample times [s].
+        model_of: The discrete model at some sample times [s] of some joints.
         densities: The parameters, one a joint.
         guess: The stationary posterior. (n,)
         state: What the filter is before the block; at a log's begin after its first sample.
@@ -351,7 +334,7 @@ def kalman_steps(
     for span in spans(samples, begins=begins):
         fold = Fold.of(span.stop - span.start)
         # What is one for all joints is written out: rows of one size need no iterator.
-        model = model_of(own, fold.fold(dt[span]))
+        model = model_of(fold.fold(dt[span]), own)
         model = Discrete(model.step, *map(np.ascontiguousarray, model[1:]))
         gains = settle(model, entering, guess)
         entering = Covariance(*map(fold.last, gains.posterior))
@@ -359,5 +342,5 @@ def kalman_steps(
         states = run_blocks(F, g[:, :, kind] * fold.fold(d[span]), error, kind)
         error = fold.last(states)
         tau[span] = fold.unfold(states[1])
-        sd.T[:, span] = fold.unfold(np.sqrt(gains.posterior.p22)).T[kind]
+        sd.T[:, span] = fold.unfold(np.sqrt(gains.p22)).T[kind]
     return tau, sd, KalmanState(error, np.stack([p[kind] for p in entering]))

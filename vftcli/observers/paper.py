@@ -14,7 +14,9 @@ state; a whole log is one block.
 """
 
 from abc import abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -27,8 +29,8 @@ from vftcli.observers.as_printed import (
     settled_prior,
 )
 from vftcli.observers.kalman_model import (
-    DISCRETISATIONS,
     NOISE_CONVENTIONS,
+    SCHEMES,
     Covariance,
     Densities,
     Discrete,
@@ -256,7 +258,7 @@ class KalmanObserver(BlockObserver):
 
     def __post_init__(self) -> None:
         scheme, convention = self.discretisation, self.noise_convention
-        check_known(scheme, DISCRETISATIONS, f"discretisation {scheme!r}")
+        check_known(scheme, SCHEMES, f"discretisation {scheme!r}")
         check_known(convention, NOISE_CONVENTIONS, f"kfo.noise_convention is {convention!r}")
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = numbers_of(getattr(self, name), name, self.name)
@@ -286,7 +288,7 @@ class KalmanObserver(BlockObserver):
             F, g = error_filter(settled, self.model(step, n))
             start = zero if state is None else state.error
             tau, end = steady_filter(F, g, d, start, wanted=TORQUE)
-            sd = np.broadcast_to(handed_over(np.sqrt(settled.posterior.p22)), tau.shape)
+            sd = np.broadcast_to(handed_over(np.sqrt(settled.p22)), tau.shape)
             state = KalmanState(end, np.stack(settled.posterior))
         elif self.prints_hold:
             every = self.model(np.broadcast_to(terms.dt, (len(d), 1)), n)
@@ -303,7 +305,7 @@ class KalmanObserver(BlockObserver):
                 state = KalmanState(zero, np.stack(update(prior, first).posterior))
             guess = settled.posterior
             tau, sd, state = kalman_steps(
-                terms, d, self._model_of, densities, guess, state, begins=begins
+                terms, d, self._discretise, densities, guess, state, begins=begins
             )
         return self.estimated(terms, tau, sd=handed_over(sd)), state
 
@@ -314,12 +316,13 @@ class KalmanObserver(BlockObserver):
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """Discrete model at one sample time, or at each as a column (T, 1). [s]"""
-        return self._model_of(self.densities(joints), np.asarray(step, dtype=np.float64))
+        return self._discretise(np.asarray(step, dtype=np.float64), self.densities(joints))
 
-    def _model_of(self, densities: Densities, step: Array) -> Discrete:
-        """The discrete model of some joints."""
+    @property
+    def _discretise(self) -> Callable[[Array, Densities], Discrete]:
+        """The discrete model of sample times and joints."""
         convention = "literal" if self.as_printed else self.noise_convention
-        return discretise(self.discretisation, convention, step, densities)
+        return partial(discretise, self.discretisation, convention)
 
     def steady(self, step: float, joints: int) -> Gains:
         """Stationary gains and covariances at a sample time. [s]"""

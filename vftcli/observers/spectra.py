@@ -49,11 +49,9 @@ SLOW = 5.0  #: Up to here the measured spectrum of the external torque holds. [H
 FALL = 2.5
 
 #: A free part that was found is believed if on most joints the loaded part has this share of its
-#: slow power beyond the free one's. Reference runs show 0.96 and more, those that are in contact
-#: all the time 0.82 and less.
+#: power below `SLOW` beyond the free one's. Reference runs show 0.96 and more, those that are in
+#: contact all the time 0.82 and less.
 QUIETER = 0.85
-
-CONTACT_BAND = 5.0  #: Contacts are separated from noise below this. [Hz]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,13 +125,12 @@ class Spectra:
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what lag and bandwidth leave out, of H (F, n). (n,) [(N·m)²]"""
-        share: Array = np.abs(1.0 - response) ** 2
-        return np.asarray(np.sum(share * self.external, axis=0) * self.width)
+        missed = np.abs(1.0 - response) ** 2 * self.external
+        return np.asarray(np.sum(missed, axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
         """∫|H|² S_n df, what of the noise comes through H (F, n). (n,) [(N·m)²]"""
-        share: Array = np.abs(response) ** 2
-        return np.asarray(np.sum(share * self.noise, axis=0) * self.width)
+        return np.asarray(np.sum(np.abs(response) ** 2 * self.noise, axis=0) * self.width)
 
 
 def neighbour_mean(spectrum: Array) -> Array:
@@ -179,7 +176,7 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
 
 def looks_free(spectra: Spectra) -> bool:
     """Whether most joints have clearly less slow power free than loaded."""
-    slow = spectra.frequency < CONTACT_BAND
+    slow = spectra.frequency < SLOW
     power = np.maximum(spectra.loaded[slow].sum(axis=0), np.finfo(float).tiny)
     return bool(np.median(spectra.external[slow].sum(axis=0) / power) > QUIETER)
 
@@ -198,9 +195,7 @@ class FreeError(NamedTuple):
 
     moving: Array  #: While the joint moves. (n,) [(N·m)²]
     resting: Array  #: While it rests. (n,) [(N·m)²]
-    #: Joints that hardly move while nothing touches the arm, so that `moving` rests on their dry
-    #: friction. (n,)
-    unseen: Mask
+    unseen: Mask  #: Joints that hardly move there: `moving` rests on their dry friction. (n,)
 
 
 def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
@@ -215,19 +210,13 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
         dry_friction: Of each joint, 0 where nothing is known of it. (n,) [N·m]
     """
     known = np.isfinite(read)
-    square = np.where(known, read, 0.0) ** 2
-    whole = np.sum(square, axis=0) / np.maximum(np.count_nonzero(known, axis=0), 1)
-
-    def mean_over(where: Mask) -> tuple[Array, Mask]:
-        count = np.count_nonzero(where, axis=0)
-        few = count < ENOUGH
-        mean = np.sum(np.where(where, square, 0.0), axis=0) / np.maximum(count, 1)
-        return np.where(few, whole, mean), few
-
-    moving, unseen = mean_over(known & ~resting)
-    still, _ = mean_over(known & resting)
+    kinds = np.array([known, known & ~resting, known & resting])
+    square, counts = np.where(known, read, 0.0) ** 2, np.count_nonzero(kinds, axis=1)
+    means = np.sum(np.where(kinds, square, 0.0), axis=1) / np.maximum(counts, 1)
+    moving, still = np.where(counts[1:] < ENOUGH, means[0], means[1:])
+    unseen = counts[1] < ENOUGH
     return FreeError(
-        moving=np.where(unseen, moving + (UNSEEN * dry_friction) ** 2, moving),
+        moving=moving + unseen * (UNSEEN * dry_friction) ** 2,
         resting=np.maximum(still, (HELD * dry_friction) ** 2),
         unseen=unseen,
     )
@@ -244,8 +233,7 @@ def error_band(
         resting: Where a joint rests. (T, n)
         correction_sd: Standard deviation of a correction of the model. (T, n) [N·m]
     """
-    variance = np.where(resting, free.resting + missed, free.moving + missed)
+    variance: Array = np.where(resting, free.resting + missed, free.moving + missed)
     if correction_sd is not None:
         variance += correction_sd**2
-    sd: Array = np.sqrt(variance, out=variance)
-    return sd
+    return np.sqrt(variance, out=variance)

@@ -115,17 +115,14 @@ def load_gains(path: Path) -> Gains:
 
 def overlay_gains(under: Gains, over: Gains) -> Gains:
     """Gains of one source with those of another put over them, parameter by parameter."""
-    names = dict.fromkeys((*under, *over))
-    return {name: {**under.get(name, {}), **over.get(name, {})} for name in names}
+    return {name: {**under.get(name, {}), **over.get(name, {})} for name in {**under, **over}}
 
 
-def parameters_given(section: str, name: str, *sources: Gains) -> dict[str, Any]:
-    """Parameters of one observer: later sources win, its section over the shared."""
-    found: dict[str, Any] = {}
-    for source in sources:
-        # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
-        found |= {**source.get(section, {}), **source.get(name, {})}
-    return found
+def parameters_given(setup: "Setup", section: str, name: str) -> dict[str, Any]:
+    """Parameters of one observer: the user's win over the file's, its own over the shared."""
+    # kfo-zoh.r_diag is meant for that one filter, kfo.r_diag for all of them.
+    places = ((source, key) for source in (setup.gains, setup.settings) for key in (section, name))
+    return {key: value for source, at in places for key, value in source.get(at, {}).items()}
 
 
 FALLBACK_RATE = 10.0  #: First-order gain where a robot gives no gains at all. [1/s]
@@ -136,17 +133,12 @@ class LogSpectra(NamedTuple):
     """Noise and contact of a complete log, None without a free part."""
 
     plain: "Spectra | None" = None  #: Of p and μ as the robot's model gives them.
-    #: Of `best`'s, less the bias of the whole log.
-    best: "Spectra | None" = None
+    best: "Spectra | None" = None  #: Of `best`'s, less the bias of the whole log.
     gains: Gains | None = None  #: The gains that `plain` calls for, as a gains file holds them.
 
     def under(self, name: str) -> "Spectra | None":
         """The spectra of what the observer of this name runs on."""
         return self.best if name == BEST else self.plain
-
-
-#: What is known of a log that is still being written, or has no free part.
-NOT_SHOWN = LogSpectra()
 
 
 class Setup(NamedTuple):
@@ -157,7 +149,7 @@ class Setup(NamedTuple):
     joints: int  #: Number of joints n.
     step: float  #: Nominal sample time. [s]
     as_printed: bool  #: Use the paper's printed formulas.
-    shown: LogSpectra = NOT_SHOWN  #: What the complete log shows of noise and contact.
+    shown: LogSpectra = LogSpectra()  #: What the complete log shows of noise and contact.
 
 
 Built = tuple[Observer, tuple[Remark, ...]]  #: An observer, and remarks on gains that nobody gave.
@@ -179,23 +171,21 @@ class Entry(NamedTuple):
 def build_fdo(setup: Setup, name: str) -> Built:
     """Filtered dynamics observer, cutoff given or from the Kalman filter."""
     omega, origin = first_order_gain(setup, name, "omega")
-    if origin:
-        # One cutoff for all joints: the one with the joints' mean delay.
-        omega = np.full_like(omega, 1.0 / np.mean(1.0 / omega))
-    if np.any(omega != omega[0]):
+    if not origin and np.any(omega != omega[0]):
         raise ParameterError("fdo.omega takes one cutoff for all joints; gmo.gain takes one each")
-    cutoff = float(omega[0])
-    values: dict[str, Any] = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
+    # One cutoff for all joints: the one with the joints' mean delay.
+    cutoff = float(1.0 / np.mean(1.0 / omega) if origin else omega[0])
     observer = FilteredDynamicsObserver(omega=cutoff, as_printed=setup.as_printed)
-    return observer, tuple(fact(code, **values) for code in origin)
+    said: dict[str, Any] = {"parameter": "fdo.omega", "gain": cutoff, "unit": "rad/s"}
+    return observer, tuple(fact(code, **said) for code in origin)
 
 
 def build_gmo(setup: Setup, name: str) -> Built:
     """The momentum observer, its gains given or left over from the Kalman filter."""
     gain, origin = first_order_gain(setup, name, "gain")
-    values = {"parameter": "gmo.gain", "gain": gain.tolist(), "unit": "1/s"}
     observer = MomentumObserver(gain=gain, as_printed=setup.as_printed)
-    return observer, tuple(fact(code, **values) for code in origin)
+    said = {"parameter": "gmo.gain", "gain": gain.tolist(), "unit": "1/s"}
+    return observer, tuple(fact(code, **said) for code in origin)
 
 
 def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tuple[str, ...]]:
@@ -205,7 +195,7 @@ def first_order_gain(setup: Setup, name: str, parameter: str) -> tuple[Array, tu
     `FALLBACK_RATE` where no gains are given at all; and on a slow clock at most 2/Ts, which takes
     each sample's raw disturbance as it is: from there on the observer would overshoot.
     """
-    given = parameters_given(name, name, setup.gains, setup.settings)
+    given = parameters_given(setup, name, name)
     if parameter in given:
         return spread(given[parameter], setup.joints, "joints", f"{name}.{parameter}"), ()
     rate, origin = per_joint(FALLBACK_RATE, setup.joints), "gain-from-default"
@@ -230,7 +220,7 @@ def build_kfo(setup: Setup, name: str) -> tuple[KalmanObserver, tuple[Remark, ..
     R and Q of a file are read as "discrete" unless a convention is named: with that reading the
     paper's gains win joints 1 to 3, as its Table I says. Without a file they are densities.
     """
-    given = parameters_given("kfo", name, read_as("discrete", setup).gains, setup.settings)
+    given = parameters_given(read_as("discrete", setup), "kfo", name)
     convention = str(given.pop("noise_convention", "density"))
     values = {
         key: spread(value, setup.joints, "joints", f"kfo.{key}")

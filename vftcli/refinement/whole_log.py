@@ -32,7 +32,7 @@ from vftcli.refinement.robust_fit import (
     slow_loads,
 )
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask, frozen_mask, handed_over, seal
+from vftcli.signals.arrays import Array, Mask, handed_over, seal, seal_mask
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
@@ -85,7 +85,7 @@ class WholeLogBias:
 
     def __post_init__(self) -> None:
         seal(self, "weight", "bias", "sd", "load")
-        object.__setattr__(self, "free", frozen_mask(self.free))
+        seal_mask(self, "free")
 
     @property
     def applied(self) -> Mask:

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_series, check_shape, seal
+from vftcli.signals.arrays import Array, check_series, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import check_kind
@@ -37,9 +37,8 @@ class Payload(Shown):
     inertia: Array  #: Inertia tensor about the centre of mass, in flange axes. (3, 3) [kg·m²]
 
     def __post_init__(self) -> None:
-        seal(self, "com", "inertia")
-        check_shape(self.com, (3,), "com", "the payload")
-        check_shape(self.inertia, (3, 3), "inertia", "the payload")
+        seal(self, "com", shape=(3,), called="the payload")
+        seal(self, "inertia", shape=(3, 3), called="the payload")
         if why := unphysical(self.mass, self.inertia):
             raise RobotError(f"the payload is unphysical: {why}")
 
@@ -73,9 +72,8 @@ class Chain(Shown):
             "flange_rotation": (3, 3),
             "flange_translation": (3,),
         }
-        seal(self, *shapes)
         for name, shape in shapes.items():
-            check_shape(getattr(self, name), shape, name, "the chain")
+            seal(self, name, shape=shape, called="the chain")
 
     @property
     def joints(self) -> int:

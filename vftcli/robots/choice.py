@@ -64,7 +64,12 @@ class RobotChoice(Choice):
         elif self.payload is not None:
             robot = robot.with_payload(self.payload)
         if self.friction == "model":
-            return robot.with_simulated_friction()
+            if not robot.simulated_friction:
+                raise RobotError(
+                    f"{robot.name}: model.friction=model is what an MJCF gives its joints "
+                    "(damping, frictionloss); this robot's description gives none"
+                )
+            return replace(robot, friction=robot.simulated_friction)
         return robot.without_friction() if self.friction == "none" else robot
 
     def check(self) -> None:

@@ -249,7 +249,17 @@ def friction_torque(
     if not friction:
         torque[:] = 0.0
     for j, joint in enumerate(friction):
-        torque[:, j] = joint_friction(joint, dq[:, j], None if load is None else load[:, j])
+        if joint.model == "none":
+            torque[:, j] = 0.0
+            continue
+        check_known(joint.model, FRICTION_MODELS, f"no friction model {joint.model!r}")
+        numbers = joint.parameters.items()
+        values: dict[str, Any] = {k: v for k, v in numbers if k not in PRESLIDING}
+        if joint.speeds:
+            values |= {"speeds": joint.speeds, "torques": joint.torques}
+        if load is not None and "load_coulomb" in values:
+            values["load"] = load[:, j]
+        torque[:, j] = FRICTION_MODELS[joint.model].torque(dq[:, j], **values)
         if deflection is not None and (a := joint.parameters.get("presliding", 0.0)) > 0.0:
             torque[:, j] += a * deflection[:, j]
     if temperature is not None and (factor := friction_factor(friction, temperature)) is not None:
@@ -258,19 +268,6 @@ def friction_torque(
         torque *= factor
         torque += offset
     return torque
-
-
-def joint_friction(joint: JointFriction, dq: Array, load: Array | None) -> Array | float:
-    """What one joint's model makes of its velocities and its load. (T,) [N·m]"""
-    if joint.model == "none":
-        return 0.0
-    check_known(joint.model, FRICTION_MODELS, f"no friction model {joint.model!r}")
-    values: dict[str, Any] = {k: v for k, v in joint.parameters.items() if k not in PRESLIDING}
-    if joint.speeds:
-        values |= {"speeds": joint.speeds, "torques": joint.torques}
-    if load is not None and "load_coulomb" in values:
-        values["load"] = load
-    return FRICTION_MODELS[joint.model].torque(dq, **values)
 
 
 def steady_torque(friction: JointFriction, dq: Array) -> Array:

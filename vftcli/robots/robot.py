@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vftcli.robots.chain import Chain, Payload
-from vftcli.signals.arrays import Array, check_shape, seal
+from vftcli.signals.arrays import Array, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.pose import Pose
 from vftcli.signals.remarks import Remark
@@ -135,10 +135,7 @@ class Robot(Shown):
 
     def __post_init__(self) -> None:
         n = self.joints
-        for key in ("torque_constant", "gear", "efficiency"):
-            if (value := getattr(self, key)) is not None:
-                seal(self, key)
-                check_shape(value, (n,), key, self.name)
+        seal(self, "torque_constant", "gear", "efficiency", shape=(n,), called=self.name)
         if self.friction and len(self.friction) != n:
             raise RobotError(f"{self.name}: {len(self.friction)} friction models for {n} joints")
         if self.torque_source not in TORQUE_SOURCES:
@@ -206,12 +203,3 @@ class Robot(Shown):
     def without_friction(self) -> "Robot":
         """Return the robot with no friction model, for ``model.friction=none``."""
         return replace(self, friction=())
-
-    def with_simulated_friction(self) -> "Robot":
-        """The robot with the friction of a simulator, for ``model.friction=model``."""
-        if not self.simulated_friction:
-            raise RobotError(
-                f"{self.name}: model.friction=model is what an MJCF gives its joints (damping, "
-                "frictionloss); this robot's description gives none"
-            )
-        return replace(self, friction=self.simulated_friction)

@@ -105,17 +105,29 @@ class RunningTerms:
         """
         check_joints(recording, self.robot)
         q, dq = recording.q, recording.require("dq")
-        effort, scale = effort_of(recording, self.robot)
+        constant = self.robot.torque_constant
+        if constant is not None and uses_current(recording, self.robot):
+            effort = recording.require("current")
+        else:
+            effort, constant = drive_torque(recording, self.robot), None
         temperature = measured_temperature(recording)
         # One block of memory: the larger it is, the fewer pages the system has to find.
         p, mu, room = (rows.T for rows in np.empty((3, *q.T.shape)))
-        for span, velocity, (momentum, bias, *gravity) in self._chunks(q, dq):
+        chunks: Iterable[tuple[slice, Array, list[Array]]]
+        if self.literal:
+            momentum, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
+            chunks = [(slice(0, len(q)), dq, [momentum, coriolis - gravity, gravity])]
+        else:
+            wanted = ("p", "bias", *["gravity"] * self._friction.takes_load)
+            chunks = momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
+        for span, velocity, (momentum, bias, *loads) in chunks:
             p[span] = momentum
             mu[span] = effort[span]
-            mu[span] *= scale
+            if constant is not None:
+                mu[span] *= constant
             mu[span] += bias
             if self.robot.friction:
-                load = gravity[0] if gravity else None
+                load = loads[0] if loads else None
                 warm = None if temperature is None else temperature[span]
                 mu[span] -= self._friction.torque(q[span], velocity, load, warm)
         terms = DynamicsTerms(
@@ -129,14 +141,6 @@ class RunningTerms:
         self.before = terms.last
         return terms
 
-    def _chunks(self, q: Array, dq: Array) -> Iterable[tuple[slice, Array, list[Array]]]:
-        """P, Cᵀq̇ − g and, if friction asks for it, g, by chunks."""
-        if self.literal:
-            p, coriolis, gravity = literal_momentum_terms(self.robot.model, q, dq)
-            return [(slice(0, len(q)), dq, [p, coriolis - gravity, gravity])]
-        wanted = ("p", "bias", *["gravity"] * self._friction.takes_load)
-        return momentum_chunks(self.robot.loaded_chain, q, dq, wanted)
-
 
 def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False) -> DynamicsTerms:
     """P and μ along a recording, `literal` by the paper's (7)–(16).
@@ -146,13 +150,6 @@ def dynamics_terms(recording: Recording, robot: Robot, *, literal: bool = False)
         RobotError: If the number of joints differs.
     """
     return RunningTerms(robot, literal=literal).next(recording)
-
-
-def effort_of(recording: Recording, robot: Robot) -> tuple[Array, Array | float]:
-    """The measured effort (T, n) and its factor: K [N·m/A], or 1."""
-    if uses_current(recording, robot) and robot.torque_constant is not None:
-        return recording.require("current"), robot.torque_constant
-    return drive_torque(recording, robot), 1.0
 
 
 def literal_momentum_terms(model: Any, q: Array, dq: Array) -> MomentumTerms:  # noqa: ANN401

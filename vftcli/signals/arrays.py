@@ -17,10 +17,7 @@ Indices = NDArray[np.int64]  #: Numbers of rows or samples, counted from 0.
 
 
 def frozen(value: ArrayLike) -> Array:
-    """A read-only float64 array that nobody else can write to.
-
-    One that is so already, down to the memory it is a view of, is not copied.
-    """
+    """A read-only float64 array that nobody else can write to; not copied where it is one."""
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
         return value
     copy = np.array(value, dtype=np.float64, order="K")
@@ -73,19 +70,22 @@ def number_array(value: ArrayLike, name: str, owner: str) -> Array:
         raise ShapeError(f"{name} of {owner} is {kind}; expected an array of numbers") from None
 
 
-def seal(owner: object, *names: str) -> None:
-    """Make the named arrays of a frozen dataclass read-only; None stays None."""
+def seal(owner: object, *names: str, shape: tuple[int, ...] = (), called: str = "") -> None:
+    """Make arrays of a frozen dataclass read-only, and check their shape; None stays None."""
     for name in names:
         if (value := getattr(owner, name)) is not None:
             # The one way past a frozen dataclass, for its own __post_init__ only.
             object.__setattr__(owner, name, number_array(value, name, type(owner).__name__))
+            if shape:
+                check_shape(value, shape, name, called)
 
 
-def frozen_mask(value: ArrayLike) -> Mask:
-    """Return a read-only boolean copy: non-zero is true."""
-    copy = np.array(value, dtype=np.bool_)
-    copy.setflags(write=False)
-    return copy
+def seal_mask(owner: object, name: str) -> None:
+    """Make a mask of a frozen dataclass read-only, non-zero true; None stays None."""
+    if (value := getattr(owner, name)) is not None:
+        copy = np.array(value, dtype=np.bool_)
+        copy.setflags(write=False)
+        object.__setattr__(owner, name, copy)
 
 
 def empty_series(samples: int, columns: int) -> Array:
@@ -122,13 +122,6 @@ def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: s
     """Raise a ShapeError unless `value` has `shape`."""
     if np.shape(value) != shape:
         raise ShapeError(f"{name} of {owner} has shape {np.shape(value)}; expected {shape}")
-
-
-def check_fields(owner: object, called: str, shape: tuple[int, ...], *names: str) -> None:
-    """Raise a ShapeError unless the named fields are None or have `shape`."""
-    for name in names:
-        if (value := getattr(owner, name)) is not None:
-            check_shape(value, shape, name, called)
 
 
 def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) -> None:

@@ -11,13 +11,12 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
-    check_fields,
     check_series,
     check_shape,
     empty_series,
-    frozen_mask,
     handed_over,
     seal,
+    seal_mask,
 )
 from vftcli.signals.remarks import Remark
 from vftcli.signals.series import Clock, clock_of
@@ -53,9 +52,9 @@ class DynamicsTerms(Shown):
 
     def __post_init__(self, room: Array | None) -> None:
         seal(self, "t", "p", "mu")
-        check_series(self.p, None, "p", "the dynamics terms")
-        check_clock(self.t, "the dynamics terms")
-        check_fields(self, "the dynamics terms", (self.samples, self.joints), "p", "mu")
+        check_series(self.p, None, "p", called := "the dynamics terms")
+        check_clock(self.t, called)
+        seal(self, "p", "mu", shape=(self.samples, self.joints), called=called)
         change = empty_series(*self.p.shape) if room is None else room
         half, before, explained = 0.5 * self.dt[:, 0], self.before, np.zeros(self.samples)
         # Joint by joint, so that the passes stay in the cache.
@@ -135,14 +134,15 @@ class ExternalTorque(TimeSeries):
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
-        seal(self, "t", "tau", "sd", "floor", "error_sd")
-        if self.moving is not None:
-            object.__setattr__(self, "moving", frozen_mask(self.moving))
+        seal(self, "t", "tau", "floor")
+        seal_mask(self, "moving")
         check_series(self.tau, None, "tau", self.name)
         check_clock(self.t, self.name)
-        check_shape(self.tau, (len(self.t), self.tau.shape[1]), "tau", self.name)
-        check_fields(self, self.name, self.tau.shape, "sd", "error_sd", "moving")
-        check_fields(self, self.name, self.tau.shape[1:], "floor")
+        shape = len(self.t), self.joints
+        seal(self, "tau", "sd", "error_sd", shape=shape, called=self.name)
+        seal(self, "floor", shape=shape[1:], called=self.name)
+        if self.moving is not None:
+            check_shape(self.moving, shape, "moving", self.name)
 
     def _headline(self) -> str:
         rms = np.sqrt(np.nanmean(np.where(self.known.any(axis=0), self.tau, 0.0) ** 2, axis=0))

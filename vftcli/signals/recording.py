@@ -13,8 +13,8 @@ from vftcli.signals.arrays import (
     Indices,
     Mask,
     check_clock,
-    check_fields,
     check_series,
+    check_shape,
     release,
     seal,
 )
@@ -183,17 +183,19 @@ class Recording(TimeSeries):
     truth: "pl.DataFrame | None" = None
 
     def __post_init__(self) -> None:
-        seal(self, "t", *MEANINGS)
+        seal(self, "t", "q")
         check_series(self.q, None, "q", "the recording")
         if np.size(self.t) == 0:
             raise ClockError(f"{self.name}: no samples")
         check_clock(self.t, self.name)
-        check_fields(self, self.name, (self.samples, self.joints), *JOINT_SIGNALS)
-        check_fields(self, self.name, (self.samples, 6), "wrench")
+        shape = self.samples, self.joints
+        seal(self, *JOINT_SIGNALS, shape=shape, called=self.name)
+        seal(self, "wrench", shape=(self.samples, 6), called=self.name)
         if self.joint_names and len(self.joint_names) != self.joints:
             told = f"{len(self.joint_names)} joint names for {self.joints} joints"
             raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
-        check_fields(self, self.name, (3,), "payload_com")
+        if self.payload_com is not None:
+            check_shape(np.asarray(self.payload_com), (3,), "payload_com", self.name)
 
     def _headline(self) -> str:
         there = f"{self.samples} samples of {self.joints} joints over {self.duration:.4g} s"

@@ -11,10 +11,9 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
-    check_fields,
     check_shape,
-    frozen_mask,
     seal,
+    seal_mask,
 )
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.remarks import Remark
@@ -127,15 +126,16 @@ class Wrench(TimeSeries):
     remarks: tuple[Remark, ...] = ()  #: What a reader of the numbers should know.
 
     def __post_init__(self) -> None:
-        seal(self, "t", "values", "sd", "sigma_min", "null_space")
+        seal(self, "t", "values", "null_space")
         samples = len(self.t)
-        mask = frozen_mask(np.zeros(samples) if self.masked is None else self.masked)
-        object.__setattr__(self, "masked", mask)
+        if self.masked is None:
+            object.__setattr__(self, "masked", np.zeros(samples))
+        seal_mask(self, "masked")
         check_clock(self.t, self.name)
         check_shape(self.values, (samples, 6), "wrench", self.name)
-        check_fields(self, self.name, (samples, 6), "sd")
-        check_fields(self, self.name, (samples,), "sigma_min")
-        check_shape(mask, (samples,), "mask", self.name)
+        seal(self, "sd", shape=(samples, 6), called=self.name)
+        seal(self, "sigma_min", shape=(samples,), called=self.name)
+        check_shape(self.hidden, (samples,), "mask", self.name)
 
     def _headline(self) -> str:
         most = self.size[np.isfinite(self.size)].max(initial=0.0)
