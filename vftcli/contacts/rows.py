@@ -231,7 +231,8 @@ class ContactMeasurement:
             remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
         start = float(blocks.t[run[0]] - 0.5 * blocks.length[run[0]])
         stop = float(blocks.t[run[1] - 1] + 0.5 * blocks.length[run[1] - 1])
-        for cut in self.run.recording.source.cuts_between(start - BESIDE, stop + BESIDE)[:1]:
+        cuts = self.run.recording.source.cuts
+        for cut in [c for c in cuts if c.start <= stop + BESIDE and c.stop >= start - BESIDE][:1]:
             remarks = (*remarks, caution("samples-cut-inside", at_s=cut.start))
         J, at = jacobian[peak], float(blocks.t[peak])
         wrench, force = values.copy(), inside.values[:, :3]

@@ -10,7 +10,7 @@ from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.robots.robot import Robot
 from vftcli.signals.errors import RobotError
 from vftcli.signals.parsing import printable
-from vftcli.signals.recording import Recording
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Where, fact
 
 NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
@@ -33,12 +33,24 @@ def paired(recording: Recording, robot: Robot) -> Recording:
                 "with --robot, or call the joints in the robot file as the log does (name in "
                 "[[joints]])"
             )
-        recording = recording.with_joints(order)
+        if order != tuple(range(recording.joints)):
+            left = [name for k, name in enumerate(named) if k not in order]
+            remarks = [fact("joints-by-name", joints=[named[k] for k in order])]
+            remarks += [fact("joints-left-out", joints=left)] if left else []
+            there = set(JOINT_SIGNALS).intersection(recording.signals)
+            fields: dict[str, Any] = {x: getattr(recording, x)[:, order] for x in there}
+            names = tuple(named[k] for k in order)
+            recording = recording.changed(*remarks, joint_names=names, **fields)
     done = {remark.code for remark in recording.source.remarks}
-    if robot.gear is not None and "gear-applied" not in done and recording.joints == robot.joints:
-        efficiency = np.ones(robot.joints) if robot.efficiency is None else robot.efficiency
-        recording = recording.behind_gear(robot.gear, efficiency)
-    return recording
+    if robot.gear is None or "gear-applied" in done or recording.joints != robot.joints:
+        return recording
+    # Logged at the motors: q = q_m / N, τ = N η τ_m. Currents and the vendor's estimate stay.
+    torque = robot.gear if robot.efficiency is None else robot.gear * robot.efficiency
+    scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / robot.gear)
+    scales |= dict.fromkeys(("torque", "torque_without_gravity", "target_torque"), torque)
+    there = set(scales).intersection(recording.signals)
+    fields = {name: getattr(recording, name) * scales[name] for name in there}
+    return recording.changed(fact("gear-applied", ratios=robot.gear.tolist()), **fields)
 
 
 def unwound(recording: Recording, robot: Robot) -> Recording:

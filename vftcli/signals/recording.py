@@ -104,10 +104,6 @@ class Source(Shown):
     def _headline(self) -> str:
         return f"{self.path or 'in memory'}, {self.format}"
 
-    def cuts_between(self, start: float, stop: float) -> tuple[Cut, ...]:
-        """What was cut out between two times. [s]"""
-        return tuple(cut for cut in self.cuts if cut.start <= stop and cut.stop >= start)
-
     @property
     def repairs(self) -> tuple[str, ...]:
         """What was dropped, turned or derived, in words."""
@@ -298,32 +294,6 @@ class Recording(TimeSeries):
         taken = fact("effort-taken", effort=MEANINGS[source], kind=MEANINGS[kind], factor=factor)
         # 0 + x: no zero of the other sign.
         return self.changed(taken, **{**dict.fromkeys(there), kind: 0.0 + factor * value})
-
-    def with_joints(self, places: Sequence[int]) -> "Recording":
-        """The recording with the joints at some places, in their order; what goes is said."""
-        order, names = list(places), self.joint_names
-        if order == list(range(self.joints)):
-            return self
-        left = [name for k, name in enumerate(names) if k not in order]
-        remarks = [fact("joints-by-name", joints=[names[k] for k in order])]
-        remarks += [fact("joints-left-out", joints=left)] if left else []
-        joints = [name for name in self.signals if name in JOINT_SIGNALS]
-        fields = {name: getattr(self, name)[:, order] for name in joints}
-        return self.changed(*remarks, joint_names=tuple(names[k] for k in order), **fields)
-
-    def behind_gear(self, gear: Array, efficiency: Array) -> "Recording":
-        """The recording of the links, logged at the motors: q = q_m / N, τ = N η τ_m.
-
-        N is the gear's ratio, negative where the motor turns the other way, η its efficiency. (n,)
-        Currents and the vendor's estimate stay.
-        """
-        scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / gear)
-        scales |= dict.fromkeys(
-            ("torque", "torque_without_gravity", "target_torque"), gear * efficiency
-        )
-        there = [name for name in self.signals if name in scales]
-        fields = {name: getattr(self, name) * scales[name] for name in there}
-        return self.changed(fact("gear-applied", ratios=gear.tolist()), **fields)
 
     def without(self, rows: Mask, cuts: Iterable[Cut] = ()) -> "Recording":
         """The recording without some rows (T,); gaps stay in their place."""

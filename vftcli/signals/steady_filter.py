@@ -59,18 +59,7 @@ def filtered(
 
 
 def steady_filter(F: Array, g: Array, d: Array, start: Array, wanted: Array) -> tuple[Array, Array]:
-    """Run s_t = F s_{t−1} + g d_t.
-
-    Args:
-        F: Transition. (m, m, n)
-        g: What the input adds to the state. (m, n)
-        d: Input. (T, n)
-        start: State before the first sample. (m, n)
-        wanted: Weights of the state's entries. (m, n) or (m, 1)
-
-    Returns:
-        One combination of the state, wanted·s_t (T, n), and the state after the last sample (m, n).
-    """
+    """Run `filtered` with F (m, m, n) and g (m, n) of the whole log, for one combination (m, n)."""
     toeplitz, ends, carry, powers = blocks_of(F.transpose(2, 0, 1), g.T, wanted.T)
     out, state, columns = empty_series(*d.shape), start.T, np.ascontiguousarray(d.T)
     for first in range(0, len(d), PIECE):
