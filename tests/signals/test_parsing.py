@@ -7,14 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, vector
 from vftcli.signals.arrays import spread
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import (
-    NUMBER,
-    PER_JOINT,
-    SWITCH,
-    TEXT,
-    WHOLE,
     assignment,
     check_kind,
     check_known,
@@ -26,7 +22,6 @@ from vftcli.signals.parsing import (
     printable_lines,
     set_value,
     toml_tables,
-    vector,
     whole,
 )
 

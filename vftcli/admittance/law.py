@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 
+from vftcli.robots.robot_file import NUMBER
 from vftcli.signals.arrays import Array, frozen, seal, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import NUMBER, assignment, check_known, set_value
+from vftcli.signals.parsing import assignment, check_known, set_value
 from vftcli.signals.remarks import Remark, Where, warning
 
 #: The six axes: translation of the flange point along the base axes, rotation about them.

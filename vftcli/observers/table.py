@@ -9,17 +9,10 @@ import numpy as np
 from vftcli.observers.observer import Observer, per_joint
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots.profile import checked_gains
-from vftcli.robots.robot_file import RobotFile
+from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile
 from vftcli.signals.arrays import Array, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import (
-    PER_JOINT,
-    TEXT,
-    assignment,
-    check_known,
-    set_value,
-    shown,
-)
+from vftcli.signals.parsing import assignment, check_known, set_value, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
 if TYPE_CHECKING:

@@ -32,13 +32,14 @@ from vftcli.robots.robot_file import (
     DESCRIPTIONS,
     RobotFile,
     Section,
+    is_finite,
     robot_text,
     weightless,
 )
 from vftcli.robots.urdf import mjcf_tree, urdf_tree
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
-from vftcli.signals.parsing import did_you_mean, is_finite, shown
+from vftcli.signals.parsing import did_you_mean, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
 #: First element of a description → who reads it.

@@ -11,9 +11,7 @@ import numpy as np
 from vftcli.robots.chain import CONVENTIONS, Body, Chain, Payload, kinematics, symmetric, unphysical
 from vftcli.robots.friction import FRICTION_MODELS, PRESLIDING, falling_friction, lawless
 from vftcli.robots.robot import TORQUE_SOURCES, JointFriction, Limits, Robot, SensorNoise
-from vftcli.robots.robot_file import RobotFile, Section, is_table, lines_of, weightless
-from vftcli.signals.arrays import Array
-from vftcli.signals.parsing import (
+from vftcli.robots.robot_file import (
     NUMBER,
     PER_AXIS,
     PER_JOINT,
@@ -21,10 +19,16 @@ from vftcli.signals.parsing import (
     TABLE,
     TEXT,
     TEXTS,
+    RobotFile,
+    Section,
     ValueKind,
+    is_table,
+    lines_of,
     several,
-    shown,
+    weightless,
 )
+from vftcli.signals.arrays import Array
+from vftcli.signals.parsing import shown
 from vftcli.signals.pose import Pose, rpy_angles, rpy_matrix
 from vftcli.signals.remarks import fact
 

@@ -11,7 +11,7 @@ them cannot be right. A torque computed from numbers inside them is finite.
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from datetime import date, time
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -20,16 +20,65 @@ import numpy as np
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.parsing import (
-    NUMBER,
-    TABLE,
-    TEXT,
-    ValueKind,
-    tables,
-    toml_tables,
-    vector,
-    word_of,
+from vftcli.signals.parsing import shown, toml_tables
+
+
+class ValueKind(NamedTuple):
+    """One kind of value."""
+
+    words: str  #: What such a value is, as it ends "it must be …".
+    fits: Callable[[Any], bool]  #: Whether a value of TOML is one.
+
+    def broken(self, name: str, value: object) -> str:
+        """The complaint about the value of a key, "" where it is of the kind."""
+        return "" if self.fits(value) else f"{name} is {shown(value)}; it must be {self.words}"
+
+    def check(self, name: str, value: object) -> None:
+        """Raise a ParameterError unless the value of a key is of the kind."""
+        if why := self.broken(name, value):
+            raise ParameterError(why)
+
+
+def is_finite(value: object) -> bool:
+    """Whether a value of TOML is a finite number; true and false are none."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer beyond the largest float
+        return False
+
+
+def several(least: int) -> ValueKind:
+    """The kind of a list of so many numbers or more."""
+    words = f"a list of at least {least} finite numbers"
+    return ValueKind(words, lambda v: LIST.fits(v) and len(v) >= least and all(map(is_finite, v)))
+
+
+def vector(length: int) -> ValueKind:
+    """The kind of a list of so many numbers."""
+    words = f"{length} finite numbers"
+    return ValueKind(words, lambda v: several(length).fits(v) and len(v) == length)
+
+
+def one_each(of: str, fits: Callable[[Any], bool]) -> ValueKind:
+    """The kind of a number, or a list with one for each."""
+    words = f"a number or one {of}"
+    return ValueKind(words, lambda v: v != [] and all(map(fits, v if LIST.fits(v) else [v])))
+
+
+NUMBER = ValueKind("a finite number", is_finite)
+WHOLE = ValueKind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool))
+SWITCH = ValueKind("true or false", lambda v: isinstance(v, bool))
+TEXT = ValueKind("text in quotes", lambda v: isinstance(v, str))
+LIST = ValueKind("a list", lambda v: isinstance(v, list | tuple))
+TEXTS = ValueKind(
+    "text in quotes, or a list of it",
+    lambda v: TEXT.fits(v) or (LIST.fits(v) and all(map(TEXT.fits, v))),
 )
+TABLE = ValueKind("a section", lambda v: isinstance(v, Mapping))
+PER_JOINT = one_each("a joint", is_finite)
+PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
 
 
 class Bound(NamedTuple):
@@ -212,11 +261,15 @@ class Section(NamedTuple):
 
     def choice(self, key: str, known: Iterable[str], default: str | None = None) -> str:
         """One of the words that are known, `default` if the key is absent."""
-        return str(self.value(key, word_of(known), default))
+        there = list(known)
+        kind = ValueKind(f"one of {', '.join(there)}", lambda v: v in there)
+        return str(self.value(key, kind, default))
 
     def tables(self, key: str) -> tuple[Mapping[str, Any], ...]:
         """The ``[[key]]`` tables, none if there are none."""
-        return tuple(self.value(key, tables(key), ()))
+        words = f"tables, each headed [[{key}]]"
+        kind = ValueKind(words, lambda v: LIST.fits(v) and all(map(TABLE.fits, v)))
+        return tuple(self.value(key, kind, ()))
 
     def section(self, name: str) -> "Section":
         """The section of a name in this one, empty if there is none."""

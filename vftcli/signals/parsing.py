@@ -1,11 +1,10 @@
-"""Texts and TOML values: letters that can be shown, known names, spans, numbers, their kinds."""
+"""Texts: letters that can be shown, known names, spans, numbers, the tables of TOML."""
 
-import math
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Any, NamedTuple
+from typing import Any
 
 from vftcli.signals.errors import ParameterError
 
@@ -137,76 +136,6 @@ def toml_tables(text: str) -> dict[str, Any]:
         raise ParameterError("not valid TOML: nested too deep") from None
     except ValueError as error:  # TOML's own, and that of an integer of thousands of digits
         raise ParameterError(f"not valid TOML: {error}") from None
-
-
-class ValueKind(NamedTuple):
-    """One kind of value."""
-
-    words: str  #: What such a value is, as it ends "it must be …".
-    fits: Callable[[Any], bool]  #: Whether a value of TOML is one.
-
-    def broken(self, name: str, value: object) -> str:
-        """The complaint about the value of a key, "" where it is of the kind."""
-        return "" if self.fits(value) else f"{name} is {shown(value)}; it must be {self.words}"
-
-    def check(self, name: str, value: object) -> None:
-        """Raise a ParameterError unless the value of a key is of the kind."""
-        if why := self.broken(name, value):
-            raise ParameterError(why)
-
-
-def is_finite(value: object) -> bool:
-    """Whether a value of TOML is a finite number; true and false are none."""
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer beyond the largest float
-        return False
-
-
-def several(least: int) -> ValueKind:
-    """The kind of a list of so many numbers or more."""
-    words = f"a list of at least {least} finite numbers"
-    return ValueKind(words, lambda v: LIST.fits(v) and len(v) >= least and all(map(is_finite, v)))
-
-
-def vector(length: int) -> ValueKind:
-    """The kind of a list of so many numbers."""
-    words = f"{length} finite numbers"
-    return ValueKind(words, lambda v: several(length).fits(v) and len(v) == length)
-
-
-def word_of(known: Iterable[str]) -> ValueKind:
-    """The kind of a word of a list."""
-    there = list(known)
-    return ValueKind(f"one of {', '.join(there)}", lambda v: v in there)
-
-
-def tables(key: str) -> ValueKind:
-    """The kind of the ``[[key]]`` tables."""
-    words = f"tables, each headed [[{key}]]"
-    return ValueKind(words, lambda v: LIST.fits(v) and all(map(TABLE.fits, v)))
-
-
-def one_each(of: str, fits: Callable[[Any], bool]) -> ValueKind:
-    """The kind of a number, or a list with one for each."""
-    words = f"a number or one {of}"
-    return ValueKind(words, lambda v: v != [] and all(map(fits, v if LIST.fits(v) else [v])))
-
-
-NUMBER = ValueKind("a finite number", is_finite)
-WHOLE = ValueKind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool))
-SWITCH = ValueKind("true or false", lambda v: isinstance(v, bool))
-TEXT = ValueKind("text in quotes", lambda v: isinstance(v, str))
-LIST = ValueKind("a list", lambda v: isinstance(v, list | tuple))
-TEXTS = ValueKind(
-    "text in quotes, or a list of it",
-    lambda v: TEXT.fits(v) or (LIST.fits(v) and all(map(TEXT.fits, v))),
-)
-TABLE = ValueKind("a section", lambda v: isinstance(v, Mapping))
-PER_JOINT = one_each("a joint", is_finite)
-PER_AXIS = one_each("an axis", lambda v: is_finite(v) or v == math.inf)
 
 
 def set_value(text: str, whole: str) -> float | list[float]:

@@ -7,20 +7,18 @@ from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from vftcli.robots.robot_file import lines_of
-from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import (
+from vftcli.robots.robot_file import (
     LIST,
     SWITCH,
     TABLE,
     TEXT,
     WHOLE,
     ValueKind,
-    assignment,
-    check_known,
     is_finite,
-    toml_tables,
+    lines_of,
 )
+from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import assignment, check_known, toml_tables
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"
