@@ -212,3 +212,25 @@ def test_a_name_that_a_spreadsheet_would_run_is_a_text_in_csv(first: str) -> Non
     (row,) = csv.DictReader(io.StringIO(text, newline=""))
     shown = name.replace("\r", r"\r")
     assert row == {"log": f"'{shown}", "value": "-1.5", "at": "'-"}
+
+
+def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom() -> None:
+    columns = (
+        Column("name", words=True),
+        Column("time to the peak", "m, rad", ".1f"),
+        Column("work of all", "J", ".1f", seldom=True),
+    )
+    grid = Grid(columns=columns, rows=(("a", 1.0, 2.0), ("b", 10.0, 20.0)))
+    wide, narrow, least = (
+        terminal(grid, width=80),
+        terminal(grid, width=31),
+        terminal(grid, width=15),
+    )
+    assert wide.splitlines()[0] == "name  time to the peak [m, rad]  work of all [J]"
+    assert [line.split() for line in narrow.splitlines()[-2:]] == [
+        ["a", "1.0", "2.0"],
+        ["b", "10.0", "20.0"],
+    ]
+    assert "[m, rad]" in narrow
+    assert max(map(len, narrow.splitlines())) <= 31
+    assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]

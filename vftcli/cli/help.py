@@ -253,7 +253,7 @@ def robots(name: str | None, tip: str | None) -> str:
 
     if name is not None:
         return robot_text(RobotChoice.parsed(robot=name, tip=tip).named())
-    grids = {maker: robots_grid(map(load_robot, names)) for maker, names in MAKERS.items()}
+    grids = {maker: robots_grid(map(load_robot, names), maker) for maker, names in MAKERS.items()}
     return "".join(f"{maker}\n{terminal(grid)}" for maker, grid in grids.items()).rstrip("\n")
 
 

@@ -64,8 +64,11 @@ class Stages:
     def echo(
         self, text: str, *, err: bool = False, nl: bool = True, colour: bool | None = None
     ) -> None:
-        """Print over the line, which comes again below; on a terminal fitted to its width."""
-        if is_terminal(sys.stderr if err else sys.stdout):
+        """Print over the line, which comes again below, fitted to the terminal or 80 columns.
+
+        Words that no terminal shows stay one line: programs look for them.
+        """
+        if not err or is_terminal(sys.stderr):
             text = fitted(text, shutil.get_terminal_size().columns)
         with self._lock:
             self.clear()

@@ -29,16 +29,16 @@ COLUMNS = {
     "xi": Column("ξ", form=number_form(".3g")),
     "axis": Column("axis"),
     "drag": Column("drag"),
-    "start_s": Column("start", "s", THIRD),
-    "release_s": Column("release", "s", THIRD),
+    "start_s": Column("start", "s", THIRD, seldom=True),
+    "release_s": Column("release", "s", THIRD, seldom=True),
     "peak": Column("peak", "m, rad", number_form(".4f")),
     "time_to_peak_s": Column("to peak", "s", THIRD),
-    "peak_advance_s": Column("advance", "s", THIRD),
+    "peak_advance_s": Column("advance", "s", THIRD, seldom=True),
     "overshoot": Column("overshoot", "%", lambda share: number_form(".1f")(100.0 * share)),
     "return_10_s": Column("back to 10 %", "s", THIRD, symbol="$t_{10}$"),
     "return_2_s": Column("back to 2 %", "s", THIRD, symbol="$t_2$"),
-    "idle_s": Column("idle", "s", THIRD),
-    "work_J": Column("work", "J", THIRD),
+    "idle_s": Column("idle", "s", THIRD, seldom=True),
+    "work_J": Column("work", "J", THIRD, seldom=True),
 }
 #: What is timed of a contact → its heading.
 LATENCIES = {

@@ -10,6 +10,8 @@ import csv
 import io
 import json
 import re
+import shutil
+import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
@@ -52,6 +54,7 @@ class Column(NamedTuple):
     words: bool = False
     width: int = 0  #: Least width on the terminal.
     symbol: str = ""  #: The heading in LaTeX where it is a formula.
+    seldom: bool = False  #: Whether a terminal without room for it may leave it out.
 
     @property
     def heading(self) -> str:
@@ -125,32 +128,55 @@ def joint_columns(joints: Sequence[int] | int, **shape: Any) -> tuple[Column, ..
     return tuple(Column(f"J{j}", symbol=f"$J_{{{j}}}$", **shape) for j in numbers)
 
 
-def terminal(grid: Grid, letters: Callable[[str], str] = str) -> str:
-    """A table as text, two blanks between columns, each line ended."""
-    # Where numbers may bear a mark, those without one keep its place.
-    rooms = [" " * (grid.marked and not column.words) for column in grid.columns]
-    heads = [letters(c.heading) + room for c, room in zip(grid.columns, rooms, strict=True)]
-    table = [
-        [letters(cell.text) + (cell.mark or room) for cell, room in zip(row, rooms, strict=True)]
-        for row in grid.cells
-    ]
-    if any(heads):
-        table.insert(0, heads)
-    widths = [
-        max(column.width, *(len(texts[k]) for texts in table), 0)
-        for k, column in enumerate(grid.columns)
-    ]
-    # Words stand to the left of their columns, numbers to the right.
-    lines = [
-        "  ".join(
-            text.ljust(width) if column.words else text.rjust(width)
-            for text, column, width in zip(texts, grid.columns, widths, strict=True)
-        ).rstrip()
-        for texts in table
-    ]
+def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None = None) -> str:
+    """A table as text, two blanks between columns, each line ended.
+
+    A table wider than `width`, by default the terminal's, breaks its headings, then leaves out
+    columns that are seldom asked for, the last first, and names them below.
+    """
+    width = width or shutil.get_terminal_size().columns
+    left_out: list[str] = []
+    lines = table_lines(grid, letters)
+    if len(max(lines, key=len, default="")) > width:
+        lines = table_lines(grid, letters, broken=True)
+    while len(max(lines, key=len, default="")) > width and any(c.seldom for c in grid.columns):
+        k = max(k for k, column in enumerate(grid.columns) if column.seldom)
+        left_out.insert(0, grid.columns[k].head)
+        rows = tuple([*row[:k], *row[k + 1 :]] for row in grid.rows)
+        grid = replace(grid, columns=grid.columns[:k] + grid.columns[k + 1 :], rows=rows)
+        lines = table_lines(grid, letters, broken=True)
+    above = [grid.caption] if grid.caption else []
+    below = [f"No room for: {', '.join(left_out)}."] if left_out else []
+    return "".join(f"{line}\n" for line in (*above, *lines, *below))
+
+
+def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = False) -> list[str]:
+    """Headings and rows as lines, a rule above the summaries; headings `broken` at blanks."""
+    columns: list[list[str]] = []
+    for column, entries in zip(grid.columns, zip(*grid.cells, strict=True), strict=True):
+        # Where numbers may bear a mark, those without one keep its place.
+        room = " " * (grid.marked and not column.words)
+        texts = [letters(cell.text) + (cell.mark or room) for cell in entries]
+        heads = [letters(column.heading)]
+        if broken:
+            # The unit is not broken: of its blanks textwrap knows nothing.
+            unit = column.unit.replace(" ", "\N{NO-BREAK SPACE}")
+            head = letters(column._replace(unit=unit).heading)
+            least = max(map(len, [*head.split(" "), *texts]))
+            heads = [h.replace("\N{NO-BREAK SPACE}", " ") for h in textwrap.wrap(head, least)]
+        columns.append([*(head + room for head in heads), *texts])
+    heights = [len(texts) - len(grid.rows) for texts in columns]
+    high = max(heights, default=0)
+    for k, (column, height) in enumerate(zip(grid.columns, heights, strict=True)):
+        texts = [""] * (high - height) + columns[k]
+        wide = max(column.width, *map(len, texts))
+        # Words stand to the left of their columns, numbers to the right.
+        columns[k] = [text.ljust(wide) if column.words else text.rjust(wide) for text in texts]
+    lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
+    lines = lines[high:] if not any(lines[:high]) else lines
     if grid.summaries:
         lines.insert(-grid.summaries, "-" * len(lines[0]))
-    return "".join(f"{line}\n" for line in ([grid.caption] if grid.caption else []) + lines)
+    return lines
 
 
 def markdown(grid: Grid) -> str:

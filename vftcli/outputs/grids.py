@@ -34,13 +34,13 @@ CONTACTS = {
 }
 
 
-def robots_grid(robots: "Iterable[Robot]") -> Grid:
-    """The robot profiles, one row each, without a heading."""
+def robots_grid(robots: "Iterable[Robot]", maker: str = "") -> Grid:
+    """The robot profiles of a maker, one row each, without a heading."""
     rows = []
     for robot in robots:
         friction = sorted({f.model for f in robot.friction}) or ["no friction model"]
         joints, models = f"{robot.joints} joints", ", ".join(friction)
-        rows.append((robot.name, robot.title, joints, robot.torque_source, models))
+        rows.append((robot.name, robot.title.removeprefix(f"{maker} "), joints, robot.torque_source, models))
     # The widths keep the columns of one release where they were in the one before.
     return Grid([Column("", words=True, width=width) for width in (6, 27, 9, 12, 0)], rows)
 
