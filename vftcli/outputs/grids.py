@@ -38,11 +38,12 @@ def robots_grid(robots: "Iterable[Robot]", maker: str = "") -> Grid:
     """The robot profiles of a maker, one row each, without a heading."""
     rows = []
     for robot in robots:
-        friction = sorted({f.model for f in robot.friction}) or ["no friction model"]
-        joints, models = f"{robot.joints} joints", ", ".join(friction)
-        rows.append((robot.name, robot.title.removeprefix(f"{maker} "), joints, robot.torque_source, models))
+        friction = sorted({f.model.removeprefix("coulomb-") for f in robot.friction})
+        title, joints = robot.title.removeprefix(f"{maker} "), f"{robot.joints} joints"
+        models = ", ".join(friction) or "no friction model"
+        rows.append((robot.name, title, joints, robot.torque_source, models))
     # The widths keep the columns of one release where they were in the one before.
-    return Grid([Column("", words=True, width=width) for width in (6, 27, 9, 12, 0)], rows)
+    return Grid([Column("", words=True, width=width) for width in (6, 24, 8, 12, 0)], rows)
 
 
 def joints_grid(robot: "Robot") -> Grid:
