@@ -96,7 +96,7 @@ def test_contacts_are_counted_in_whole_numbers() -> None:
         "longest_delay_s": None,
     }
     (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
-    assert terminal(grid).splitlines()[2].split() == [
+    assert terminal(grid, width=200).splitlines()[2].split() == [
         "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "1", "0", "0", "0.0400", "–",
     ]  # fmt: skip
     assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []

@@ -143,7 +143,8 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None 
         k = max(k for k, column in enumerate(grid.columns) if column.seldom)
         left_out.insert(0, grid.columns[k].head)
         rows = tuple([*row[:k], *row[k + 1 :]] for row in grid.rows)
-        grid = replace(grid, columns=grid.columns[:k] + grid.columns[k + 1 :], rows=rows)
+        columns = [*grid.columns[:k], *grid.columns[k + 1 :]]
+        grid = replace(grid, columns=columns, rows=rows)
         lines = table_lines(grid, letters, broken=True)
     above = [grid.caption] if grid.caption else []
     below = [f"No room for: {', '.join(left_out)}."] if left_out else []
