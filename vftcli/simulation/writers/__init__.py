@@ -6,24 +6,23 @@ later: commas, six significant digits.
 """
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vftcli.robots import Robot
+from vftcli.robots.kernels import momentum_terms
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.pose import log_matrix
 from vftcli.signals.wrench import AXES
-from vftcli.simulation.arm import rigid_torque
 from vftcli.simulation.experiment import FlangeMotion, Simulation, Truth, flat
 from vftcli.simulation.scenario import Scenario
 from vftcli.simulation.sensing import drive_constants
-from vftcli.simulation.trajectories import Reference
 from vftcli.simulation.writers.rosbag2 import ROBOT_STATE, write_rosbag2
 from vftcli.virtual_sensor.solvers import LEAST_SIGMA, wrench_of
 
@@ -96,51 +95,40 @@ TRUTH_FRAME = "base axes, moment about the flange point"  #: Of the truth's wren
 AT_CONTACT = "base axes, moment about the point that is touched"
 
 
-def vendor_signals(simulation: Simulation) -> dict[str, Callable[[], Array]]:
-    """Signals of vendors' tables by name, to be called. (M, …) each
+def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
+    """Signals of vendors' tables by name. (M, …) each
 
     With no tool set the TCP is the flange.
     """
     import pinocchio as pin
 
     samples, signals = simulation.samples, simulation.measured.signals
-    model = simulation.nominal.model
-    target, time = simulation.target, simulation.measured.stamp + simulation.scenario.sensing.start
-    still = np.zeros_like(samples.target_q)
-    resting = Reference(samples.target_q, still, still)
-
-    def accelerometer() -> Array:
-        weightless = np.gradient(samples.target_dq, samples.time, axis=0)
-        felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
-        return np.asarray(np.einsum("kji,kj->ki", target.rotation, felt))
-
-    def momentum() -> Array:
-        data, states = model.createData(), zip(signals["q"], signals["dq"], strict=True)
-        linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
-        return np.array([np.linalg.norm(vector) for vector in linear])
-
-    def matrix() -> Array:
-        pose = np.zeros((len(samples.time), 4, 4))
-        pose[:, :3, :3], pose[:, :3, 3], pose[:, 3, 3] = target.rotation, target.position, 1.0
-        return pose.transpose(0, 2, 1).reshape(-1, 16)
-
+    chain, model = simulation.nominal.loaded_chain, simulation.nominal.model
+    actual, target = simulation.actual, simulation.target
+    time = simulation.measured.stamp + simulation.scenario.sensing.start
+    gravity = momentum_terms(chain, samples.target_q, np.zeros_like(samples.target_q)).gravity
+    weightless = np.gradient(samples.target_dq, samples.time, axis=0)
+    felt = np.einsum("kij,kj->ki", target.jacobian[:, :3], weightless) - model.gravity.linear
+    data, states = model.createData(), zip(signals["q"], signals["dq"], strict=True)
+    linear = [pin.computeCentroidalMomentum(model, data, *state).linear for state in states]
+    matrix = np.zeros((len(time), 4, 4))
+    matrix[:, :3, :3], matrix[:, :3, 3], matrix[:, 3, 3] = target.rotation, target.position, 1.0
+    # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
+    force = wrench_of(signals["tau_ext"], actual.jacobian, left_out=LEAST_SIGMA).values
     return {
-        **{name: partial(signals.__getitem__, name) for name in signals},
-        "time": lambda: time,
-        "milliseconds": lambda: np.rint(time * 1e3).astype(int),
-        "target_ddq": lambda: samples.target_ddq,
-        "pose": lambda: pose_of(simulation.actual),
-        "twist": lambda: simulation.actual.twist,
-        # A controller's estimate stays bounded: directions that the pose cannot tell read nothing.
-        "force": lambda: (
-            wrench_of(signals["tau_ext"], simulation.actual.jacobian, left_out=LEAST_SIGMA).values
-        ),
-        "target_pose": lambda: pose_of(target),
-        "target_matrix": matrix,
-        "target_twist": lambda: target.twist,
-        "accelerometer": accelerometer,
-        "momentum": momentum,
-        "torque_command": lambda: signals["target_torque"] - rigid_torque(model, resting),
+        **signals,
+        "time": time,
+        "milliseconds": np.rint(time * 1e3).astype(int),
+        "target_ddq": samples.target_ddq,
+        "pose": pose_of(actual),
+        "twist": actual.twist,
+        "force": force,
+        "target_pose": pose_of(target),
+        "target_matrix": matrix.transpose(0, 2, 1).reshape(-1, 16),
+        "target_twist": target.twist,
+        "accelerometer": np.einsum("kji,kj->ki", target.rotation, felt),
+        "momentum": np.linalg.norm(linear, axis=1),
+        "torque_command": signals["target_torque"] - gravity,
     }
 
 
@@ -174,7 +162,7 @@ class VendorTable(NamedTuple):
         names, texts = [], []
         for name, content in own.items():
             if isinstance(content, str):
-                values = known[content.removeprefix("-").removeprefix("next ")]()
+                values = known[content.removeprefix("-").removeprefix("next ")]
                 if content.startswith("next "):
                     values = np.concatenate([values[1:], values[-1:]])
                 values = (-values if content.startswith("-") else values)[rows]
