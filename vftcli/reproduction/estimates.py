@@ -61,16 +61,15 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
     }
     models, result = Runs(), RunResult()
     for variant, (run, observers, spans) in asked.items():
+        wrench = WrenchChoice(sensor_pose=sensor_pose, zero=ZeroChoice(spans=spans))
         choice = AnalysisChoice(
             observers=observers,
             contacts=False,
-            wrench=WrenchChoice(sensor_pose=sensor_pose, zero=ZeroChoice(spans=spans)),
+            wrench=wrench,
             reference=ReferenceChoice(name="sensor"),
         )
         made = analyse(run.recording, load_robot("ur5"), choice, models)
-        assert made.errors is not None, "a reference was asked for"
-        rows = made.errors.filter(made.errors["axis"].is_not_null())
-        for row in rows.iter_rows(named=True):
+        for row in error_rows(made, "axis"):
             force, moment = row["rmse_N"], row["rmse_Nm"]
             result.put(variant, {row["axis"]: moment if force is None else force})
         assert made.virtual_sensor is not None, "a wrench was asked for"
@@ -99,6 +98,12 @@ def dragged_sensor(seed: int, *, sensor_pose: str, unloaded: Sequence[float]) ->
             assert chart is not None, "a wrench was asked for"
             result.charts["fig4"] = chart
     return result
+
+
+def error_rows(made: Analysis, of: str) -> list[dict[str, Any]]:
+    """The rows of the errors that are of a joint, or of an axis."""
+    assert made.errors is not None, "a reference was asked for"
+    return list(made.errors.filter(pl.col(of).is_not_null()).iter_rows(named=True))
 
 
 def rms(values: Array) -> float:
@@ -217,9 +222,8 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
             reference=ReferenceChoice(name="two-cycle"),
         )
         made = analyse(recording, robot, choice, models)
-        assert made.errors is not None, "a reference was asked for"
-        rows = made.errors.filter(pl.col("joint").is_not_null())
-        for row in rows.iter_rows(named=True):
+        rows = error_rows(made, "joint")
+        for row in rows:
             key = f"{row['observer']}/{row['joint']}"
             result.put(variant, {key: row["rmse_Nm"]})
             result.put(FLOOR, {key: row["reference_floor_Nm"]})
@@ -227,8 +231,8 @@ def tapped_circle(seed: int, *, scenario: str, period: float) -> RunResult:
         for estimate in made.estimates:
             free = (estimate.t > 1.0) & (estimate.t < period)
             result.put(variant, {f"free/{estimate.name}": rms(estimate.tau[free, :3])})
-            own = rows.filter((pl.col("observer") == estimate.name) & (pl.col("joint") <= 3))
-            if lags := own["lag_s"].drop_nulls().to_list():
+            own = (r["lag_s"] for r in rows if r["observer"] == estimate.name and r["joint"] <= 3)
+            if lags := [lag for lag in own if lag is not None]:
                 result.put(variant, {f"lag/{estimate.name}": float(np.mean(lags))})
         for each in facts(made.observers, made.tunings, made.motion.log, made.errors):
             numbers = {
