@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from vftcli.identification import Task, identify
+from vftcli.identification.fitting import repeated_share
 from vftcli.identification.payload import payload_from_pair, payload_from_poses
-from vftcli.identification.result import repeated_share
 from vftcli.identification.training import gravity_torque, prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque

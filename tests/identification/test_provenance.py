@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from vftcli.identification.fitting import with_provenance
-from vftcli.identification.payload import LoadFit
-from vftcli.identification.result import (
-    BASE,
+from vftcli.identification.fitting import (
     PARAMETERS,
     RESIDUALS,
     SHAPE_CHOICES,
     Identification,
     Trace,
-    number,
+    with_provenance,
 )
+from vftcli.identification.links import BASE
+from vftcli.identification.methods import number
+from vftcli.identification.payload import LoadFit
 from vftcli.robots import Payload, load_robot
 from vftcli.robots.profile import robot_toml
 from vftcli.signals.recording import Recording, Source

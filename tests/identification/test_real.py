@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.evaluation import rmse
 from vftcli.identification import Task, identify
-from vftcli.identification.result import REPEATED, repeated_share
+from vftcli.identification.fitting import REPEATED, repeated_share
 from vftcli.identification.training import prepare
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read

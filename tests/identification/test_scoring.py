@@ -6,15 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from vftcli.identification.result import (
+from vftcli.identification.fitting import (
     Trace,
-    apparent_load,
     held_out_remarks,
     joint_remark,
     repeated_share,
     score_remarks,
 )
-from vftcli.identification.training import root_mean_square
+from vftcli.identification.training import apparent_load, root_mean_square
 from vftcli.robots import Payload, load_robot
 
 UR5 = load_robot("ur5")

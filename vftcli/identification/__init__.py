@@ -6,9 +6,8 @@ from vftcli.identification.choice import Task
 from vftcli.signals.packages import door
 
 if TYPE_CHECKING:
-    from vftcli.identification.fitting import identify
-    from vftcli.identification.result import Identification
+    from vftcli.identification.fitting import Identification, identify
 else:
-    __getattr__ = door(__name__, "fitting", "result")
+    __getattr__ = door(__name__, "fitting")
 
 __all__ = ["Identification", "Task", "identify"]

@@ -8,9 +8,8 @@ import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, JointFit, all_residuals, fit_frictions
 from vftcli.identification.links import residuals
-from vftcli.identification.result import apparent_load
 from vftcli.identification.shapes import Shape
-from vftcli.identification.training import ParameterColumns, PreparedLog, Training
+from vftcli.identification.training import ParameterColumns, PreparedLog, Training, apparent_load
 from vftcli.robots.friction import SMOOTHING, dry_friction, dry_torque
 from vftcli.robots.robot import JointFriction
 from vftcli.signals.arrays import Array, Mask

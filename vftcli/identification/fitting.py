@@ -1,30 +1,45 @@
-"""Logs in, a robot out: `vftcli identify` in the order of its data."""
+"""Logs in, a robot out: `vftcli identify` in the order of its data, and what its numbers are worth.
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any
+A log is scored filtered and in motion, from its first to its last sample that moves.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, get_type_hints
 
 import numpy as np
 import polars as pl
 
 from vftcli.identification.choice import Task
-from vftcli.identification.methods import chosen_method, friction_method, whole_arm
-from vftcli.identification.payload import LoadFit, find_load, names_of
-from vftcli.identification.result import (
-    PARAMETERS,
-    RESIDUALS,
-    SHAPE_CHOICES,
-    Identification,
+from vftcli.identification.methods import (
     MethodResult,
+    Number,
+    chosen_method,
+    friction_method,
     number,
-    score,
-    score_remarks,
+    whole_arm,
 )
+from vftcli.identification.payload import LoadFit, find_load, names_of
 from vftcli.identification.targets import targets_method
-from vftcli.identification.training import Training, prepare_training, settings_record
+from vftcli.identification.training import (
+    PreparedLog,
+    Training,
+    apparent_load,
+    prepare,
+    prepare_training,
+    root_mean_square,
+    settings_record,
+)
+from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
+from vftcli.robots.terms import uses_current
+from vftcli.signals.arrays import Array
+from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording, refuse_repeated_logs
+from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.rest import faster
+from vftcli.signals.series import resample_columns
 
 #: Name at the command line → method; without a name the first two are chosen between.
 FITS: dict[str | None, Callable[[Training], MethodResult]] = {
@@ -33,6 +48,175 @@ FITS: dict[str | None, Callable[[Training], MethodResult]] = {
     "targets": targets_method,
     None: chosen_method,
 }
+#: One row a log, model and joint: RMS of measured less predicted torque, in motion. `log_index`
+#: counts the logs from 1, training first: two files of one name stay two logs.
+RESIDUALS = pl.Schema(
+    {"log": str, "log_index": int, "role": str, "model": str}
+    | {"joint": int, "rms_Nm": float, "samples": int}
+)
+EXPLAINS = 0.4  #: Share of a residual that a cause must explain to be named.
+HEAVY = 0.3  #: Smallest load that is remarked on. [kg]
+ENOUGH = 50  #: Samples in motion that a remark on friction needs.
+WORSE = 1.5  #: Times the training's residual from which a held-out joint is remarked on.
+#: A model that leaves this many times what the profile leaves of a log has made it worse.
+BEHIND = 1.01
+NEAR = 0.01  #: Largest joint distance of samples at one place. [rad]
+SLOWNESS = 0.1  #: Velocity difference that counts as much as that distance, as a time. [s]
+#: Share of a log's samples on another's trajectory from which on it repeats that trajectory.
+REPEATED = 0.8
+#: One row a number: its value, standard deviation, and what the profile said.
+PARAMETERS = pl.Schema(get_type_hints(Number))
+#: One row a friction candidate: its cross-validated error.
+SHAPE_CHOICES = pl.Schema({"joint": int, "friction": str, "cv_rms_Nm": float, "chosen": bool})
+
+
+class Trace(NamedTuple):
+    """Measured and predicted torque of one log, filtered alike."""
+
+    motion: PreparedLog  #: The prepared log.
+    role: str  #: "train" or "held-out".
+    measured: Array  #: Drive torque, by the identified drive constants. (M, n) [N·m]
+    predicted: Array  #: Torque that the identified robot expects. (M, n) [N·m]
+    before: Array  #: RMS of what the profile does not explain. (n,) [N·m]
+
+    @property
+    def residual(self) -> Array:
+        """Measured less predicted. (M, n) [N·m]"""
+        difference: Array = self.measured - self.predicted
+        return difference
+
+    @property
+    def rms(self) -> Array:
+        """RMS of the residual in each joint. (n,) [N·m]"""
+        return root_mean_square(self.residual)
+
+    def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
+        """Rows of `RESIDUALS`, this log being the one of this index."""
+        name, samples = self.motion.recording.name, self.motion.samples
+        return [
+            (name, index, self.role, model, j, float(value), samples)
+            for model, values in (("identified", self.rms), ("profile", self.before))
+            for j, value in enumerate(values, start=1)
+        ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Identification:
+    """A robot made from logs, with the account of how."""
+
+    robot: Robot  #: The identified robot; its document carries the sources.
+    profile: Robot  #: The robot it started from.
+    method: str  #: Name of the method.
+    residuals: pl.DataFrame  #: RMS per log, model and joint (`RESIDUALS`).
+    parameters: pl.DataFrame  #: Identified numbers (`PARAMETERS`).
+    #: Friction candidates (`SHAPE_CHOICES`), empty where none competed.
+    shape_choices: pl.DataFrame
+    base: pl.DataFrame | None  #: Base parameters (`BASE`), None for methods that have none.
+    traces: tuple[Trace, ...]  #: Measured and predicted torque of every log.
+    #: Filters, differentiation, decimation and band, by name.
+    processing: Mapping[str, Any] = field(default_factory=dict)
+    remarks: tuple[Remark, ...] = ()  #: What the reader should know.
+
+
+def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float) -> Trace:
+    """Measured torque of a log, and the identified robot's and the profile's."""
+    motion = prepare(log, profile, cutoff)
+    if motion.samples < 2:
+        return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
+    before = root_mean_square(motion.tau - motion.predicted)
+    old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
+    # What was made from currents with the old constants is made with the new.
+    if old is not None and new is not None and uses_current(log, profile):
+        measured = measured * (new / old)
+    return Trace(motion, role, measured, motion.under(robot).predicted, before)
+
+
+def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
+    """Remarks on worse or repeated logs, and on joints much worse elsewhere."""
+    train = [trace for trace in traces if trace.role == "train"]
+    held_out = [trace for trace in traces if trace.role == "held-out"]
+    remarks = []
+    for trace in traces:
+        left, before = float(np.mean(trace.rms)), float(np.mean(trace.before))
+        if left > BEHIND * before > 0.0:
+            where = Where(trace.motion.recording.name)
+            remarks.append(
+                caution("worse-than-profile", where, identified_Nm=left, profile_Nm=before)
+            )
+    for test in held_out:
+        where = Where(test.motion.recording.name)
+        for other in (trace.motion for trace in train):
+            if (share := repeated_share(other, test.motion)) >= REPEATED:
+                values = {"training_log": other.recording.name, "share_percent": 100.0 * share}
+                remarks.append(caution("repeated-trajectory", where, **values))
+    if not train:
+        return remarks
+    level = np.mean([trace.rms for trace in train], axis=0)
+    for test in held_out:
+        remarks += held_out_remarks(test, level)
+    return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
+
+
+def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
+    """Causes of a held-out residual far above the training's. (n,) [N·m]
+
+    A load on the flange, which explains all joints at once, is looked for first.
+    """
+    motion, name = trace.motion, trace.motion.recording.name
+    worse = np.flatnonzero(trace.rms > WORSE * trained).tolist()
+    if not worse:
+        return []
+    mass, explained = apparent_load(motion, trace.residual)
+    if explained > EXPLAINS and abs(mass) > HEAVY:
+        share = 100.0 * explained
+        return [caution("apparent-load", Where(name), mass_kg=mass, share_percent=share)]
+    moving = np.count_nonzero((motion.weights > 0) & faster(motion.dq), axis=0)
+    resting = [j for j in worse if moving[j] < ENOUGH]
+    remarks = [joint_remark(trace, j, float(trained[j])) for j in worse if j not in resting]
+    if resting:
+        remarks.append(fact("resting-joints", Where(name, tuple(j + 1 for j in resting))))
+    return remarks
+
+
+def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
+    """Whether friction explains joint j's (from 0) residual beyond training's.
+
+    Coulomb and viscous friction and an offset are fitted to the residual; where they explain
+    `EXPLAINS` of it, friction is named as its cause.
+    """
+    motion, residual, size = trace.motion, trace.residual, float(trace.rms[j])
+    where = Where(motion.recording.name, (j + 1,))
+    values = {"rms_Nm": size, "ratio": size / trained}
+    dq = motion.recording.require("dq")[:, j]
+    used = ((motion.weights > 0) & faster(motion.dq))[:, j]
+    sign = np.tanh(dq / SMOOTHING)
+    A = np.column_stack([motion.filtered(np.column_stack([sign, dq])), np.ones(motion.samples)])
+    fit = fit_column(A, residual[:, j], used.astype(float))
+    left = float(np.mean(fit.residual[used] ** 2))
+    explained = 1.0 - left / max(float(np.mean(residual[used, j] ** 2)), 1e-12)
+    if explained < EXPLAINS:
+        return caution("larger-residual", where, **values)
+    speed = float(np.sqrt(np.mean(motion.dq[used, j] ** 2)))
+    more = float(fit.values[0] + fit.values[1] * speed)
+    values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
+    return caution("more-friction" if more > 0 else "less-friction", where, **values)
+
+
+def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
+    """Share of the test's moving samples on the training log's (q, q̇) path.
+
+    Such a log is no test: whatever error the model has along that path, it has fitted.
+    """
+    from scipy.spatial import cKDTree
+
+    if train.samples == 0 or test.samples == 0:
+        return 0.0
+    path, points = (np.hstack([log.q, SLOWNESS * log.dq]) for log in (train, test))
+    # Between samples the path is interpolated, so that its points lie nearer than `NEAR`.
+    index = np.arange(0, len(path) - 1 + 1e-9, 0.25)
+    tree = cKDTree(resample_columns(index, np.arange(float(len(path))), path))
+    distance, _ = tree.query(points, p=np.inf, distance_upper_bound=NEAR)
+    return float(np.mean(np.isfinite(distance)))
 
 
 def identify(

@@ -21,13 +21,14 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.identification.result import BASE
 from vftcli.identification.training import ParameterColumns, PreparedLog
 from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd
 
+#: One row a base parameter, or a friction coefficient estimated along with them.
+BASE = pl.Schema({"parameter": str, "value": float, "sd": float, "determined": bool})
 ROWS = 512  #: Samples stacked at once.
 REWEIGHTINGS = 3  #: Passes of reweighting; each evaluates the regressor twice.
 #: Singular values below this share of the largest stay at the start (columns scaled).

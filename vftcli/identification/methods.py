@@ -5,6 +5,7 @@ What method "targets" says of a joint's friction is made here too.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import polars as pl
@@ -32,7 +33,6 @@ from vftcli.identification.links import (
     predicts_best_unpulled,
     stack,
 )
-from vftcli.identification.result import MethodResult, Number, number
 from vftcli.identification.shapes import Shape, round_digits
 from vftcli.identification.training import ParameterColumns, Training
 from vftcli.robots.friction import SMOOTHING, falling_speed, steady_torque
@@ -43,12 +43,62 @@ from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 
+#: Parameter → its unit.
+UNITS = {
+    "torque_constant": "N·m/A",
+    "rotor_inertia": "kg·m²",
+    "coulomb": "N·m",
+    "viscous": "N·m·s/rad",
+    "offset": "N·m",
+    "quadratic": "N·m·s²/rad²",
+    "logarithmic": "N·m",
+    "load_coulomb": "1",
+    "presliding": "N·m",
+    **{f"point{k}": "N·m" for k in range(1, 5)},
+    "stribeck": "N·m",
+    "mass": "kg",
+    "com_x": "m",
+    "com_y": "m",
+    "com_z": "m",
+}
 #: Standard deviation over value up to which a number counts as determined by the logs.
 DETERMINED = 0.3
 #: Standard deviations off from which a profile's rotor inertia is replaced.
 REFUTED = 3.0
 #: Measured over expected torque below which a current does not follow it.
 LEAST_SLOPE = 0.05
+
+
+class Number(NamedTuple):
+    """One identified number."""
+
+    joint: int  #: Joint, from 1; the last one for a load on the flange.
+    parameter: str  #: Its key in the robot file, one of `UNITS`.
+    value: float  #: The estimate.
+    sd: float  #: Its standard deviation.
+    unit: str  #: Unit of value, sd and profile.
+    profile: float  #: The profile's number, nan where it has none.
+    determined: bool  #: Whether the logs determine it; else it is not written.
+
+
+def number(
+    j: int, parameter: str, value: float, sd: float, profile: float, determined: bool
+) -> Number:
+    """An identified number of joint j (from 0), with its parameter's unit."""
+    unit, known = UNITS[parameter], bool(determined)
+    return Number(j + 1, parameter, float(value), float(sd), unit, float(profile), known)
+
+
+class MethodResult(NamedTuple):
+    """Robot, numbers and remarks of one method."""
+
+    method: str  #: Its name.
+    robot: Robot  #: The identified robot.
+    numbers: Sequence[Number] = ()  #: Its identified numbers.
+    remarks: Sequence[Remark] = ()  #: What the reader of the numbers should know.
+    shape_choices: Sequence[tuple[int, str, float, bool]] = ()  #: Rows of `SHAPE_CHOICES`.
+    base: pl.DataFrame | None = None  #: Base parameters (`BASE`), if the method has them.
+    is_narrow: bool = False  #: Whether the motion tells the links too little.
 
 
 def friction_method(data: Training, fitted: CleanFit | None = None) -> MethodResult:

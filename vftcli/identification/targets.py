@@ -14,12 +14,14 @@ import numpy as np
 
 from vftcli.identification.friction_fit import LIGHT, is_dissipative
 from vftcli.identification.methods import (
+    MethodResult,
+    Number,
     identified_friction,
+    number,
     profile_constant,
     profile_friction,
     temperature_remarks,
 )
-from vftcli.identification.result import MethodResult, Number, number
 from vftcli.identification.shapes import LOGARITHMIC_VELOCITIES, Shape, bent, round_digits
 from vftcli.identification.training import PreparedLog, Training, gravity_torque, prepare
 from vftcli.robots.friction import friction_torque

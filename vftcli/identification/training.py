@@ -209,6 +209,15 @@ def load_columns(robot: Robot, q: Array, dq: Array, ddq: Array) -> Array:
     return torque_regressor(robot.chain, q, dq, ddq)[:, :, -LINK:][:, :, :STATIC]
 
 
+def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
+    """Mass that would explain the residual, and the share explained. [kg], [1]"""
+    signals = ((log.q[s], log.dq[s], log.ddq[s]) for s in log.chunks())
+    A = np.concatenate([load_columns(log.robot, *part).reshape(-1, STATIC) for part in signals])
+    y = residual.ravel()
+    x = np.linalg.lstsq(A, y, rcond=1e-6)[0]
+    return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
+
+
 def root_mean_square(x: Array) -> Array:
     """Root mean square of each column of x (M, n), in its unit. (n,)"""
     value: Array = np.sqrt(np.mean(x**2, axis=0))

@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.doctor.examination import Examination
-from vftcli.identification.result import Identification, Trace
+from vftcli.identification.fitting import Identification, Trace
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
