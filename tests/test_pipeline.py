@@ -21,7 +21,7 @@ import vftcli as vft
 from vftcli import pipeline
 from vftcli.cli import app
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.free_motion import alignment
+from vftcli.free_motion import free_motion
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
@@ -168,7 +168,7 @@ def test_every_log_is_read_modelled_and_aligned_once(
 
     count(reading, "read_chosen")
     count(modelled, "dynamics_terms")
-    count(alignment, "align")
+    count(free_motion, "align")
     names = {"LOAD": runs[0], "FREE": runs[1], "MORE": runs[2], "OUT": tmp_path / "out"}
     names["TRUTH"] = Path(f"file:{FIXTURE}.truth.parquet")
     line = words.replace("OUT.toml", str(tmp_path / "gains.toml"))

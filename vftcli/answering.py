@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from vftcli.admittance.replay import DrivingForce, Replay
     from vftcli.contacts.thresholds import ComparedSignals, Thresholds
     from vftcli.doctor.examination import Examination
-    from vftcli.evaluation.logged_jacobian import JacobianJudgement
+    from vftcli.evaluation.wrenches import JacobianJudgement
     from vftcli.identification import Identification
     from vftcli.observers.spectra import Spectra
     from vftcli.observers.tuning import Goal, Tuned

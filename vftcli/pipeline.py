@@ -346,8 +346,7 @@ def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None"
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
-    learned = found.model.prior
-    prior = None if learned is None else with_wider_force(learned)
+    prior = found.model.prior and with_wider_force(found.model.prior)
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 
@@ -360,10 +359,10 @@ def known_contacts(analysis: "Analysis", choice: AnalysisChoice) -> "KnownContac
     part = free_part(motion)
     listed = {} if rows is None else {BEST: rows.contacts}
     if part is None:
-        return KnownContacts(untouched=np.zeros(motion.log.recording.samples, bool), listed=listed)
-    sensed = analysis.virtual_sensor if choice.wrench is not None else None
+        return KnownContacts(untouched=np.zeros(len(motion.log.t), bool), listed=listed)
     others = [] if part.own.any() else [p for p in part.pieces if p.run is not motion.log]
     own = [o for o in analysis.observers if o.name not in listed]
+    sensed = analysis.virtual_sensor if choice.wrench is not None else None
     sensor = None if sensed is None else sensed.sensor
     beside = read_in_free_runs(others, own, analysis.run_of, sensor)
     return KnownContacts(untouched=part.own, beside=beside, listed=listed)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from contact_rows import contact
 
-from vftcli.contacts.lookalikes import is_load
+from vftcli.contacts.listing import is_load
 from vftcli.signals.recording import Recording
 
 

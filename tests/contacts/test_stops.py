@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vftcli.contacts.lookalikes import follows_stop
+from vftcli.contacts.listing import follows_stop
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 

@@ -29,8 +29,8 @@ def test_the_level_of_exponential_noise_is_the_analytic_one(rate: float) -> None
     """Two hours, k = 120: e is known to 1/√120 = 9 %, and 3 sd of it are allowed."""
     tail = tail_of(maxima_of(np.random.default_rng(1), 7200))
     assert tail is not None
-    assert (tail.count, tail.hours, tail.rate) == (120, 2.0, 60.0)
-    allowed = 3.0 / np.sqrt(tail.count) * np.log(tail.rate / rate)
+    assert (tail.size, tail.hours, tail.rate) == (120, 2.0, 60.0)
+    allowed = 3.0 / np.sqrt(tail.size) * np.log(tail.rate / rate)
     assert abs(tail.threshold(rate)[0] - level_at(rate)) < allowed
 
 
@@ -50,13 +50,13 @@ def test_few_maxima_tell_a_fifth_of_them_and_four_tell_nothing() -> None:
     tail = tail_of(np.arange(60.0))
     assert tail is not None
     # The twelve largest of 0 … 59 lie 1 … 12 beyond the next, 47.
-    assert (tail.count, tail.start, tail.excess) == (12, 47.0, 6.5)
+    assert (tail.size, tail.start, tail.excess) == (12, 47.0, 6.5)
 
 
 def test_the_lower_end_of_one_maximum_is_the_level_it_lies_beyond() -> None:
     tail = tail_of(np.array([1.0, 1.0, 2.0, 3.0, 5.0]))
     assert tail is not None
-    assert tail.count == 1
+    assert tail.size == 1
     value, (low, high) = tail.threshold(tail.rate / np.e)
     # One e-fold beyond u = 3 with e = 2, and 1.96 times that as half the interval.
     assert (value, low) == (5.0, 3.0)

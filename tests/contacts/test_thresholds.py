@@ -97,7 +97,7 @@ def test_a_short_log_beside_a_long_one_counts_by_its_largest_reading() -> None:
 def test_short_logs_alone_tell_a_guess_and_say_so() -> None:
     found = find_thresholds([free_log("a", 12.0), free_log("b", 12.0, seed=1)], 60.0)
     assert "tail-of-few" in codes(found)
-    assert all(one.tail is not None and one.tail.count == 2 for one in found.joints)
+    assert all(one.tail is not None and one.tail.size == 2 for one in found.joints)
 
 
 @pytest.mark.parametrize(("seconds", "said"), [(3602.0, True), (3 * 3600.0 + 2.1, False)])

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from vftcli import readers
-from vftcli.evaluation.references import touched_remarks, touches, zero_reference
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation.references import make_reference, touched_remarks, touches
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.robots import load_robot
 from vftcli.robots.run import Run
 from vftcli.signals.remarks import sentence
@@ -41,7 +43,8 @@ def test_a_free_log_is_judged_against_zero_though_it_shows_contact(logs: Path) -
     """That nobody touched this UR10 is its authors' word; 7 N·m of J6's friction are open."""
     path = logs / "salerno_ur10" / "ur10_exciting.db3"
     recording = readers.read(path, columns="tau=effort")
-    made = zero_reference(Run(recording=recording, robot=load_robot("ur10")))
+    log = Run(recording=recording, robot=load_robot("ur10"))
+    made = make_reference(FreeMotion(log=log), ReferenceChoice(name="zero"))
     assert not made.torque.tau.any()
     assert [remark.code for remark in made.torque.remarks] == [
         "reference-zero",

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vftcli.free_motion import alignment as room
+from vftcli.free_motion import free_motion as room
 from vftcli.free_motion.free_motion import FreeRun
 from vftcli.readers import read
 from vftcli.robots import load_robot

@@ -8,10 +8,13 @@ import pinocchio as pin
 import pytest
 from rosbags.highlevel import AnyReader
 
-from vftcli.evaluation.references import sensor_reference
+from vftcli.evaluation.reference_choice import ReferenceChoice
+from vftcli.evaluation.references import make_reference
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.readers import read
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian, link_poses
+from vftcli.robots.run import Run
 from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording
@@ -136,11 +139,17 @@ def test_a_force_by_the_robot_is_turned(axes: str) -> None:
     np.testing.assert_array_equal(by, -on)
 
 
+def of_sensor(recording: Recording, mounting: Mounting) -> np.ndarray:
+    """The torque of the log's own wrench as a reference."""
+    motion = FreeMotion(log=Run(recording=recording, robot=UR5))
+    return make_reference(motion, ReferenceChoice(name="sensor"), mounting).torque.tau
+
+
 def test_one_contact_in_every_frame_is_one_joint_torque() -> None:
     base = in_base(WrenchFrame("sensor", "sensor"))
-    sensor = sensor_reference(log(WrenchFrame("sensor", "sensor")), UR5, MOUNTED).torque.tau
+    sensor = of_sensor(log(WrenchFrame("sensor", "sensor")), MOUNTED)
     frame = WrenchFrame("base", "flange", "by-robot")
-    same = sensor_reference(log(frame, -base), UR5, Mounting()).torque.tau
+    same = of_sensor(log(frame, -base), Mounting())
     np.testing.assert_allclose(same, sensor, atol=1e-11)
 
 

@@ -21,7 +21,7 @@ from vftcli.signals.parsing import printable, printable_lines
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
     from vftcli.doctor import Examination, Examiner
-    from vftcli.evaluation.logged_jacobian import JacobianJudgement
+    from vftcli.evaluation.wrenches import JacobianJudgement
     from vftcli.outputs.screen import Canvas
     from vftcli.pipeline import AnalysisChoice
     from vftcli.readers.library import Library
@@ -191,7 +191,7 @@ def judge_by_jacobian(
     log: Path, found: "JacobianError", choice: "AnalysisChoice"
 ) -> "JacobianJudgement":
     """What a vendor's torques beside a Jacobian tell of what is asked, with the notes on them."""
-    from vftcli.evaluation.logged_jacobian import judge_jacobian
+    from vftcli.evaluation.wrenches import judge_jacobian
     from vftcli.readers.references import jacobian_log
 
     read = jacobian_log(log, found, choice.read, choice.library.label(log))

@@ -9,6 +9,7 @@ import numpy as np
 
 from vftcli.signals.arrays import Array, seal
 from vftcli.signals.remarks import Remark, caution
+from vftcli.signals.rest import faster
 from vftcli.signals.shown import UNKNOWN, Shown, joined, value_text
 
 if TYPE_CHECKING:
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
     from vftcli.contacts.free_statistics import Basis
     from vftcli.contacts.windows import ArmPart
+    from vftcli.free_motion.free_motion import FreeLoad
+    from vftcli.robots.run import Run
     from vftcli.virtual_sensor.smoother import WrenchPrior
 
 Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
@@ -24,6 +27,13 @@ Trust = Literal["good", "fair", "weak"]  #: How far a row may be believed.
 SURE_NATS, TIGHT, WIDE = 50.0, 0.25, 0.4
 #: Where only forces larger than this are detected along an axis, the pose is blind to it. [N]
 BLIND = 500.0
+#: A payload of the robot's file is named where it weighs as much as a load to this share.
+SAME_MASS = 0.1
+#: Fields of a contact that are unknown where no wrench is.
+OF_FORCES = (
+    "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
+    "anywhere", "course", "vendor_force",
+)  # fmt: skip
 #: Columns that a table of contacts has even where it has no row.
 FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
 
@@ -193,6 +203,17 @@ class CarriedLoad(NamedTuple):
     #: From the arm's first motion to its last, in which it is weighed. [s]
     span: tuple[float, float]
 
+    @classmethod
+    def of(cls, load: "FreeLoad", run: "Run") -> "CarriedLoad":
+        """A load of a log, with the payload of the robot's file that weighs as much."""
+        moves = run.t[faster(run.dq).any(axis=1)]
+        ends = moves if len(moves) else run.t
+        apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
+        name = min(apart, key=lambda key: apart[key], default=None)
+        alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
+        span = float(ends[0]), float(ends[-1])
+        return cls(load.mass, load.sd, run.robot.name, name if alike else None, span)
+
     def record(self) -> dict[str, Any]:
         """The load for machines, units in the names."""
         return {
@@ -295,11 +316,9 @@ class ContactList(Shown):
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":
-        """The list by what the log's examination says.
+        """The list by the log's examination: its load, mass and deviation [kg], and doubts.
 
-        Args:
-            load: Mass and standard deviation of its load as weighed there, if so. [kg]
-            doubted: Whether the velocities that every size rests on are in doubt.
+        Every size rests on velocities that may be in doubt.
         """
         carried, rows = self.load, self.contacts
         if carried is not None and load is not None:
@@ -308,6 +327,16 @@ class ContactList(Shown):
             why = caution("size-by-wrong-velocity")
             rows = tuple(replace(row, remarks=(*row.remarks, why)) for row in rows)
         return replace(self, load=carried, contacts=rows)
+
+    def without_forces(self) -> "ContactList":
+        """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
+        nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
+        rows, weak = (
+            tuple(replace(row, **nothing) for row in part)
+            for part in (self.contacts, self.candidates)
+        )
+        remarks = (*self.remarks, caution("no-wrench-of-few-joints"))
+        return replace(self, contacts=rows, candidates=weak, smallest_force=None, remarks=remarks)
 
     @property
     def tells_untouched(self) -> bool:

@@ -70,8 +70,7 @@ class FreeStatistics:
 
     def in_blocks(self, seconds: float) -> "FreeStatistics | None":
         """The statistics by blocks of another length [s]; None if no stretch holds enough."""
-        known = self.basis == "free motion"
-        found = noise_of(self.free, seconds) if known else inferred(self.log, self.free, seconds)
+        found = noise_of(self.log, self.free, seconds, known=self.basis == "free motion")
         return None if found is None else replace(self, noise=found[0], pieces=found[1])
 
 
@@ -92,7 +91,7 @@ def free_statistics(motion: FreeMotion, seconds: float) -> FreeStatistics | None
     load = free_load(part.pieces)
     # An unknown load is no noise: contacts are found beside it.
     pieces = tuple(p._replace(run=without_load(p.run, load)) for p in part.pieces)
-    found = noise_of(pieces, seconds)
+    found = noise_of(motion.log, pieces, seconds, known=True)
     if found is None:
         return None
     return FreeStatistics(
@@ -122,7 +121,7 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
     weighed = free_load([RunSamples(corrected, bias.free)]) if bias.fitted or short else None
     corrected = without_load(corrected, weighed)
     free = (RunSamples(corrected, bias.free),) if bias.fitted else ()
-    found = inferred(corrected, free, seconds)
+    found = noise_of(corrected, free, seconds, known=False)
     if found is None:
         return None
     return FreeStatistics(
@@ -139,25 +138,19 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
     )
 
 
-def inferred(
-    log: Run, free: Sequence[RunSamples], seconds: float
-) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
-    """Noise that is inferred, and its free pieces in blocks of a length [s]; None without any."""
-    whole = disturbance_blocks(log.terms, log.q, seconds)
-    learned = noise_of(free, seconds) if free else None
-    noise = infer_noise(whole, dry_torques(log.robot), None if learned is None else learned[0])
-    return None if noise is None else (noise, () if learned is None else learned[1])
-
-
 def noise_of(
-    pieces: Sequence[RunSamples], seconds: float
+    log: Run, pieces: Sequence[RunSamples], seconds: float, *, known: bool
 ) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
-    """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short."""
-    blocks = tuple(
-        disturbance_blocks(piece.run.terms, piece.run.q, seconds, piece.inside) for piece in pieces
-    )
-    noise = learn_noise(blocks, dry_torques(pieces[0].run.robot))
-    return None if noise is None else (noise, blocks)
+    """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short.
+
+    Where they are not known to be free it is inferred from the whole log.
+    """
+    blocks = tuple(disturbance_blocks(run.terms, run.q, seconds, at) for run, at in pieces)
+    dry = dry_torques(log.robot)
+    noise = learned = learn_noise(blocks, dry)
+    if not known:
+        noise = infer_noise(disturbance_blocks(log.terms, log.q, seconds), dry, learned)
+    return None if noise is None else (noise, () if learned is None else blocks)
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
@@ -217,8 +210,7 @@ def observer_noise(run: Run) -> Array:
     torque = observed(run)
     step = max(round(2.0 / (GAIN * median_step(run.t))), 1)
     bends = torque[2 * step :] - 2.0 * torque[step:-step] + torque[: -2 * step]
-    noise: Array = robust_sd(bends) / np.sqrt(6.0)
-    return noise
+    return np.asarray(robust_sd(bends) / np.sqrt(6.0))
 
 
 def torque_level(pieces: Sequence[RunSamples]) -> Array:

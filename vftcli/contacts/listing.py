@@ -1,8 +1,11 @@
-"""The contacts of a log: found by evidence, measured by the smoother, with what limits them."""
+"""The contacts of a log: found by evidence, measured by the smoother, with what limits them.
+
+Two things look like a contact and are none: what lasts for most of a log is a load, a wrong payload
+or a wrong model, and has a mean; the jerk of a brake looks like a knock.
+"""
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -18,20 +21,21 @@ from vftcli.contacts.free_statistics import (
     SETTLED,
     FreeStatistics,
     block_length,
+    free_part,
     free_statistics,
     inferred_statistics,
     observed,
 )
-from vftcli.contacts.lookalikes import follows_stop, is_load, load_row
 from vftcli.contacts.rows import (
     BENT_SHORT,
     NORMAL,
     SHORT,
     ContactMeasurement,
+    force_course,
 )
 from vftcli.contacts.search import Candidates, search
 from vftcli.contacts.windows import LEAST_EVIDENCE, LEAST_IN_MOTION, places
-from vftcli.free_motion.free_motion import FreeLoad, FreeMotion
+from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.refinement.whole_log import WholeLogBias, whole_log_bias
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.run import Run
@@ -40,10 +44,16 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution
-from vftcli.signals.rest import MOVES, faster
+from vftcli.signals.rest import MOVES, REST, faster
 from vftcli.signals.series import covered
 from vftcli.virtual_sensor.model_error import UNSEEN_SHARE, error_process
-from vftcli.virtual_sensor.smoother import BlockLog, BlockSpan
+from vftcli.virtual_sensor.smoother import (
+    DRIVES,
+    BlockLog,
+    BlockSpan,
+    hidden_by_blocks,
+    smooth_wrench,
+)
 
 FINE = 0.008  #: A short contact is measured in blocks of this length: longer ones cut its peak. [s]
 SHORTEST = 0.5  #: No contact can be told in a log shorter than this. [s]
@@ -52,16 +62,9 @@ SLOWEST = 10.0  #: Rate below which pushes of some tenths of a second lie betwee
 FALSE_MARGIN = 1.5
 #: What lies within so long of either end of the log is no contact: filters begin there. [s]
 AT_ENDS = 0.3
-#: A payload of the robot's file is named where it weighs as much as a load to this share.
-SAME_MASS = 0.1
 #: The arm rests around a contact where no joint is as fast as `MOVES` in 95 % of the samples from
 #: so long before it to so long after it. [s]
 AROUND = 1.0
-#: Fields of a contact that are unknown where no wrench is.
-OF_FORCES = (
-    "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
-    "anywhere", "course", "vendor_force",
-)  # fmt: skip
 
 
 def list_contacts(
@@ -78,7 +81,7 @@ def list_contacts(
         return without_list(log)
     found = by_smoother(free, seconds, proven=referenced or free.basis == "free motion")
     if log.robot.joints < 6:
-        return without_forces(found)
+        return found.without_forces()
     if is_load(log.recording, found.contacts):
         remarks = (*found.remarks, caution("contact-is-load"))
         found = replace(found, contacts=(load_row(motion, found.contacts),), remarks=remarks)
@@ -119,7 +122,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     found = found.kept(
         [k for k, (a, b) in enumerate(found.runs) if t[b - 1] >= ends[0] and t[a] <= ends[1]]
     )
-    at_rest = np.array([rests_around(run.recording, found, span) for span in found.runs], bool)
+    at_rest = np.array([rests_around(run, found, span) for span in found.runs], bool)
     passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
     if not named:
         passed |= at_rest & np.array(found.beyond, dtype=bool)
@@ -154,7 +157,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
         false_on_free=false + false_rows(free, seconds) if named else None,
         threshold=least if named else LEAST_IN_MOTION,
         smallest_force=smallest,
-        load=None if free.load is None else carried(free.load, run),
+        load=None if free.load is None else CarriedLoad.of(free.load, run),
         stops=stops,
         model=ContactModel(
             prior=measurement.prior,
@@ -165,17 +168,6 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
         ),
         remarks=tuple(limits(run, free, stops, smallest)),
     )
-
-
-def carried(load: FreeLoad, run: Run) -> CarriedLoad:
-    """A load that the arm carries, with the payload of the robot's file that weighs as much."""
-    t, dq = run.t, run.dq
-    moves = t[faster(dq).any(axis=1)]
-    span = (float(moves[0]), float(moves[-1])) if len(moves) else (float(t[0]), float(t[-1]))
-    apart = {name: abs(p.mass - load.mass) for name, p in run.robot.payloads.items()}
-    name = min(apart, key=lambda key: apart[key], default=None)
-    alike = name is not None and apart[name] <= max(2.0 * load.sd, SAME_MASS * load.mass)
-    return CarriedLoad(load.mass, load.sd, run.robot.name, name if alike else None, span)
 
 
 def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[int]]:
@@ -192,19 +184,18 @@ def adjoining(runs: Sequence[BlockSpan], rows: Sequence[Contact]) -> list[list[i
 
 def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list[Contact]:
     """The rows of all contacts of a measurement, those of short contacts from finer blocks."""
-    found, rows = measurement.found, measurement.rows()
-    length = found.log.blocks.length
-    if brief := [k for k, span in enumerate(found.runs) if length[slice(*span)].sum() < SHORT]:
+    rows = measurement.rows()
+    if brief := [k for k, seconds in enumerate(measurement.found.lasts) if seconds < SHORT]:
         for k, row in zip(brief, fine_rows(free, brief, measurement), strict=False):
             rows[k] = row
     return rows
 
 
-def rests_around(recording: Recording, found: Candidates, span: BlockSpan) -> bool:
+def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
     """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
-    first, last = np.searchsorted(recording.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
-    speed = np.abs(recording.require("dq")[first:last])
+    first, last = np.searchsorted(run.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
+    speed = np.abs(run.dq[first:last])
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
 
@@ -218,13 +209,13 @@ def fine_rows(
     free: FreeStatistics, brief: Sequence[int], measurement: ContactMeasurement
 ) -> list[Contact]:
     """Rows of short contacts by blocks that cut their peaks less, none where there are no such."""
-    recording, found = free.log.recording, measurement.found
-    seconds, usual = max(FINE, float(recording.median_step)), block_length(recording.t)
+    found = measurement.found
+    seconds, usual = max(FINE, free.log.step), block_length(free.log.t)
     # On a clock that jitters blocks are as short as they may be.
     fine = free.in_blocks(seconds) if seconds < 0.7 * usual <= 0.7 * BLOCK else None
     if fine is None:
         return []
-    blocks = disturbance_blocks(fine.log.terms, recording.q, seconds)
+    blocks = disturbance_blocks(fine.log.terms, fine.log.q, seconds)
     edges = found.log.blocks.t - 0.5 * found.log.blocks.length
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
     spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
@@ -295,25 +286,109 @@ def without_list(run: Run) -> ContactList:
     torque = np.abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
     k, j = np.unravel_index(np.argmax(torque), torque.shape)
+    model = ContactModel(
+        prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
+    )
     return ContactList(
         recording=run.name,
         duration=run.recording.duration,
         contacts=(),
         basis="none",
         unexplained=Unexplained(float(torque[k, j]), int(j) + 1, float(run.t[k])),
-        model=ContactModel(
-            prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
-        ),
+        model=model,
     )
 
 
-def without_forces(found: ContactList) -> ContactList:
-    """The list of an arm whose joints cannot tell a wrench: times and joint torques."""
-    nothing: dict[str, Any] = dict.fromkeys(OF_FORCES)
+#: The arm rests at the beginning of a contact if no joint moves for so long on either side. [s]
+EDGE = 1.0
+#: Share of the time since the first motion that contacts must fill together to be a load.
+SHARE = 0.5
+#: Several contacts are one load if their forces add up to more than this share of their sizes:
+#: pushes that follow one another come from different sides.
+ONE_SIDE = 0.95
+PIECE = 5.0  #: Length of the pieces whose means tell how far the mean may be off. [s]
+BRIEF = 0.3  #: Longest row that a stop explains. [s]
+#: When the arm must have moved, how fast it was, and when it must rest: about the beginning of a
+#: row, which is known to a block. A knock on an arm that stood still is none of this. [s]
+BEFORE, AT_STOP, AFTER = (-0.25, -0.05), (-0.25, 0.1), (0.12, 0.35)
+RINGING = 0.05  #: Share of the speed before that may be left at rest, while the arm rings.
+
+
+def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
+    """Whether contacts fill more than half of the time since the first motion, with one force.
+
+    A load neither begins nor ends while the arm rests: what does is a push.
+    """
+    if not contacts:
+        return False
+    moving = np.any(faster(recording.require("dq"), REST), axis=1)
+    t = recording.t
+    first = float(t[np.argmax(moving)]) if moving.any() else float(t[0])
+    lasts = np.array([contact.stop - contact.start for contact in contacts])
+    if lasts.sum() <= SHARE * (float(t[-1]) - first):
+        return False
+    for edge in (contacts[0].start, contacts[-1].stop):
+        near = np.abs(t - edge) < EDGE
+        if t[0] + EDGE < edge < t[-1] - EDGE and not moving[near].any():
+            return False
+    forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
+    sizes = np.linalg.norm(forces, axis=1).sum()
+    together = float(np.linalg.norm(forces.sum(axis=0)))
+    return len(contacts) == 1 or together > ONE_SIDE * float(sizes)
+
+
+def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
+    """One row for contacts that are a load: the mean of the ungated wrench, with its band.
+
+    The mean's standard deviation is √(s²/m + (3 % of the mean)²), s the spread of m means over 5 s.
+    """
+    part = free_part(motion)
+    wrench = smooth_wrench(motion.log, () if part is None else part.pieces)
+    start, stop = contacts[0].start, contacts[-1].stop
+    inside = (wrench.t >= start) & (wrench.t <= stop)
+    values, t = wrench.values[inside], wrench.t[inside]
+    mean, number = values.mean(axis=0), ((t - t[0]) / PIECE).astype(int)
+    pieces = np.array([values[number == k].mean(axis=0) for k in np.unique(number)])
+    error = wrench.sd[inside].mean(axis=0)
+    if len(pieces) > 1:
+        error = pieces.std(axis=0, ddof=1) / np.sqrt(len(pieces))
+    sd = np.hypot(error, DRIVES * mean)
+    _, (size,), (band,) = force_course(t[:1], mean[None, :3], np.diag(sd[:3] ** 2)[None])
+    forces = values[:, :3]
+    covariance = wrench.covariance[inside, :3, :3] + hidden_by_blocks(forces, bent=0.0)
     return replace(
-        found,
-        contacts=tuple(replace(row, **nothing) for row in found.contacts),
-        candidates=tuple(replace(row, **nothing) for row in found.candidates),
-        smallest_force=None,
-        remarks=(*found.remarks, caution("no-wrench-of-few-joints")),
+        max(contacts, key=lambda contact: contact.evidence or 0.0),
+        number=1,
+        start=start,
+        stop=stop,
+        is_load=True,
+        peak_force=float(size),
+        peak_band=float(band),
+        place_band=float(band),
+        wrench=mean,
+        wrench_sd=sd,
+        mean_force=mean[:3],
+        impulse=mean[:3] * (stop - start),
+        anywhere=(max(float(size - band), 0.0), float(size + band)),
+        course=force_course(t, forces, covariance),
+        where="wrist" if "wrist" in {contact.where for contact in contacts} else "cannot tell",
     )
+
+
+def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:
+    """Whether a row begins where every joint that moved comes to rest at once, and is over soon.
+
+    It lasts from start to stop and is known to a block. [s]
+    """
+    if stop - start > BRIEF + block:
+        return False
+    t, speed = recording.t - start, np.abs(recording.require("dq"))
+    before, around, after = (
+        speed[(t >= first) & (t <= last)]
+        for first, last in (BEFORE, AT_STOP, (AFTER[0] + block, AFTER[1]))
+    )
+    if not len(before) or not len(after):
+        return False
+    rests = after.max(axis=0) < np.maximum(MOVES, RINGING * around.max(axis=0))
+    # A median, since noise must not pass for motion.
+    return bool(np.median(before, axis=0).max() > MOVES and rests.all())

@@ -28,7 +28,7 @@ from vftcli.robots.run import Run
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.linear_model import smoothed
 from vftcli.signals.remarks import Remark, caution
-from vftcli.signals.series import covered, median_step
+from vftcli.signals.series import covered, resample_columns
 from vftcli.virtual_sensor.model_error import ErrorProcess, error_model, error_process
 from vftcli.virtual_sensor.smoother import BENT, BlockLog, WrenchPrior, hidden_by_blocks
 
@@ -88,12 +88,6 @@ class ContactLocation(NamedTuple):
         apart = np.array([fit.size for fit in self.fits]) - size
         return float(np.sqrt(likely @ apart**2 / likely.sum()))
 
-    def limits(self, size: float, anywhere: tuple[float, float]) -> tuple[Remark, ...]:
-        """Where another part may have been touched, another force touched it: a remark if so."""
-        if len(self.parts) == 1 or NORMAL * self.spread(size) <= WIDE * size:
-            return ()
-        return (caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1]),)
-
     def sizes(self, size: float, band: float) -> tuple[float, float]:
         """Smallest and largest |F| over the places that fit, bands included. [N]"""
         spans = [(size, band), *((fit.size, fit.band) for fit in self.fits)]
@@ -127,29 +121,22 @@ class ContactMeasurement:
         blocks, J = found.log.blocks, found.places[0].jacobian
         gate = covered(found.runs, len(blocks.t), 1)
         process = error_process(free.noise, blocks, gate)._replace(white=found.log.process.white)
-        log = BlockLog(blocks, process)
+        log, quiet = BlockLog(blocks, process), quiet_error(blocks.d, process, gate)
         if like is not None:
             prior, test = like.prior, like.test
         else:
-            rounds = 2 if found.runs else 0
-            prior = learn_prior(log, J, found.runs, found.prior, rounds)
+            prior = learn_prior(log, J, found.runs, found.prior, rounds=2 if found.runs else 0)
             test = self_test(free, prior)
         return cls(
-            run=free.log,
-            found=found,
-            log=log,
-            prior=prior,
-            test=test,
-            quiet=quiet_error(blocks.d, process, gate),
-            bent=bent,
+            run=free.log, found=found, log=log, prior=prior, test=test, quiet=quiet, bent=bent
         )
 
     @cached_property
     def priors(self) -> list[WrenchPrior]:
         """How the wrench of every contact may move: one that is short moves faster."""
-        blocks, own = self.log.blocks, with_wider_force(self.prior)
-        lasts = [float(blocks.length[slice(*run)].sum()) for run in self.found.runs]
-        return [own._replace(time=min(own.time, OWN_TIME * seconds)) for seconds in lasts]
+        own = with_wider_force(self.prior)
+        lasts = (OWN_TIME * seconds for seconds in self.found.lasts)
+        return [own._replace(time=min(own.time, seconds)) for seconds in lasts]
 
     @cached_property
     def wrenches(self) -> list[WindowWrench]:
@@ -223,10 +210,13 @@ class ContactMeasurement:
         where, named, lead = self.part(number, location)
         band = NORMAL * float(np.sqrt(u @ covariance[:3, :3] @ u))
         anywhere = location.sizes(size, band)
-        on_wrist = named == "wrist" and lead >= SURE_NATS
-        remarks = () if on_wrist else location.limits(size, anywhere)
-        spread = 0.0 if on_wrist else location.spread(size)
-        rate = 1.0 / median_step(self.run.t)
+        spread = 0.0 if named == "wrist" and lead >= SURE_NATS else location.spread(size)
+        remarks: tuple[Remark, ...] = ()
+        if len(location.parts) > 1 and NORMAL * spread > WIDE * size:
+            # Where another part may have been touched, another force touched it.
+            why = caution("size-goes-with-place", least_N=anywhere[0], most_N=anywhere[1])
+            remarks = (why,)
+        rate = 1.0 / self.run.step
         if length.sum() < SHORT and rate < SLOW:
             remarks = (*remarks, caution("peak-cut-by-rate", rate_hz=rate))
         start = float(blocks.t[run[0]] - 0.5 * blocks.length[run[0]])
@@ -303,8 +293,8 @@ def vendor_force(run: Run, J: Array, at: float) -> float | None:
     own = run.recording.tau_ext
     if own is None or J.shape[1] < 6:
         return None
-    wrench = np.linalg.lstsq(J.T, sample_at(run, own, at), rcond=None)[0]
-    return finite(float(np.linalg.norm(wrench[:3])))
+    torque = resample_columns(np.array([at]), run.t, own)[0]
+    return size_of(np.linalg.lstsq(J.T, torque, rcond=None)[0][:3])
 
 
 def sensor_force(run: Run, at: float) -> float | None:
@@ -312,14 +302,10 @@ def sensor_force(run: Run, at: float) -> float | None:
     own = run.recording.wrench
     if own is None or not own.any():
         return None
-    return finite(float(np.linalg.norm(sample_at(run, own[:, :3], at))))
+    return size_of(resample_columns(np.array([at]), run.t, own[:, :3])[0])
 
 
-def sample_at(run: Run, values: Array, at: float) -> Array:
-    """A log's columns (T, k) at a time [s], straight between samples. (k,)"""
-    return np.array([np.interp(at, run.t, column) for column in values.T])
-
-
-def finite(size: float) -> float | None:
-    """A size, None where it is not finite."""
+def size_of(force: Array) -> float | None:
+    """|F| of a force (3,), None where it is not finite. [N]"""
+    size = float(np.linalg.norm(force))
     return size if np.isfinite(size) else None

@@ -81,8 +81,12 @@ class Candidates(NamedTuple):
     @property
     def best(self) -> Array:
         """Evidence of each candidate's best place. (C,) [nats]"""
-        found: Array = self.evidence.max(axis=1)
-        return found
+        return np.asarray(self.evidence.max(axis=1))
+
+    @property
+    def lasts(self) -> list[float]:
+        """Length of each candidate. (C,) [s]"""
+        return [float(self.log.blocks.length[slice(*run)].sum()) for run in self.runs]
 
     def kept(self, chosen: Sequence[int]) -> "Candidates":
         """Some of the candidates."""
@@ -99,13 +103,9 @@ class Candidates(NamedTuple):
 
 
 def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candidates:
-    """Look for contacts along a log.
+    """What may be contacts along a log, in blocks of a length [s].
 
-    Args:
-        run: The log with its robot's model.
-        noise: Noise and model error of free motion.
-        level: Standard deviation of the momentum observer's torque in it. (n,) [N·m]
-        seconds: Length of a block. [s]
+    Free motion has this noise, and the momentum observer's torque this level in it. (n,) [N·m]
     """
     blocks = disturbance_blocks(run.terms, run.q, seconds)
     options = places(run.robot.loaded_chain, blocks.q)

@@ -45,8 +45,7 @@ def block_maxima(t: Array, level: Array) -> Array:
     first = np.flatnonzero(np.diff(number, prepend=-1))
     known = np.add.reduceat(np.isfinite(level).astype(np.intp), first)
     maxima = np.maximum.reduceat(np.where(np.isfinite(level), level, -np.inf), first)
-    found: Array = maxima[known * median_step(t) >= KNOWN * BLOCK]
-    return found
+    return np.asarray(maxima[known * median_step(t) >= KNOWN * BLOCK])
 
 
 def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
@@ -55,25 +54,21 @@ def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:
     return contact_intervals(t, above, gap=APART)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Tail:
+class Tail(NamedTuple):
     """The exponential tail of one signal of one log."""
 
     maxima: Array  #: The block maxima, largest first. (B,)
-    count: int  #: How many of them, k, lie beyond `start`.
-
-    def __post_init__(self) -> None:
-        seal(self, "maxima")
+    size: int  #: How many of them, k, lie beyond `start`.
 
     @property
     def start(self) -> float:
         """u: where the tail begins. [the signal's unit]"""
-        return float(self.maxima[self.count])
+        return float(self.maxima[self.size])
 
     @property
     def excess(self) -> float:
         """e: mean distance from `start` of the maxima beyond it. [the signal's unit]"""
-        return float(np.mean(self.maxima[: self.count])) - self.start
+        return float(np.mean(self.maxima[: self.size])) - self.start
 
     @property
     def hours(self) -> float:
@@ -83,7 +78,7 @@ class Tail:
     @property
     def rate(self) -> float:
         """λ: how often the signal passes `start`. [1/h]"""
-        return self.count / self.hours
+        return self.size / self.hours
 
     def threshold(self, rate: float) -> tuple[float, tuple[float, float]]:
         """The level passed at a rate [1/h], u + e ln(λ/rate), and the ends of its 95 %.
@@ -94,7 +89,7 @@ class Tail:
         """
         if rate <= self.rate:
             step = self.excess * float(np.log(self.rate / rate))
-            spread = float(NORMAL / np.sqrt(self.count) * step)
+            spread = float(NORMAL / np.sqrt(self.size) * step)
             value = self.start + step
             return value, (max(value - spread, self.start), value + spread)
         due = rate * self.hours
@@ -119,7 +114,7 @@ def tail_of(maxima: Array) -> Tail | None:
     count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
     if count < 1:
         return None
-    return Tail(maxima=np.sort(maxima)[::-1], count=count)
+    return Tail(np.sort(maxima)[::-1], count)
 
 
 #: A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates.
@@ -210,7 +205,7 @@ class SignalThreshold(NamedTuple):
         if self.tail is None or not self.is_wide:
             return 0.0
         width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)
-        count = self.tail.count * width**2
+        count = self.tail.size * width**2
         blocks = SHARE * count if count <= LEAST_READINGS else count / AN_HOUR * 3600.0 / BLOCK
         return max(blocks / len(self.tail.maxima) - 1.0, 0.0)
 
@@ -269,8 +264,7 @@ class Thresholds(Shown):
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
         # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
-        share: Array = np.abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST)
-        return share
+        return np.asarray(np.abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST))
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
@@ -329,7 +323,7 @@ def thresholds_of_set(
         if not tails:
             return ()
         # Of few readings a tail is a guess, and a guess may not outdo what others know.
-        sure = {name: tail for name, tail in tails.items() if tail.count >= ENOUGH} or tails
+        sure = {name: tail for name, tail in tails.items() if tail.size >= ENOUGH} or tails
         levels = [
             SignalThreshold(*tail.threshold(rate / count), rate / count, name, tail)
             for name, tail in sure.items()
@@ -362,16 +356,16 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
                 rate_per_h=rate,
                 need_h=need,
                 hours=longest.hours,
-                maxima=longest.count,
+                maxima=longest.size,
                 tail_rate_per_h=longest.rate,
                 own_rate_per_h=rate / joints,
             )
         )
-    if longest.count < ENOUGH:
-        remarks.append(caution("tail-of-few", maxima=longest.count, need_s=LONG_ENOUGH))
+    if longest.size < ENOUGH:
+        remarks.append(caution("tail-of-few", maxima=longest.size, need_s=LONG_ENOUGH))
     for signals in free:
         where, duration = Where(signals.recording.name), signals.recording.duration
-        if duration < LONG_ENOUGH and longest.count >= ENOUGH:
+        if duration < LONG_ENOUGH and longest.size >= ENOUGH:
             remarks.append(caution("free-log-too-short", where, duration_s=duration))
         if not signals.frame:
             continue
@@ -382,5 +376,4 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
 
 def worst_of(level: Array) -> Array:
     """The largest of each sample's levels, NaN where none is known. (T,)"""
-    worst: Array = np.fmax.reduce(level, axis=1, initial=np.nan)
-    return worst
+    return np.asarray(np.fmax.reduce(level, axis=1, initial=np.nan))

@@ -128,17 +128,8 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
     least = float(score.min()) + ALIKE
     order = np.argsort(score, kind="stable")[: np.count_nonzero(score <= least)]
-    return [
-        PointFit(
-            link=int(links[i]),
-            share=float(along[i]),
-            misfit=float(misfit[i]),
-            score=float(score[i]),
-            force=forces[i],
-            band=float(bands[i]),
-        )
-        for i in order
-    ]
+    columns = (x[order].tolist() for x in (links, along, misfit, score))
+    return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
 
 
 MARGIN = 1.0  #: How far a window reaches beyond its contacts on either side. [s]
@@ -176,8 +167,7 @@ class WindowWrench(NamedTuple):
     @property
     def size(self) -> Array:
         """|F|. (k,) [N]"""
-        found: Array = np.linalg.norm(self.values[:, :3], axis=1)
-        return found
+        return np.asarray(np.linalg.norm(self.values[:, :3], axis=1))
 
 
 def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
@@ -263,8 +253,7 @@ def untouched_likelihood(log: BlockLog, lanes: Sequence[Lane], model: LinearMode
     with np.errstate(divide="ignore"):
         usual, spiked = np.log1p(-often), np.log(often) - 0.5 * np.log(SPIKE)
     either = np.logaddexp(usual - 0.5 * square, spiked - 0.5 * square / SPIKE)
-    nats: Array = (either - 0.5 * np.log(S)).sum(axis=(0, 2))
-    return nats
+    return np.asarray((either - 0.5 * np.log(S)).sum(axis=(0, 2)))
 
 
 def learn_prior(
@@ -305,5 +294,4 @@ def evidence(
     each = np.full((len(runs), len(places)), -np.inf)
     np.maximum.at(each, tuple(np.transpose(owners)), likelihoods(log, touched))
     bare = contact_lanes(log, [places[0].jacobian] * len(runs), runs, [None] * len(runs))
-    found: Array = each - likelihoods(log, bare)[:, None]
-    return found
+    return np.asarray(each - likelihoods(log, bare)[:, None])

@@ -11,7 +11,6 @@ if TYPE_CHECKING:
         WRENCH_SCHEMA,
         evaluate_wrenches,
         with_contacts,
-        with_wrenches,
     )
 else:
     __getattr__ = door(__name__, "errors", "intervals", "wrenches")
@@ -26,5 +25,4 @@ __all__ = [
     "paired_significance",
     "rmse",
     "with_contacts",
-    "with_wrenches",
 ]

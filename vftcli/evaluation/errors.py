@@ -66,8 +66,7 @@ def rmse(estimate: Array, reference: Array) -> Array:
     known = np.isfinite(error)
     count = np.count_nonzero(known, axis=0)
     total = np.sum(np.where(known, error, 0.0) ** 2, axis=0)
-    result: Array = np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
-    return result
+    return np.asarray(np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan)))
 
 
 def correlation(x: Array, y: Array) -> float:

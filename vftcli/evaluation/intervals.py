@@ -50,15 +50,11 @@ class Resampled(NamedTuple):
 
 
 def resample(squares: Array, length: int) -> Resampled:
-    """Mean squares of moving-block bootstrap repetitions; all columns share blocks.
+    """Mean squares of moving-block bootstrap repetitions of squared errors. (T, m) [(N·m)²]
 
     Blocks of `MEMORY` correlation times (`block_lengths`) are drawn with replacement from the
     series closed to a ring, so that every sample counts alike (Politis and Romano's circular
-    variant of Künsch's moving blocks). Sums over blocks come from one cumulative sum.
-
-    Args:
-        squares: Squared errors, one column an observer. (T, m) [(N·m)²]
-        length: Length of the blocks. [samples]
+    variant of Künsch's moving blocks); all columns share blocks of a length [samples].
     """
     samples = len(squares)
     blocks = max(1, round(samples / length))
@@ -109,11 +105,6 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     few contacts shows both a small mean and a small scatter. With h, that share times Student's
     quantile for the number of blocks, the true value is at most observed/(1 − h); downwards, where
     the mean square is skewed, its logarithm is used: observed·e^{−h}.
-
-    Args:
-        mean_square: The observed mean square. [(N·m)²]
-        draws: Resampled mean squares. (B,) [(N·m)²]
-        blocks: Blocks in each repetition.
     """
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")

@@ -224,8 +224,7 @@ def step_response(observer: Observer, step: float, joints: int) -> Array:
     t = np.arange(0.0, STEP_TIME, step)
     p = np.repeat(t[:, None], joints, axis=1)
     seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
-    times: Array = np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
-    return times
+    return np.asarray(np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan))
 
 
 #: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's advice.

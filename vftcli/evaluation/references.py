@@ -1,6 +1,6 @@
 """Reference torques, their sources, and estimates beside them: one table of errors."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +10,7 @@ import polars as pl
 
 from vftcli.evaluation.errors import evaluate, joint_means
 from vftcli.evaluation.reference_choice import ReferenceChoice
-from vftcli.evaluation.wrenches import with_contacts, with_wrenches
+from vftcli.evaluation.wrenches import evaluate_wrenches, with_contacts
 from vftcli.free_motion.free_motion import FreeMotion
 from vftcli.free_motion.two_cycle import two_cycle_reference
 from vftcli.observers.observer import Tuning
@@ -120,26 +120,6 @@ class ReferenceLoad:
     wrench: Wrench | None = None
 
 
-def zero_reference(log: Run) -> ReferenceLoad:
-    """No contact at all: the reference of a free motion, of unknown error, with its contacts."""
-    zero, remarks = np.zeros(log.q.shape), (caution("reference-zero"), *touched_remarks(log))
-    return ReferenceLoad(torque=ExternalTorque(name="zero", t=log.t, tau=zero, remarks=remarks))
-
-
-def vendor_reference(recording: Recording) -> ReferenceLoad:
-    """The vendor's estimate in the log, torque on the robot, of unknown error."""
-    tau, remarks = recording.require("tau_ext"), (caution("reference-vendor"),)
-    torque = ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
-    return ReferenceLoad(torque=torque)
-
-
-def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
-    """τ_ext = J_Fᵀ w of the wrench that the log holds."""
-    check_joints(recording, robot)
-    wrench = logged_wrench(recording, robot.chain, mounting)
-    return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
-
-
 def load_of(
     wrench: Wrench, recording: Recording, robot: Robot, name: str, remark: Remark
 ) -> ReferenceLoad:
@@ -148,6 +128,30 @@ def load_of(
     tau, remarks = np.einsum("tij,ti->tj", J, wrench.values), (remark, *wrench.remarks)
     torque = ExternalTorque(name=name, t=recording.t, tau=tau, remarks=remarks)
     return ReferenceLoad(torque=torque, wrench=wrench)
+
+
+def make_reference(
+    motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
+) -> ReferenceLoad:
+    """The reference that is asked for, on the clock of the log that is compared.
+
+    The mounting says where tool and sensor sit on the flange.
+    """
+    log, recording, robot = motion.log, motion.log.recording, motion.log.robot
+    if choice.path is not None:
+        return file_reference(choice.path, recording, robot, mounting, choice.columns)
+    if choice.name == "two-cycle":
+        return ReferenceLoad(torque=two_cycle_reference(motion))
+    if choice.name == "sensor":
+        check_joints(recording, robot)
+        wrench = logged_wrench(recording, robot.chain, mounting)
+        return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
+    if choice.name == "vendor":
+        tau, remarks = recording.require("tau_ext"), [caution("reference-vendor")]
+    else:
+        tau, remarks = np.zeros(log.q.shape), [caution("reference-zero"), *touched_remarks(log)]
+    torque = ExternalTorque(name=choice.name, t=log.t, tau=tau, remarks=tuple(remarks))
+    return ReferenceLoad(torque=torque)
 
 
 def file_reference(
@@ -205,31 +209,6 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
     return np.where(inside[:, None], there, np.nan)
 
 
-#: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool and sensor
-#: sit.
-REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
-    "zero": lambda motion, _: zero_reference(motion.log),
-    "vendor": lambda motion, _: vendor_reference(motion.log.recording),
-    "two-cycle": lambda motion, _: ReferenceLoad(torque=two_cycle_reference(motion)),
-    "sensor": lambda motion, mounting: sensor_reference(
-        motion.log.recording, motion.log.robot, mounting
-    ),
-}
-
-
-def make_reference(
-    motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
-) -> ReferenceLoad:
-    """The reference that is asked for, on the clock of the log that is compared.
-
-    The mounting says where tool and sensor sit on the flange.
-    """
-    if choice.path is not None:
-        log = motion.log
-        return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)
-    return REFERENCES[choice.name](motion, mounting)
-
-
 class Judgement(NamedTuple):
     """Errors of one log's estimates against a reference; fields of `vftcli.Analysis`."""
 
@@ -258,14 +237,9 @@ def judge(
     choice: ReferenceChoice,
     told: KnownContacts | None = None,
 ) -> Judgement:
-    """Make the reference and compare with it.
+    """The chosen reference, and errors of estimates and of their wrenches, if any, beside it.
 
-    Args:
-        motion: The log and its free motion.
-        estimates: The observers' torques.
-        sensed: Their wrenches, or None.
-        choice: Which reference.
-        told: Known contacts of the log, None for none.
+    Contacts are judged by what is known of them.
 
     Raises:
         ReferenceTorqueError: If the reference cannot be made.
@@ -278,7 +252,8 @@ def judge(
     if sensed is not None:
         theirs = reference_wrench(recording, robot, made, sensed.sensor)
         sensed = with_reference(sensed, theirs, of_sensor=choice.name == "sensor")
-        errors = with_wrenches(errors, recording.name, sensed)
+        rows = evaluate_wrenches(recording.name, sensed.wrenches, sensed.reference or theirs)
+        errors = pl.concat([errors, rows], how="diagonal")
     if choice.contacts:
         try:
             scores = judge_contacts(estimates, sensed, reference, told)

@@ -11,6 +11,7 @@ from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
+from vftcli.signals.lag import lag_fit
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
@@ -74,7 +75,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
-    for lag in valleys(distances(x), step, stated):
+    for lag in valleys(lag_fit(x, x, 0.0).difference[len(x) - 1 :], step, stated):
         seconds, deviation = lag * step, returned(t, q, lag * step)
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
@@ -131,19 +132,6 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
         )
     span = slice(moving[0], moving[-1] + 1)
     return t[span], q[span]
-
-
-def distances(x: Array) -> Array:
-    """Mean squared distance of x and x `lag` samples later, every lag. (N,)"""
-    x = x - x.mean(axis=0)
-    samples = len(x)
-    size = 1 << int(np.ceil(np.log2(2 * samples)))
-    spectrum = np.fft.rfft(x, size, axis=0)
-    product = np.fft.irfft(np.sum(np.abs(spectrum) ** 2, axis=1), size)[:samples]
-    energy = np.concatenate([[0.0], np.cumsum(np.sum(x**2, axis=1))])
-    lag = np.arange(samples)
-    total = energy[samples - lag] + energy[samples] - energy[lag] - 2.0 * product
-    return np.asarray(np.maximum(total, 0.0) / (samples - lag))
 
 
 def valleys(distance: Array, step: float, stated: float | None) -> list[float]:

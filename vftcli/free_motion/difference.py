@@ -122,13 +122,9 @@ def differences(
     rungs: Sequence[str],
     cutoffs: Sequence[float | None],
 ) -> Iterator[Difference]:
-    """The difference on every rung, with and without the low-pass, one by one.
+    """The difference on every rung that has its clock, at every low-pass [Hz], one by one.
 
-    Args:
-        motion: The log.
-        clocks: "found" and, where a period is stated, "commanded" → one pairing a free run.
-        rungs: Names in `RUNGS`; those without their clock are left out.
-        cutoffs: Cutoffs of the low-pass to try, None for none. [Hz]
+    Clocks are "found" and, where a period is stated, "commanded", with one pairing a free run.
     """
     way, pair = None, None
     for name in rungs:
@@ -204,12 +200,7 @@ def error_model(
     - stiction where a joint stops: two torques anywhere within ±F_c differ by √(2/3)·F_c, after
       a stop shorter than `STUCK` by its share, by `REPEATED_STOP` where the whole arm rests.
 
-    Args:
-        pair: The log and its free runs.
-        signal: The difference where known. (S, n) [N·m]
-        smooth: The low-passed difference. (S, n) [N·m]
-        corrected: Whether the model's torque corrects it.
-        cutoff: Cutoff of its low-pass, None without. [Hz]
+    The signal is the difference where it is known, and smooth what is low-passed. (S, n) [N·m]
     """
     motion, known = pair.motion, pair.known
     t, step = motion.t[known], motion.step
@@ -269,19 +260,12 @@ def noise_below(
 
 
 def noise_when_quiet(t: Array, x: Array, moving: Mask, step: float, cutoff: float | None) -> Array:
-    """Coloured noise of a difference from its quietest pieces. (n,) [N·m]
+    """Coloured noise of a low-passed difference (S, n) from its quietest pieces. (n,) [N·m]
 
     Real noise is denser at low frequencies than above contacts. In a piece of `PIECE` it is the
     deviation from a straight line, a slow load's course; `QUIET` of the pieces are assumed without
     a fast contact. Slower wander does not count: this errs low. Zero for fewer than
     `LEAST_PIECES`.
-
-    Args:
-        t: Clock of the paired samples. (S,) [s]
-        x: The difference behind its low-pass. (S, n) [N·m]
-        moving: Whether the joint moves. (S, n)
-        step: Sample time. [s]
-        cutoff: Cutoff of its low-pass, None without. [Hz]
     """
     size = round(PIECE / step)
     count = len(t) // size

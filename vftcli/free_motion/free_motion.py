@@ -9,41 +9,47 @@ part's disturbance is fitted with a load's weight, its friction beside it,
 with friction and offset held to what a model usually misses of them.
 """
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from vftcli.free_motion.alignment import Alignment, align
 from vftcli.free_motion.choice import FreeChoice
+from vftcli.free_motion.cycles import (
+    Cycles,
+    FreeCycles,
+    Period,
+    find_free_cycles,
+    find_period,
+    segment,
+)
+from vftcli.free_motion.paired_runs import Pairing, pair_with_run
+from vftcli.robots.chain import Chain
+from vftcli.robots.regressor import load_regressor, load_wrench
 from vftcli.robots.run import Run, RunSamples
-from vftcli.signals.arrays import Mask
-from vftcli.signals.errors import ParameterError, ReferenceTorqueError
+from vftcli.robots.terms import gain_sd
+from vftcli.signals.arrays import Array, Indices, Mask, handed_over, seal
+from vftcli.signals.errors import ClockError, ParameterError, ReferenceTorqueError
+from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.parsing import interval_text
 from vftcli.signals.recording import Recording, refuse_repeated_runs
-from vftcli.signals.remarks import Remark, Where, fact
-from vftcli.signals.shown import Shown
-
-# A plain estimate asks for no free motion: what finds it is loaded when it is asked for.
-if TYPE_CHECKING:
-    from vftcli.free_motion.alignment import Alignment
-    from vftcli.free_motion.cycles import Cycles, FreeCycles, Period
-    from vftcli.free_motion.paired_runs import Pairing
-
-from collections.abc import Sequence
-
-from vftcli.robots.chain import Chain
-from vftcli.robots.friction import dry_friction
-from vftcli.robots.regressor import load_regressor, load_wrench
-from vftcli.robots.terms import gain_sd
-from vftcli.signals.arrays import Array, Indices, handed_over, seal
-from vftcli.signals.errors import ClockError
-from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.remarks import caution
+from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step
+from vftcli.signals.shown import Shown
 
 #: A cycle counts as inside a span if it sticks out by no more than this share of itself.
 SLACK = 0.03
+
+
+def within(t: Array, spans: Iterable[tuple[float, float]]) -> Mask:
+    """Samples that lie in any of some spans. (T,)"""
+    inside = np.zeros(len(t), dtype=bool)
+    for first, last in spans:
+        inside |= (t >= first) & (t <= last)
+    return inside
 
 
 class FreePart(NamedTuple):
@@ -67,9 +73,7 @@ class FreeRun:
     log: Run  #: The log.
 
     @cached_property
-    def _alignment(self) -> "Alignment | ReferenceTorqueError":
-        from vftcli.free_motion.alignment import align
-
+    def _alignment(self) -> Alignment | ReferenceTorqueError:
         try:
             return align(self.log.recording, self.recording)
         except ReferenceTorqueError as error:
@@ -86,17 +90,15 @@ class FreeRun:
         return not isinstance(self._alignment, ReferenceTorqueError)
 
     @property
-    def alignment(self) -> "Alignment":
+    def alignment(self) -> Alignment:
         """Its alignment with the log."""
         if isinstance(self._alignment, ReferenceTorqueError):
             raise self._alignment
         return self._alignment
 
     @cached_property
-    def pairing(self) -> "Pairing":
+    def pairing(self) -> Pairing:
         """Instant in the free run of each sample of the log."""
-        from vftcli.free_motion.paired_runs import pair_with_run
-
         found = self.alignment
         pairing = pair_with_run(self.log.t, self.run, found.shift, found.rate)
         return pairing._replace(times=np.where(found.overlap, pairing.times, np.nan))
@@ -123,17 +125,13 @@ class FreeMotion(Shown):
         return replace(self, log=log, runs=runs)
 
     @cached_property
-    def period(self) -> "Period":
+    def period(self) -> Period:
         """The period of the log's motion."""
-        from vftcli.free_motion.cycles import find_period
-
         return find_period(self.log.recording, self.choice.period)
 
     @cached_property
-    def cycles(self) -> "Cycles":
+    def cycles(self) -> Cycles:
         """The cycles of the log."""
-        from vftcli.free_motion.cycles import segment
-
         return segment(self.log.recording, self.period)
 
     @cached_property
@@ -154,10 +152,8 @@ class FreeMotion(Shown):
         return tuple(sorted(found))
 
     @cached_property
-    def free_cycles(self) -> "FreeCycles":
+    def free_cycles(self) -> FreeCycles:
         """Free cycles of the log: the user's, else those found."""
-        from vftcli.free_motion.cycles import FreeCycles, find_free_cycles
-
         if self.cycles_given:
             return FreeCycles(self.cycles_given, None)
         return find_free_cycles(self.log, self.cycles)
@@ -168,11 +164,17 @@ class FreeMotion(Shown):
 
         Its remarks are on the log alone: where in a free run the log's motion lies is not asked.
         """
-        log, choice = self.log, self.choice
-        own, t = self.within_spans, log.t
+        log, choice, t = self.log, self.choice, self.log.t
+        own, spans = within(t, choice.spans), choice.spans
+        if spans and (np.count_nonzero(own) < 2 or own.all()):
+            raise ParameterError(
+                f"{log.name}: the free part {', '.join(interval_text(*s) for s in spans)} "
+                f"holds {np.count_nonzero(own)} of its {len(t)} samples; it must be "
+                f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
+            )
+        ends = float(t[0]), float(t[-1])
         remarks = [
-            fact("free-span", begin_s=max(a, float(t[0])), end_s=min(b, float(t[-1])))
-            for a, b in choice.spans
+            fact("free-span", begin_s=max(a, ends[0]), end_s=min(b, ends[1])) for a, b in spans
         ]
         given = choice.is_given or bool(self.runs)
         if choice.cycles or not given:
@@ -200,21 +202,6 @@ class FreeMotion(Shown):
         if self.choice.is_given or not spans:
             return self
         return replace(self, choice=replace(self.choice, spans=spans))
-
-    @property
-    def within_spans(self) -> Mask:
-        """RunSamples of the log inside the spans that are given as free. (T,)"""
-        recording, spans, t = self.log.recording, self.choice.spans, self.log.t
-        inside = np.zeros(len(t), dtype=bool)
-        for first, last in spans:
-            inside |= (t >= first) & (t <= last)
-        if spans and (np.count_nonzero(inside) < 2 or inside.all()):
-            raise ParameterError(
-                f"{recording.name}: the free part {', '.join(interval_text(*s) for s in spans)} "
-                f"holds {np.count_nonzero(inside)} of its {recording.samples} samples; it must be "
-                f"a part of the log, which runs from {t[0]:g} to {t[-1]:g} s"
-            )
-        return inside
 
 
 LEAST = 0.4  #: A load from which it is one: drive constants that are 3 % off look like .3 kg. [kg]
@@ -283,7 +270,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
     if len(d) < 2 * A.shape[2] or not np.any(d):
         return None
-    friction = dry_friction(robot.friction, robot.joints)
+    friction = pieces[0].run.dry_friction
     prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
     weights, sd, loaded = weigh(d, A, prior)
     _, _, bare = weigh(d, A[:, :, 4:], prior[4:])
@@ -334,12 +321,8 @@ def columns(piece: RunSamples) -> tuple[Array, Array] | None:
 def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
     """Weights of columns (m,), their standard deviations, and the rms that is left (n,) [N·m].
 
-    Regularised least squares, each joint weighed by what the fit leaves of it.
-
-    Args:
-        d: Disturbance. (S, n) [N·m]
-        A: Columns. (S, n, m)
-        prior: Standard deviations of their weights about zero. (m,)
+    Regularised least squares of the disturbance d (S, n) [N·m] on A (S, n, m), each joint weighed
+    by what the fit leaves of it; the prior (m,) is of the weights about zero.
     """
     together = max(1.0, MEMORY * RATE)
     spread = np.sqrt(np.mean(d**2, axis=0)) + 1e-6

@@ -25,7 +25,7 @@ from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import Remark, Where, caution, fact
+from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
 from vftcli.signals.rest import REST, faster
 
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
@@ -77,7 +77,13 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     log, choice = motion.log, motion.choice
     partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
     rungs = tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
-    cutoffs = cutoffs_for(choice.low_pass, log.recording.median_step)
+    low_pass, nyquist = choice.low_pass, 0.5 / log.step
+    if isinstance(low_pass, float | int) and not low_pass < nyquist:
+        raise ReferenceTorqueError(
+            f"two-cycle.low-pass={low_pass:g} is not a cutoff between 0 and {nyquist:.4g} Hz, "
+            "none or auto"
+        )
+    cutoffs = (None, min(LOW_PASS, 0.4 * nyquist)) if isinstance(low_pass, str) else (low_pass,)
     chosen, floors = most_certain(differences(log, partners.clocks, rungs, cutoffs))
     measured = measured_scale(partners, chosen)
     scale = np.ones(log.robot.joints) if measured is None else measured
@@ -156,20 +162,6 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
     return Partners({"found": pairings}, tuple(remarks), np.zeros(recording.samples, dtype=bool))
 
 
-def cutoffs_for(low_pass: float | str | None, step: float) -> tuple[float | None, ...]:
-    """Cutoffs of the low-pass to make: both none and the default for "auto". [Hz]"""
-    if low_pass is None:
-        return (None,)
-    if isinstance(low_pass, str):
-        return (None, min(LOW_PASS, 0.2 / step))
-    if not low_pass < 0.5 / step:
-        raise ReferenceTorqueError(
-            f"two-cycle.low-pass={low_pass:g} is not a cutoff between 0 and {0.5 / step:.4g} Hz, "
-            "none or auto"
-        )
-    return (low_pass,)
-
-
 def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
     """Measured over expected error of two free runs, None without two. (n,)"""
     pairings = partners.clocks["found"]
@@ -210,13 +202,8 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     """Change of dry friction since the free run, 0 if maybe chance. (n,) [N·m]
 
     Joints warm up between two logs, and then friction does not cancel. The change is the mean of
-    the difference times the sign of the velocity. Contacts do not follow the sign of the velocity
-    over a whole log; its scatter over pieces of `BLOCK` says how sure the mean is.
-
-    Args:
-        motion: The log.
-        tau: The two-cycle difference, NaN where there is none. (T, n) [N·m]
-        moving: Whether the joint moves. (T, n)
+    the difference (T, n) [N·m] times the sign of the velocity. Contacts do not follow the sign of
+    the velocity over a whole log; its scatter over pieces of `BLOCK` says how sure the mean is.
     """
     t, n = motion.t, tau.shape[1]
     piece = ((t - t[0]) / BLOCK).astype(np.int64)
@@ -243,10 +230,9 @@ def floor_remarks(chosen: Difference, measured: Array | None, change: Array) -> 
     share, error = chosen.error.standing_share, chosen.error
     for j in np.flatnonzero(share > 0.02):
         code = "joint-stands" if share[j] > 1.0 - TRUSTED_SHARE else "joint-stands-at-times"
-        stiction = float(error.floor_standing[j])
-        where = Where(joints=(int(j) + 1,))
-        remarks.append(caution(code, where, share=float(share[j]), stiction_Nm=stiction))
+        values = {"share": float(share[j]), "stiction_Nm": float(error.floor_standing[j])}
+        remarks.append(caution(code, on_joints([int(j)]), **values))
     if len(changed := np.flatnonzero(change)):
-        where = Where(joints=tuple(int(j) + 1 for j in changed))
-        remarks.append(caution("friction-changed", where, change_Nm=change[changed].tolist()))
+        values = change[changed].tolist()
+        remarks.append(caution("friction-changed", on_joints(changed), change_Nm=values))
     return remarks

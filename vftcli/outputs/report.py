@@ -11,7 +11,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
-from vftcli.evaluation.logged_jacobian import JacobianJudgement
+from vftcli.evaluation.wrenches import JacobianJudgement
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.contacts import contacts_csv, contacts_record

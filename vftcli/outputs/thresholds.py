@@ -31,7 +31,7 @@ def thresholds_grid(thresholds: Thresholds) -> Grid:
     rows: list[Sequence[Entry]] = []
     for name, unit, level, one in thresholds.named:
         span, t = DASH.join(map(significant, one.interval)), one.tail
-        tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.count), t.hours)
+        tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.size), t.hours)
         rows.append((name, level, unit, span, *tail, one.log))
     columns = (
         Column("", words=True, width=3),
@@ -108,7 +108,7 @@ def thresholds_record(
             f"tail_from_{unit}": tail and tail.start,
             f"tail_excess_{unit}": tail and tail.excess,
             "tail_rate_per_h": tail and tail.rate,
-            "tail_maxima": tail and tail.count,
+            "tail_maxima": tail and tail.size,
             "hours": tail and tail.hours,
         }
         rows.append(row)

@@ -219,12 +219,7 @@ def find_baselines(motion: FreeMotion, choice: RefinementChoice, *, best: bool) 
 
 
 def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
-    """A baseline with the bias fit's free part, where that is enough.
-
-    Args:
-        found: A baseline without spectra.
-        quiet: The samples assumed free. (T,)
-    """
+    """A baseline without spectra with the bias fit's free part (T,), where that is enough."""
     log = found.motion.log
     share = float(quiet.mean())
     remark = fact("free-by-the-fit", share=share)

@@ -211,11 +211,7 @@ def friction_alone(robot: Robot) -> ModelError:
 
 
 def error_columns(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> list[Array]:
-    """The rows of A of every joint, each column times its standard deviation.
-
-    Returns:
-        One array a joint, its columns as in `column_numbers`. (S, p)
-    """
+    """The rows of A of every joint, each column of `column_numbers` times its deviation. (S, p)"""
     n, kept = run.robot.joints, slice(None, None, stride)
     shapes = [
         motion.dq[kept] if k == SHAPES - 2 else zero_phase(motion.t, shape, CUTOFF)[kept]

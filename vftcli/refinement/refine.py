@@ -311,43 +311,35 @@ def refine(
     *,
     gains_of_file: bool = False,
 ) -> Refinement:
-    """Give estimates their bands, and say what limits them.
+    """The observers' estimates, in this order, with their bands and what limits them.
 
-    Args:
-        found: What the observers run on.
-        observers: The observers.
-        estimates: Their estimates, in this order.
-        removed: What ``bias.method`` asked for.
-        gains_of_file: Whether the paper's observers ran with the gains of the robot's file.
+    ``bias.method`` asked for what is `removed`; the paper's observers may have run with the gains
+    of the robot's file.
     """
-    # Observers may run on different terms: each is measured on its own.
-    under = [found.of(observer.name) for observer in observers]
-    readings, remarks = list[FreeReading](), [*found.remarks]
-    for on, observer, estimate in zip(under, observers, estimates, strict=True):
+    remarks, budgets, shown, plain = [*found.remarks], list[Budget](), [], found.plain
+    for observer, estimate in zip(observers, estimates, strict=True):
+        # Observers may run on different terms: each is measured on its own.
+        on = found.of(observer.name)
         runs, complete, lost = with_spare(on, observer, estimate)
-        readings.append(free_reading(on, runs, complete))
+        reading = free_reading(on, runs, complete)
         remarks += lost
-    budgets = [
-        budget(on, on.spectra, reading)
-        for on, reading in zip(under, readings, strict=True)
-        if on.spectra is not None
-    ]
+        if on.spectra is not None:
+            budgets.append(budget(on, on.spectra, reading))
+        shown.append(with_band(on, reading))
     curves = {o.name: o.curve for o in observers if isinstance(o, AutoTuned) and o.curve}
-    shown = tuple(with_band(*pair) for pair in zip(under, readings, strict=True))
     for name, curve in curves.items():
         omega, rmse = curve.best.tolist(), curve.least.tolist()
         about = Where(about=name)
         remarks.append(fact("tuned", about, omega_n_rad_s=omega, expected_rmse_Nm=rmse))
     for name, curve in curves.items():
         remarks += bound_remarks(name, curve.best, curve.omega_n)
-    plain = found.plain
     remarks += band_remarks(plain)
     # Of the most accurate estimate: of `best` if it ran, else of the last.
     leading = [one for one in budgets if one.name == BEST] or budgets[-1:]
     remarks += [limits_remark(one, plain.stuck) for one in leading]
     gap = expected_gap(plain, shown, gains_of_file=gains_of_file)
     return Refinement(
-        estimates=shown,
+        estimates=tuple(shown),
         baselines=found,
         curves=curves,
         budgets=tuple(budgets),

@@ -152,10 +152,7 @@ class Rows:
     ) -> list[NormalEquations]:
         """Sums of all columns, model's and loads', over some samples, then over parts of them.
 
-        Args:
-            weight: Of every row. (S, n)
-            taken: The samples; None for all. (S,)
-            parts: Some of them, which may overlap. (S,) each
+        The rows have weights (S, n); no samples (S,) means all. Parts (S,) may overlap.
         """
         size = self.unknowns + self.loads.numbers.size + 1
         totals = np.zeros((1 + len(parts), size, size))
@@ -250,10 +247,7 @@ class WholeLogFit:
 def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
     """The fit of a model's error, and the log's contact-free samples.
 
-    Args:
-        rows: What is fitted.
-        step: Time between two samples. [s]
-        dry: Dry friction of the joints. (n,) [N·m]
+    Samples are a step [s] apart; `dry` is the joints' friction. (n,) [N·m]
     """
     counted = max(1.0, CORRELATED / step)
     least = np.maximum(LEAST_SCALE * dry, LEAST_TORQUE)

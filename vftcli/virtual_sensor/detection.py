@@ -80,8 +80,7 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
         raise ParameterError("the free part holds no sample in which the wrench is known")
     centre = np.median(inside, axis=0)
     half = np.maximum(BAND * np.max(np.abs(inside - centre), axis=0), least)
-    worst: Array = np.nan_to_num(np.abs(values - centre) / half, nan=0.0).max(axis=1)
-    return worst
+    return np.asarray(np.nan_to_num(np.abs(values - centre) / half, nan=0.0).max(axis=1))
 
 
 class Interval(Protocol):
@@ -132,8 +131,7 @@ def overlaps(found: Sequence[Interval], true: Sequence[Interval]) -> Array:
     begin, end = np.reshape([(f.start, f.stop) for f in found], (-1, 2)).T[:, :, None]
     first, last = np.reshape([(c.start, c.stop) for c in true], (-1, 2)).T
     shared = np.minimum(end, last + EARLY) - np.maximum(begin, first - EARLY)
-    table: Array = np.maximum(shared, 0.0)
-    return table
+    return np.asarray(np.maximum(shared, 0.0))
 
 
 def assignment(found: Sequence[Interval], true: Sequence[Interval]) -> list[int | None]:

@@ -94,8 +94,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     X[:, :3, :3] = X[:, 3:, 3:] = turned
     if frame == "flange":
         return X
-    moved: Array = adjoint(inverse(frame_pose(frame, mounting))) @ X
-    return moved
+    return np.asarray(adjoint(inverse(frame_pose(frame, mounting))) @ X)
 
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
@@ -224,12 +223,8 @@ def controller_point(
     currents is what touches the arm, each joint with a factor and an offset of its own. It is
     explained by Jᵀ of the wrench, once about the flange and once about the tool's point. The one
     that leaves less is used if it is likelier by `SURE`; the flange is used where nothing tells,
-    as an e-Series' own sensor has it.
-
-    Args:
-        recording: A log with a wrench in base axes.
-        chain: The arm.
-        tool: The tool's point in the flange frame, None where it is not known. (3,) [m]
+    as an e-Series' own sensor has it. The log's wrench is in base axes, and the tool's point in the
+    flange frame. (3,) [m]
     """
     if recording.current is None or recording.target_current is None:
         return "flange", (caution("controller-point-without-currents"),)
@@ -261,5 +256,4 @@ def unexplained(beyond: Array, torque: Array) -> Array:
     tiny = np.finfo(np.float64).tiny
     slope = np.sum(x * y, axis=0) / np.maximum(np.sum(x**2, axis=0), tiny)
     rest = np.sum((y - slope * x) ** 2, axis=0)
-    share: Array = np.maximum(rest, tiny) / np.maximum(np.sum(y**2, axis=0), tiny)
-    return share
+    return np.asarray(np.maximum(rest, tiny) / np.maximum(np.sum(y**2, axis=0), tiny))

@@ -218,11 +218,20 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
 
 
 def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
-    """Noise by Whittle's likelihood; rest adds the shares of creep, and of a push under one."""
-    white, variance, time = fit_joints(stretches)
+    """Noise by Whittle's likelihood over all stretches together, joint by joint.
+
+    Rest adds the shares of creep, and of a push under one.
+    """
+    # A block holds whole samples, so that it is not quite as long as was asked.
+    seconds = median(np.concatenate([s.length for s in stretches]))
+    f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
+    P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
+    longest = max(float(s.length.sum()) for s in stretches)
+    white, variance, time = np.transpose([fit_spectrum(f, p, seconds, longest) for p in P.T])
     return TorqueNoise(
         white=white,
-        variance=variance,
+        # An offset is an error too.
+        variance=variance + np.concatenate([s.d for s in stretches]).mean(axis=0) ** 2,
         time=time,
         dry=dry,
         seen=(~np.concatenate([s.rests for s in stretches])).mean(axis=0) >= SEEN,
@@ -246,25 +255,10 @@ def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
     return piece._replace(d=d)
 
 
-def fit_joints(stretches: Sequence[Blocks]) -> tuple[Array, Array, Array]:
-    """R, s² and T of every joint, by Whittle's likelihood over all stretches together. (n,) each"""
-    # A block holds whole samples, so that it is not quite as long as was asked.
-    seconds = median(np.concatenate([s.length for s in stretches]))
-    f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])
-    P = np.concatenate([periodogram(s.d, seconds) for s in stretches])
-    longest = max(float(s.length.sum()) for s in stretches)
-    each = [fit_spectrum(f, p, seconds, longest) for p in P.T]
-    white, variance, time = (np.array(v) for v in zip(*each, strict=True))
-    # An offset is an error too.
-    variance += np.concatenate([s.d for s in stretches]).mean(axis=0) ** 2
-    return white, variance, time
-
-
 def periodogram(d: Array, seconds: float) -> Array:
     """Two-sided periodogram at the positive frequencies. (N//2, n) [(N·m)²/Hz]"""
     spectrum = np.fft.rfft(d, axis=0)[1:]
-    power: Array = (spectrum.real**2 + spectrum.imag**2) * (seconds / len(d))
-    return power
+    return np.asarray((spectrum.real**2 + spectrum.imag**2) * (seconds / len(d)))
 
 
 def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:
@@ -352,8 +346,7 @@ def spike_limit(spikes: Array) -> Array:
     """ν²/S beyond which an innovation is more likely a spike, for how often it is one. (K, …, n)"""
     with np.errstate(divide="ignore"):
         odds = np.log(spikes) - np.log1p(-spikes)
-    limit: Array = (np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE)
-    return limit
+    return np.asarray((np.log(SPIKE) - 2.0 * odds) / (1.0 - 1.0 / SPIKE))
 
 
 def innovations(model: LinearModel, spikes: Array) -> tuple[Array, Array]:

@@ -9,17 +9,16 @@ hundredfold between filters whose estimates are nearly the same.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain as chained
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, without_load
+from vftcli.free_motion.free_motion import FreeLoad, FreeMotion, within, without_load
 from vftcli.observers.observer import Observer
 from vftcli.observers.spectra import error_band, free_error, spectra_of
 from vftcli.robots.chain import link_poses
-from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import disturbance_impulse
@@ -112,61 +111,48 @@ def sense(
         own: Those of an observer that has others, by its name.
         gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
             is one.
-
-    Raises:
-        ParameterError: If a pose or zero interval cannot be used, or cannot be found in the log.
-        MissingSignalError: If the log has no wrench and a sensor's pose is asked for.
-        RobotError: If the arm has fewer than six joints.
     """
-    recording, robot, terms = motion.log.recording, motion.log.robot, motion.log.terms
-    t, chain = recording.t, robot.chain
-    disturbance = mean_disturbance(terms)
-    raw = VirtualSensor(frame="base").wrench(disturbance, recording.q, chain)
-    mounting, fitted = find_mounting(recording, robot, disturbance, choice)
+    log, q, t = motion.log, motion.log.q, motion.log.t
+    chain = log.robot.chain
+    disturbance = mean_disturbance(log.terms)
+    raw = VirtualSensor(frame="base").wrench(disturbance, q, chain)
+    mounting, fitted = find_mounting(log.recording, log.robot, disturbance, choice)
     # The disturbance was solved in base axes, so that --frame moves no zero.
     sensor = VirtualSensor(solver=choice.by_pose, frame=choice.frame, mounting=mounting)
-    zero = zero_spans(choice.zero, raw)
-    chosen = zero.chosen(t)
-    error = torque_error(choice.torque_sd, motion.log, observers, estimates, chosen)
-    wrenches = sensor.wrenches(estimates, recording.q, chain, dict(error.sd))
+    spans, unloaded = zero_spans(choice.zero, raw)
+    chosen, free = within(t, spans), within(t, unloaded)
+    sds, on_sds = torque_error(choice.torque_sd, log, observers, estimates, chosen)
+    wrenches = list(sensor.wrenches(estimates, q, chain, sds))
+    names = [wrench.name for wrench in wrenches if choice.smooths(wrench.name)]
     smoothed = smooth_all(
-        [wrench.name for wrench in wrenches if choice.smooths(wrench.name)],
-        plain or as_modelled(motion),
-        own or {},
-        unloaded=chosen,
-        gate=gate,
+        names, plain or as_modelled(motion), own or {}, unloaded=chosen, gate=gate
     )
-    wrenches = tuple(
-        smoothed_wrench(smoothed[w.name], w, sensor, motion) if w.name in smoothed else w
-        for w in wrenches
-    )
+    bands: list[Remark] = []
+    for k, wrench in enumerate(wrenches):
+        if wrench.name in smoothed:
+            wrenches[k] = smoothed_wrench(smoothed[wrench.name], wrench, sensor, log)
+            bands += wrenches[k].remarks
     # Beside a smoothed wrench, what is said of the torques' error names those that it is said of.
-    bands = [r for w in wrenches if w.name in smoothed for r in w.remarks]
     if others := [w.name for w in wrenches if w.name not in smoothed]:
         where = Where(", ".join(others)) if smoothed else Where()
-        bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in error.remarks]
+        bands[:0] = [replace(r, where=where) if r.where == Where() else r for r in on_sds]
     # Drifts span by span: the first of each observer is its zero.
-    drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in zero.spans]
+    drifts = [[zero_drift(wrench, span) for wrench in wrenches] for span in spans]
     warnings = [
         remark
         for row in drifts
         for wrench, drift in zip(wrenches, row, strict=True)
         for remark in zero_warning(wrench, drift)
     ]
-    moved = [
-        zero_moved(first, last)
-        for row in drifts[1:]
-        for first, last in zip(drifts[0], row, strict=True)
-    ]
+    moved = [zero_moved(*pair) for row in drifts[1:] for pair in zip(drifts[0], row, strict=True)]
     # Only now: the band and the warnings are about the wrench as it was read.
     if drifts:
         drifts[0] = [replace(drift, removed=True) for drift in drifts[0]]
-        wrenches = tuple(without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True))
-    free = zero.unloaded(t)
+        wrenches = [without_drift(w, d) for w, d in zip(wrenches, drifts[0], strict=True)]
     hides = any(w.hidden.any() for w in wrenches)
     return SensorReading(
         sensor=sensor,
-        wrenches=wrenches,
+        wrenches=tuple(wrenches),
         masked=raw.hidden,
         drifts=tuple(chained.from_iterable(drifts)),
         free=free,
@@ -174,25 +160,24 @@ def sense(
         remarks=(
             *warnings,
             *fitted,
-            *(() if drifts else payload_remark(recording, robot)),
+            *(() if drifts else payload_remark(log.recording, log.robot)),
             *(mask_remark(raw.hidden, raw.sigma_min) if hides else ()),
             *moved,
             *bands,
-            *vendor_remarks(recording, raw, chain),
+            *vendor_remarks(log.recording, raw, chain),
             *(remark for w in wrenches for remark in contact_elsewhere(w, free)),
         ),
     )
 
 
 def smoothed_wrench(
-    smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, motion: FreeMotion
+    smoothed: SmoothedWrench, wrench: Wrench, sensor: VirtualSensor, log: Run
 ) -> Wrench:
     """A wrench with the smoother's values and band in place of its own, nothing of it masked."""
-    chain, q, t = motion.log.robot.chain, motion.log.q, wrench.t
-    values, sd = np.empty((len(t), 6)), np.empty((len(t), 6))
+    t, values, sd = wrench.t, np.empty((len(wrench.t), 6)), np.empty((len(wrench.t), 6))
     for start in range(0, len(t), CHUNK):
-        span = slice(start, min(start + CHUNK, len(t)))
-        flange = link_poses(chain, q[span]).rotation[:, -1]
+        span = slice(start, start + CHUNK)
+        flange = link_poses(log.robot.chain, log.q[span]).rotation[:, -1]
         X = from_base(sensor.frame, flange, sensor.mounting)
         there, covariance = smoothed.at(t[span])
         values[span] = np.squeeze(X @ there[:, :, None], axis=2)
@@ -232,24 +217,18 @@ def smooth_log(log: FreeLog, plain: FreeLog, unloaded: Mask, gate: Gate | None) 
     """
     free = log.known_free(unloaded)
     if gate is not None:
-        bare = without_load(log.run, log.load)
-        found = smooth_wrench(bare, free, gate.spans, gate.prior)
+        found = smooth_wrench(without_load(log.run, log.load), free, gate.spans, gate.prior)
         if log.load is None:
             return found
         q = resample_columns(found.t, log.run.t, log.run.q)
         values, covariance = log.load.wrench(log.run.robot.chain, q)
-        return replace(
-            found,
-            values=found.values + values,
-            covariance=found.covariance + covariance,
-            load=log.load,
-        )
+        values, covariance = found.values + values, found.covariance + covariance
+        return replace(found, values=values, covariance=covariance, load=log.load)
     if log.run is not plain.run:
         modelled = plain.known_free(unloaded)
         prior = prior_of(plain.run, modelled)
         if prior.is_steady:
-            found = smooth_wrench(plain.run, modelled, prior=prior)
-            return replace(found, uncorrected=True)
+            return replace(smooth_wrench(plain.run, modelled, prior=prior), uncorrected=True)
     return smooth_wrench(log.run, free)
 
 
@@ -290,15 +269,9 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
 
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.
-
-
-@dataclass(frozen=True, kw_only=True)
-class TorqueError:
-    """Joint torque error per observer."""
-
-    #: Observer → standard deviation, (n,) or (T, n); those without one have no band. [N·m]
-    sd: Mapping[str, Array]
-    remarks: tuple[Remark, ...]  #: Where it comes from, or why there is none.
+#: Observer → standard deviation, (n,) or (T, n), none of those without a band [N·m]; and where it
+#: comes from, or why there is none.
+TorqueError = tuple[dict[str, Array], list[Remark]]
 
 
 def torque_error(
@@ -316,9 +289,9 @@ def torque_error(
         return given_error(stated, torques)
     known = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}
     if torques and len(known) == len(torques):
-        return TorqueError(sd=known, remarks=(fact("band-from-torques"),))
+        return known, [fact("band-from-torques")]
     if np.count_nonzero(free) < 2:
-        return TorqueError(sd={}, remarks=(caution("no-wrench-band"),))
+        return {}, [caution("no-wrench-band")]
     return from_free_part(log, torques, free, missed_torque(log, observers, free))
 
 
@@ -326,10 +299,9 @@ def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
     """The torque error that ``virtual-sensor.torque-sd`` states."""
     if text == OWN:
         own = {torque.name: torque.sd for torque in torques if torque.sd is not None}
-        without = tuple(torque.name for torque in torques if torque.sd is None)
-        none = tuple(caution("no-covariance", Where(name)) for name in without)
-        said = tuple(caution("band-of-observer", Where(name)) for name in own)
-        return TorqueError(sd=own, remarks=(*said, *none))
+        codes = {True: "band-of-observer", False: "no-covariance"}
+        order = sorted(torques, key=lambda torque: torque.sd is None)
+        return own, [caution(codes[one.name in own], Where(one.name)) for one in order]
     joints = torques[0].joints if torques else 0
     values = np.array(numbers(text) or ())
     if len(values) not in {1, joints} or not np.all(np.isfinite(values) & (values > 0)):
@@ -338,8 +310,8 @@ def given_error(text: str, torques: Sequence[ExternalTorque]) -> TorqueError:
             f"each of {joints} joints [N·m]"
         )
     given = np.array(np.broadcast_to(values, (joints,)))
-    sd = {torque.name: given for torque in torques}
-    return TorqueError(sd=sd, remarks=tuple(fact("band-given", Where(name)) for name in sd))
+    names = [torque.name for torque in torques]
+    return dict.fromkeys(names, given), [fact("band-given", Where(name)) for name in names]
 
 
 def from_free_part(
@@ -349,11 +321,10 @@ def from_free_part(
     missed: Mapping[str, Array] | None,
 ) -> TorqueError:
     """The error of the free samples (T,) and of what the lag misses, where that is known."""
-    friction = dry_friction(run.robot.friction, run.robot.joints)
     rests, sd, seen = run.rests, {}, True
     for torque in torques:
         inside = torque.tau[free]
-        error = free_error(inside - np.nanmean(inside, axis=0), rests[free], friction)
+        error = free_error(inside - np.nanmean(inside, axis=0), rests[free], run.dry_friction)
         seen = seen and not np.any(error.unseen & ~rests.all(axis=0))
         lag = np.zeros(torque.joints) if missed is None else missed[torque.name]
         sd[torque.name] = error_band(error, lag, rests)
@@ -362,7 +333,7 @@ def from_free_part(
         remarks.append(caution("band-without-lag"))
     if not seen:
         remarks.append(caution("band-of-free-rest"))
-    return TorqueError(sd=sd, remarks=tuple(remarks))
+    return sd, remarks
 
 
 def missed_torque(

@@ -1,13 +1,13 @@
 """A real force/torque sensor beside ours: its pose on the flange, or its vendor's convention."""
 
-from dataclasses import dataclass
 from itertools import permutations
+from typing import NamedTuple
 
 import numpy as np
 
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array, seal
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import time_offset
@@ -27,8 +27,7 @@ DERIVED = 0.9995
 RESEMBLES = 0.5  #: Below this correlation no convention explains the field.
 
 
-@dataclass(frozen=True, kw_only=True)
-class PoseFit:
+class PoseFit(NamedTuple):
     """A sensor's pose on the flange, estimated from what it and the virtual sensor read."""
 
     pose: Pose  #: Orientation and origin of the sensor in the flange frame.
@@ -36,31 +35,12 @@ class PoseFit:
     moment_rms: float  #: The same of the moment. [N·m]
     position_sd: Array  #: Standard deviation of the origin. (3,) [m]
 
-    def __post_init__(self) -> None:
-        seal(self, "position_sd")
-
-    @property
-    def remark(self) -> Remark:
-        """The fitted pose."""
-        return fact(
-            "sensor-pose-fitted",
-            position_mm=(self.pose.translation * 1e3).tolist(),
-            position_sd_mm=(self.position_sd * 1e3).tolist(),
-            angles_deg=np.degrees(rpy_angles(self.pose.rotation)).tolist(),
-            force_rms_N=self.force_rms,
-            moment_rms_Nm=self.moment_rms,
-        )
-
 
 def fit_pose(flange: Array, sensor: Array) -> PoseFit:
-    """Find R and p of (56) from readings of the same contact. Constant offsets do not matter.
+    """R and p of (56) from two readings of a contact, flange's and sensor's. (T, 6) [N, N·m]
 
     R solves Wahba's problem on the forces (Kabsch), p the linear least squares of
-    N_F − R N_S = p × F_F, both on departures from the mean.
-
-    Args:
-        flange: Virtual wrench in flange axes about the flange point. (T, 6) [N, N·m]
-        sensor: The sensor's reading as force on the robot, in its own axes. (T, 6) [N, N·m]
+    N_F − R N_S = p × F_F, both on departures from the mean: constant offsets do not matter.
     """
     known = np.all(np.isfinite(flange) & np.isfinite(sensor), axis=1)
     ours, theirs = flange[known], sensor[known]
@@ -104,19 +84,23 @@ def find_mounting(
         )
     ours = VirtualSensor(frame="flange").wrench(disturbance, recording.q, robot.chain)
     fit = fit_pose(ours.known, frame.factor * reading)
-    return mounting._replace(sensor=fit.pose), (fit.remark,)
+    remark = fact(
+        "sensor-pose-fitted",
+        position_mm=(fit.pose.translation * 1e3).tolist(),
+        position_sd_mm=(fit.position_sd * 1e3).tolist(),
+        angles_deg=np.degrees(rpy_angles(fit.pose.rotation)).tolist(),
+        force_rms_N=fit.force_rms,
+        moment_rms_Nm=fit.moment_rms,
+    )
+    return mounting._replace(sensor=fit.pose), (remark,)
 
 
-@dataclass(frozen=True, kw_only=True)
-class AxesFit:
+class AxesFit(NamedTuple):
     """How one force reads in terms of another: theirs ≈ gain · matrix · ours."""
 
     matrix: Array  #: The signed permutation of axes that fits best. (3, 3)
     gain: float  #: Factor on top of it.
     correlation: float  #: Correlation of theirs with it, all axes together.
-
-    def __post_init__(self) -> None:
-        seal(self, "matrix")
 
     @property
     def derived(self) -> bool:
@@ -140,22 +124,16 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     known = np.all(np.isfinite(ours) & np.isfinite(theirs), axis=1)
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
     U, _, Vt = np.linalg.svd(y.T @ x)
-    matrix = permutation(U @ Vt)
+    Q, rows = U @ Vt, np.arange(3)
+    order = max(permutations(range(3)), key=lambda order: float(np.abs(Q[rows, order]).sum()))
+    matrix = np.zeros((3, 3))
+    matrix[rows, order] = np.sign(Q[rows, order])
     z = x @ matrix.T
     power = float(np.sum(z**2))
     gain = float(np.sum(z * y)) / power if power > 0 else float("nan")
     scale = float(np.sqrt(power * np.sum(y**2)))
     correlation = float(np.sum(z * y)) / scale if scale > 0 else float("nan")
     return AxesFit(matrix=matrix, gain=gain, correlation=correlation)
-
-
-def permutation(Q: Array) -> Array:
-    """The signed permutation nearest to an orthogonal matrix. (3, 3)"""
-    size = np.abs(Q)
-    best = max(permutations(range(3)), key=lambda order: float(np.sum(size[np.arange(3), order])))
-    P = np.zeros((3, 3))
-    P[np.arange(3), best] = np.sign(Q[np.arange(3), best])
-    return P
 
 
 def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Remark]:

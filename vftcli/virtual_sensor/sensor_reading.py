@@ -1,8 +1,7 @@
 """Reading of a log's virtual sensor: wrenches, zero drift and its removal, masks, remarks."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 
@@ -183,60 +182,30 @@ def without_drift(wrench: Wrench, drift: Drift) -> Wrench:
 
 def without_zero(wrench: Wrench, choice: ZeroChoice) -> Wrench:
     """A wrench less its mean over the first span of a choice, or over its own unloaded start."""
-    spans = zero_spans(choice, wrench).spans
+    spans, _ = zero_spans(choice, wrench)
     return without_drift(wrench, zero_drift(wrench, spans[0])) if spans else wrench
 
 
 def zero_moved(first: Drift, last: Drift) -> Remark:
     """How far the zero moved between two unloaded spans."""
-    moved = last.mean - first.mean
-    return fact(
-        "zero-moved",
-        Where(first.name, span=last.span),
-        first_s=list(first.span),
-        force_N=moved[:3].tolist(),
-        moment_Nm=moved[3:].tolist(),
-    )
+    force, moment = np.split(last.mean - first.mean, 2)
+    values = {"force_N": force.tolist(), "moment_Nm": moment.tolist()}
+    where = Where(first.name, span=last.span)
+    return fact("zero-moved", where, first_s=list(first.span), **values)
 
 
-class ZeroSpans(NamedTuple):
-    """The unloaded parts of a log."""
-
-    #: Those that were chosen: the first is the zero, further ones show its drift. [s]
-    spans: tuple[Span, ...]
-    start: Span | None  #: The unloaded start that was found where none was chosen. [s]
-
-    def chosen(self, t: Array) -> Mask:
-        """Samples of the chosen spans. (T,)"""
-        return samples_of(t, self.spans)
-
-    def unloaded(self, t: Array) -> Mask:
-        """Samples that are known to be unloaded: of the chosen spans, else of the start. (T,)"""
-        start = () if self.start is None else (self.start,)
-        return samples_of(t, self.spans or start)
-
-
-def zero_spans(choice: ZeroChoice, wrench: Wrench) -> ZeroSpans:
-    """The spans of a choice, and the unloaded start of a wrench where it names none."""
+def zero_spans(choice: ZeroChoice, wrench: Wrench) -> tuple[tuple[Span, ...], tuple[Span, ...]]:
+    """The chosen spans, the first the zero; and those known to be unloaded, else the start. [s]"""
     if choice.spans:
-        return ZeroSpans(choice.spans, None)
+        return choice.spans, choice.spans
     start = unloaded_start(wrench)
-    if not choice.start:
-        return ZeroSpans((), start)
-    if start is None:
+    found = () if start is None else (start,)
+    if choice.start and start is None:
         raise ParameterError(
             "--zero start: the log has no unloaded start of half a second in a regular pose; give "
             "the unloaded span as --zero A:B"
         )
-    return ZeroSpans((start,), None)
-
-
-def samples_of(t: Array, spans: Sequence[Span]) -> Mask:
-    """Samples that lie in any of the spans. (T,)"""
-    inside: Mask = np.zeros(len(t), dtype=bool)
-    for start, stop in spans:
-        inside |= (t >= start) & (t <= stop)
-    return inside
+    return found if choice.start else (), found
 
 
 def unloaded_start(wrench: Wrench) -> Span | None:
@@ -270,24 +239,17 @@ def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
 
     It does where the wrench changes within it, or lies far from the level of the log's start.
     """
-    where = Where(wrench.name, span=drift.span)
-    start = unloaded_start(wrench)
+    inside, start = wrench.between(*drift.span), unloaded_start(wrench)
+    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
+    tried: list[tuple[str, Array, Array, dict[str, object]]]
+    tried = [("zero-swings", swing, 4.0 * STEPS, {})]
     if start is not None:
         level = zero_drift(wrench, start)
         away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
-        if worst := largest_excess(away, STEPS):
-            return (warning("zero-far-from-start", where, start_s=list(start), **worst),)
-    inside = wrench.between(*drift.span)
-    swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
-    if worst := largest_excess(swing, 4.0 * STEPS):
-        return (warning("zero-swings", where, **worst),)
+        tried.insert(0, ("zero-far-from-start", away, STEPS, {"start_s": list(start)}))
+    for code, value, limit, values in tried:
+        k = int(np.argmax(value / limit))
+        if value[k] > limit[k]:
+            values |= {"axis": AXES[k], "size": float(value[k]), "unit": unit_of(k)}
+            return (warning(code, Where(wrench.name, span=drift.span), **values),)
     return ()
-
-
-def largest_excess(value: Array, limit: Array) -> dict[str, object]:
-    """The axis that exceeds its limit most, with its value and unit; empty if none does."""
-    share = value / limit
-    if not np.any(share > 1.0):
-        return {}
-    k = int(np.argmax(share))
-    return {"axis": AXES[k], "size": float(value[k]), "unit": unit_of(k)}

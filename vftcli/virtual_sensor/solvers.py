@@ -40,8 +40,7 @@ class Decomposition(NamedTuple):
     @property
     def sigma_min(self) -> Array:
         """Smallest singular value of J_s. (T,) [m]"""
-        smallest: Array = np.sqrt(np.maximum(self.squares[:, 0], 0.0))
-        return smallest
+        return np.asarray(np.sqrt(np.maximum(self.squares[:, 0], 0.0)))
 
 
 def decompose(jacobian: Array) -> Decomposition:
@@ -121,8 +120,7 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
     share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
     along = np.squeeze(np.swapaxes(tall, 1, 2) @ tau[:, :, None], axis=2)
     explained = np.squeeze(tall @ (share * along)[:, :, None], axis=2)
-    residual: Array = tau - explained
-    return residual
+    return np.asarray(tau - explained)
 
 
 class FlangeWrench(NamedTuple):
@@ -228,12 +226,9 @@ class VirtualSensor(Shown):
         )
 
     def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
-        """Where a force of this sensor acts, and where it points, both seen from the base.
+        """Where forces in this sensor's frame (S, 3) [N] act, and where they point, from the base.
 
-        Args:
-            force: Forces in the sensor's frame, as of its wrenches. (S, 3) [N]
-            q: Joint positions then. (S, n) [rad]
-            chain: The arm.
+        The arm is at q (S, n) [rad] then.
         """
         poses = link_poses(chain, q)
         flange, pose = poses.rotation[:, -1], frame_pose(self.frame, self.mounting)
