@@ -81,10 +81,7 @@ def test_a_logarithm_s_slope_is_that_of_a_curve_through_it():
 def test_values_and_columns_are_in_one_order():
     robot = shortened(ur10e(), 3)
     error = drawn_error(robot)
-    values = np.zeros(3 * 18)
-    for j in range(3):
-        values[column_numbers(j, 3)] = error.own(j)
-    again = error_of(values, 3)
+    again = error_of(error.values, 3)
     for name, value in vars(error).items():
         np.testing.assert_array_equal(getattr(again, name), value)
     assert sorted(set(np.concatenate([column_numbers(j, 3) for j in range(3)]))) == list(range(54))
@@ -99,10 +96,10 @@ def test_the_columns_times_an_error_are_the_torque_of_it(name):
     error = replace(drawn, friction=np.zeros_like(drawn.friction))
     motion = smooth_motion(run)
     columns = error_columns(run, motion, expected_error(robot), 1)
-    ones = expected_error(robot)
-    share = [np.divide(error.own(j), ones.own(j), where=ones.own(j) > 0.0,
-                       out=np.zeros_like(error.own(j))) for j in range(robot.joints)]  # fmt: skip
-    dense = np.column_stack([c @ u for c, u in zip(columns, share, strict=True)])
+    values, ones = error.values, expected_error(robot).values
+    share = np.divide(values, ones, where=ones > 0.0, out=np.zeros_like(values))
+    numbers = [column_numbers(j, robot.joints) for j in range(robot.joints)]
+    dense = np.column_stack([c @ share[k] for c, k in zip(columns, numbers, strict=True)])
     # ṗ by central differences: ω²Ts²/6 of products of up to 1.8 Hz, .2 %, of 30 N·m at most
     np.testing.assert_allclose(error.torque(run, smooth_motion(run)), dense, atol=0.06)
 

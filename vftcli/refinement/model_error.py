@@ -130,11 +130,11 @@ class ModelError:
     def __post_init__(self) -> None:
         seal(self, *vars(self))
 
-    def own(self, joint: int) -> Array:
-        """The values of the columns that one joint's row has: links from it on, then its own."""
-        drives = [self.rotor[joint], self.drive[joint]]
-        mine = [*drives, *self.friction[:, joint], self.offset[joint]]
-        return np.concatenate([self.inertial[LINK * joint :], mine])
+    @property
+    def values(self) -> Array:
+        """The values in the order of `column_numbers`. (P,)"""
+        mine = np.column_stack([self.rotor, self.drive, *self.friction, self.offset])
+        return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
         """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
@@ -166,7 +166,7 @@ def error_of(values: Array, joints: int) -> ModelError:
 
 
 def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
-    """Which of all columns the row of one joint has, as `ModelError.own` gives them."""
+    """Which of all columns the row of one joint has: links from it on, then its own."""
     own = LINK * joints + (SHAPES + 3) * joint
     return np.concatenate(
         [np.arange(LINK * joint, LINK * joints), np.arange(own, own + SHAPES + 3)]
@@ -212,20 +212,19 @@ def friction_alone(robot: Robot) -> ModelError:
 
 def error_columns(run: Run, motion: SmoothMotion, expected: ModelError, stride: int) -> list[Array]:
     """The rows of A of every joint, each column of `column_numbers` times its deviation. (S, p)"""
-    n, kept = run.robot.joints, slice(None, None, stride)
+    n, kept, sds = run.robot.joints, slice(None, None, stride), expected.values
     shapes = [
         motion.dq[kept] if k == SHAPES - 2 else zero_phase(motion.t, shape, CUTOFF)[kept]
         for k, shape in enumerate(friction_shapes(run, motion.gravity))
     ]
     q, dq, ddq, rigid = (x[kept] for x in (motion.q, motion.dq, motion.ddq, motion.rigid))
+    mine = np.stack([ddq, rigid, *shapes, np.ones_like(q)], axis=2)
     columns = [np.empty((len(q), len(column_numbers(j, n)))) for j in range(n)]
     for start in range(0, len(q), CHUNK):
         span = slice(start, start + CHUNK)
         rows = torque_regressor(run.robot.loaded_chain, q[span], dq[span], ddq[span])
-        for j in range(n):
-            columns[j][span, : LINK * (n - j)] = rows[:, j, LINK * j :]
-    for j in range(n):
-        mine = [ddq[:, j], rigid[:, j], *(shape[:, j] for shape in shapes), np.ones(len(q))]
-        columns[j][:, LINK * (n - j) :] = np.column_stack(mine)
-        columns[j] *= expected.own(j)
+        for j, column in enumerate(columns):
+            column[span] = (
+                np.hstack([rows[:, j, LINK * j :], mine[span, j]]) * sds[column_numbers(j, n)]
+            )
     return columns

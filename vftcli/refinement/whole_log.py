@@ -13,7 +13,6 @@ from vftcli.refinement.model_error import (
     CUTOFF,
     ModelError,
     SmoothMotion,
-    column_numbers,
     error_columns,
     error_of,
     expected_error,
@@ -206,10 +205,7 @@ def bias_of(
         said = remarks_of(found, np.zeros(n), float(fit.free.mean()))
         bare = untouched(run.terms, said[0])
         return replace(bare, free=free, load=load, remarks=said, fitted=True)
-    sds = np.zeros(fit.rows.unknowns)
-    for j in range(n):
-        sds[column_numbers(j, n)] = expected.own(j)
-    error = error_of(sds * found.solution.model, n)
+    error = error_of(expected.values * found.solution.model, n)
     whole = error.torque(run, motion)
     bias = found.weight * whole
     spread = resample_columns(t, t[::stride], fit.rows.spread(found.solution.covariance))
