@@ -103,17 +103,10 @@ def analyse_logs(
     failed: Failed | None = None,
     work: Analyser | None = None,
 ) -> Iterator["Analysis"]:
-    """Analyse the logs of a command one after the other; what they share is made once.
+    """Analyses of the logs of a command one after the other; what they share is made once.
 
-    Args:
-        logs: The logs.
-        choice: What is asked of each.
-        failed: Who is told of a log that cannot be analysed, which is then left out; None to raise.
-        work: What is done with each, `analyse` if not given.
-
-    Raises:
-        ParameterError: If two of them are the same run.
-        VftError: If one cannot be analysed and nobody is told.
+    The work on each is `analyse` if not given. A log that cannot be analysed is left out where
+    somebody is told of it, else it raises a VftError, as two logs of the same run do.
     """
     models, work, tell = Runs(), work or analyse, failed or raise_error
     recordings: list[tuple[Path | Recording, Recording]] = []
@@ -138,11 +131,7 @@ def analyse_logs(
 def list_touches(
     recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
 ) -> "Analysis":
-    """What touched the arm along a log, without any observer's estimate.
-
-    Raises:
-        VftError: If the log is meaningless with this robot, or tells no contacts.
-    """
+    """What touched the arm along a log, without any observer's estimate."""
     from vftcli.analysis import Analysis
     from vftcli.contacts.listing import list_contacts
 
@@ -155,11 +144,7 @@ def list_touches(
 
 
 def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, Robot]:
-    """A log with its robot, its effort taken for what it is where the robot's model shall say.
-
-    Raises:
-        RobotError: If no robot is chosen and the log does not settle it.
-    """
+    """A log with its robot, its effort taken for what it is where the robot's model shall say."""
     robot = choice.examiner.robot(recording, choice.robot)
     if choice.observers.causal:
         check_logged(recording, "--causal leaves out what looks ahead")
@@ -167,11 +152,7 @@ def prepared(recording: Recording, choice: AnalysisChoice) -> tuple[Recording, R
 
 
 def check_logged(recording: Recording, why: str) -> None:
-    """Check that no signal of a log was derived from the complete log.
-
-    Raises:
-        MissingSignalError: If one was, with the reason why that will not do.
-    """
+    """Check that no signal was derived from the complete log; else say why that will not do."""
     if recording.source.derived:
         raise MissingSignalError(
             f"{recording.name}: joint velocities (dq) that are derived from positions need the "
@@ -187,13 +168,9 @@ def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
 def analyse(
     recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs | None = None
 ) -> "Analysis":
-    """Go from a recording to estimates and, if a reference is asked for, their errors.
+    """Estimates of a recording and, if a reference is asked for, their errors.
 
-    Args:
-        recording: The log.
-        robot: The arm, its payload mounted.
-        choice: What is asked of it.
-        models: What the command has modelled so far, for several logs that share a free run.
+    The robot has its payload mounted. Several logs that share a free run share the models so far.
     """
     tell, name = choice.progress, recording.name
     tell(f"{name}: examining", 0.05, 0.15)
@@ -222,11 +199,7 @@ def read(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Run
 
 
 def examine(motion: FreeMotion, choice: AnalysisChoice) -> tuple["Examination", ...]:
-    """Examine the log, then its free runs.
-
-    Raises:
-        ExaminationError: If a finding makes every result meaningless.
-    """
+    """Examinations of the log, then of its free runs; what is meaningless raises."""
     runs = [motion.log, *(free.run for free in motion.runs)]
     found = [choice.examiner.examine(run.recording, run.robot) for run in runs]
     motion.log.recording.release()  # much of it is only examined

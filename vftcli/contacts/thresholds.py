@@ -272,11 +272,8 @@ def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
 
     Every signal of a set of n gets rate/n. Several logs are not mixed: every threshold is that of
     the log which needs the highest, so that the worst day has the rate and the others fewer. A log
-    too short for a tail counts by its largest reading alone, where another is long enough.
-
-    Args:
-        free: Logs of one arm that nobody touched.
-        rate: False alarms of all joints together; and as many of all axes. [1/h]
+    too short for a tail counts by its largest reading alone, where another is long enough. The rate
+    [1/h] is of all joints together; and as much of all axes.
     """
     if not (np.isfinite(rate) and rate > 0.0):
         raise ParameterError(f"--rate {rate:g} is not a positive number of false alarms per hour")

@@ -13,11 +13,7 @@ NAMES = ("zero", "vendor", "two-cycle", "sensor")  #: The references that are ma
 
 @dataclass(frozen=True, kw_only=True)
 class ReferenceChoice(Choice):
-    """The reference a user asks for, checked before any log is read.
-
-    Raises:
-        ReferenceTorqueError: If there is no such reference.
-    """
+    """The reference a user asks for, checked before any log is read."""
 
     GROUP = COMPARE
 

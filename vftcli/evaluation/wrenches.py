@@ -40,10 +40,7 @@ def evaluate_wrenches(
 ) -> pl.DataFrame:
     """One row per observer and axis, over the samples where the reference is known.
 
-    Args:
-        recording: The log's name, for the first column.
-        wrenches: The observers' wrenches, on the reference's clock and in its frame.
-        reference: What they are judged by.
+    All wrenches are on the reference's clock and in its frame.
     """
     rows: list[dict[str, object]] = []
     for wrench in wrenches:

@@ -49,10 +49,6 @@ class FreeChoice(Choice):
     """Free motion, and its use in the two-cycle difference.
 
     With nothing chosen the free cycles of a repeated motion are found.
-
-    Raises:
-        ReferenceTorqueError: If an alignment does not exist or lacks its period, a period or cutoff
-            is not positive, or cycles are named beside other logs.
     """
 
     GROUP = LOG
@@ -144,10 +140,6 @@ class FreeChoice(Choice):
         """The choice that the options of a command state, each the word after its option.
 
         A word of `free` is a log or a span ``A:B``.
-
-        Raises:
-            ParameterError: If a span is malformed.
-            ReferenceTorqueError: If cycles, alignment or cutoff are not what there is.
         """
         spans: list[tuple[float, float]] = []
         logs: list[Path] = []

@@ -60,9 +60,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     which enough samples return is refined below the sample time by Gauss–Newton steps on all
     its multiples together, robust against contacts that push the arm off its path.
 
-    Args:
-        recording: The log.
-        stated: The commanded period, if known: the search stays within `AROUND` of it. [s]
+    The search stays within `AROUND` of a stated period. [s]
     """
     t, q = moving_part(recording)
     check_stated(recording, stated, float(t[-1] - t[0]))

@@ -15,11 +15,7 @@ REMOVALS = (AUTOMATIC, WHOLE_LOG, "none")  #: What ``bias.method`` takes.
 
 @dataclass(frozen=True, kw_only=True)
 class RefinementChoice(Choice):
-    """A user's choice for the estimates of a whole log.
-
-    Raises:
-        ParameterError: If there is no such way to remove a bias.
-    """
+    """A user's choice for the estimates of a whole log."""
 
     GROUP = ESTIMATE
 

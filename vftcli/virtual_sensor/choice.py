@@ -21,11 +21,7 @@ SMOOTHED = ("best",)  #: Observers whose wrench is the smoother's where no other
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroChoice:
-    """What is taken as the zero of a wrench; nothing where all is left at its default.
-
-    Raises:
-        ParameterError: If both spans and the start are chosen.
-    """
+    """What is taken as the zero of a wrench; nothing where all is left at its default."""
 
     #: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
     spans: tuple[tuple[float, float], ...] = ()
@@ -37,11 +33,7 @@ class ZeroChoice:
 
     @classmethod
     def parsed(cls, words: Sequence[str]) -> "ZeroChoice":
-        """The choice that ``--zero A:B|start``, which may be repeated, states.
-
-        Raises:
-            ParameterError: If a word is neither, or they exclude each other.
-        """
+        """The choice that ``--zero A:B|start``, which may be repeated, states."""
         spans = []
         for text in words:
             if text == START:
@@ -58,11 +50,7 @@ class ZeroChoice:
 
 @dataclass(frozen=True, kw_only=True)
 class WrenchChoice(Choice):
-    """What a user asks of the virtual sensor.
-
-    Raises:
-        ParameterError: If there is no such frame or solver.
-    """
+    """What a user asks of the virtual sensor."""
 
     GROUP = WRENCH
 
@@ -153,11 +141,7 @@ class WrenchChoice(Choice):
         return self.solver == SMOOTHER or (self.solver is None and name in SMOOTHED)
 
     def mounting(self, robot: "Robot") -> "Mounting":
-        """Where tool and sensor sit: as asked, else as the robot file says.
-
-        Raises:
-            ParameterError: If a pose is malformed or names nothing there is.
-        """
+        """Where tool and sensor sit: as asked, else as the robot file says."""
         from vftcli.virtual_sensor.frames import Mounting, read_pose
 
         tool, sensor = robot.tools.get(""), robot.sensors.get("")

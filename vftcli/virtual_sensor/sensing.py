@@ -96,21 +96,12 @@ def sense(
     own: Mapping[str, FreeLog] | None = None,
     gate: Gate | None = None,
 ) -> SensorReading:
-    """Turn estimates into wrenches, remove the zero, and judge them.
+    """Wrenches of the observers' estimates, in the same order, less their zero, and judged.
 
     What is asked of the log rather than of an observer (its unloaded start, its sensor's pose, its
     vendor's convention) is read off the mean disturbance, so that it does not depend on which
-    observers run.
-
-    Args:
-        motion: The log and its robot.
-        observers: The observers, whose lag widens the band.
-        estimates: Their torques, in the same order.
-        choice: What is asked of the virtual sensor.
-        plain: The log and its free samples as the robot's model alone has them; None to find them.
-        own: Those of an observer that has others, by its name.
-        gate: The contacts, outside of which the smoother's wrench is zero; None where the whole log
-            is one.
+    observers run. The smoother needs the log with its free samples, as the robot's model alone has
+    it (`plain`, found if not given) or as an observer has its own, and a gate where there is one.
     """
     log, q, t = motion.log, motion.log.q, motion.log.t
     chain = log.robot.chain

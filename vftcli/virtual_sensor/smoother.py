@@ -288,15 +288,11 @@ def smooth_wrench(
     gate: Sequence[tuple[float, float]] | None = None,
     prior: WrenchPrior | None = None,
 ) -> SmoothedWrench:
-    """The wrench at the flange from the whole log, by `BlockModel`.
+    """The wrench at the flange from the whole log, corrected or not, by `BlockModel`.
 
-    Args:
-        run: The log, corrected or not.
-        free: Motion that nobody touched, from which the noise is learned; none to take it from the
-            drives' dry friction.
-        gate: From and to of every contact [s], outside of which the wrench is zero, as far as the
-            pose can show; None where the whole log is one.
-        prior: How the wrench may move; None to choose it by the log's likelihood.
+    Its noise is learned from free motion, without any from the drives' dry friction. Outside of the
+    gate, from and to of every contact [s], the wrench is zero as far as the pose can show; without
+    one the whole log is a contact. Without a prior it is chosen by the log's likelihood.
     """
     if run.recording.joints < 6:
         raise RobotError(

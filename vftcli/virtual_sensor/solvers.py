@@ -173,14 +173,10 @@ class VirtualSensor(Shown):
         chain: Chain,
         sd: dict[str, Array] | None = None,
     ) -> tuple[Wrench, ...]:
-        """The wrench of every estimate, about the flange, tool or sensor.
+        """The wrench of every estimate at q (T, n) [rad], about the flange, tool or sensor.
 
-        Args:
-            torques: Estimates on the log's clock.
-            q: Joint positions. (T, n) [rad]
-            chain: The arm.
-            sd: Name of an estimate → standard deviation of its torques, (n,) or (T, n) [N·m]; one
-                without has a wrench without band.
+        An estimate without a standard deviation of its torques, (n,) or (T, n) [N·m] by its name,
+        has a wrench without band.
         """
         samples, n = q.shape
         for torque in torques:
