@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vftcli.cli import app
-from vftcli.reproduction import jobs, paper
+from vftcli.reproduction import experiments, paper
 from vftcli.reproduction.paper import Experiment, Paper, PaperItem, PrintedLine
 from vftcli.signals.errors import ParameterError
 
@@ -54,8 +54,8 @@ def test_an_experiment_that_fails_is_a_row_and_exit_code_one(
         setting=(),
     )
     monkeypatch.setitem(paper.PAPERS, "p", declared)
-    monkeypatch.setitem(jobs.RUNS, "fail", fail)
-    monkeypatch.setattr(jobs, "MOST_WORKERS", 1)
+    monkeypatch.setitem(experiments.RUNS, "fail", fail)
+    monkeypatch.setattr(experiments, "MOST_WORKERS", 1)
     result = invoke("reproduce", "p", "-o", tmp_path / "out")
     assert result.exit_code == 1
     assert "the experiment, seed 1: nothing moved with 1" in result.output

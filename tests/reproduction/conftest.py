@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vftcli.outputs.charts import Chart, ChartLine
-from vftcli.reproduction import jobs, paper
+from vftcli.reproduction import experiments, paper
 from vftcli.reproduction.paper import (
     AS_PRINTED,
     CORRECTED,
@@ -69,6 +69,6 @@ PAPER = Paper(
 def cheap(monkeypatch: pytest.MonkeyPatch) -> Paper:
     """That paper, among those there are."""
     monkeypatch.setitem(paper.PAPERS, PAPER.name, PAPER)
-    monkeypatch.setitem(jobs.RUNS, "measure", measure)
-    monkeypatch.setitem(jobs.RUNS, "fail", fail)
+    monkeypatch.setitem(experiments.RUNS, "measure", measure)
+    monkeypatch.setitem(experiments.RUNS, "fail", fail)
     return PAPER

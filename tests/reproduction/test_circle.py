@@ -5,8 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
-from vftcli.reproduction.page import item_grid, spread
+from vftcli.reproduction.experiments import gather, item_grid, jobs_of, run_jobs, spread
 from vftcli.reproduction.paper import PAPERS
 
 HUANG = PAPERS["huang2025"]

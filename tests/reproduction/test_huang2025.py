@@ -3,7 +3,7 @@
 import inspect
 
 from vftcli.evaluation.published import TABLE_1
-from vftcli.reproduction.jobs import RUNS
+from vftcli.reproduction.experiments import RUNS
 from vftcli.reproduction.paper import PAPERS
 
 EXPERIMENTS, ITEMS = PAPERS["huang2025"].experiments, PAPERS["huang2025"].items

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.reproduction.jobs import Job, gather, jobs_of, run_jobs
+from vftcli.reproduction.experiments import Job, gather, jobs_of, run_jobs
 from vftcli.reproduction.paper import CORRECTED, PAPERS, RunResult
 
 HUANG = PAPERS["huang2025"]

@@ -6,13 +6,15 @@ import pytest
 
 from vftcli.outputs.files import OutputFolder
 from vftcli.outputs.grid import DASH, terminal
-from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
-from vftcli.reproduction.page import (
+from vftcli.reproduction.experiments import (
     beside_print,
     files_of,
+    gather,
+    jobs_of,
     overview,
     render_markdown,
     render_page,
+    run_jobs,
     short_overview,
     spread,
     write_reproduction,

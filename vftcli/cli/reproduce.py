@@ -36,8 +36,14 @@ def reproduce(
     from vftcli.cli.console import command_line, say, show, stages
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
-    from vftcli.reproduction.jobs import gather, jobs_of, run_jobs
-    from vftcli.reproduction.page import files_of, short_overview, write_reproduction
+    from vftcli.reproduction.experiments import (
+        files_of,
+        gather,
+        jobs_of,
+        run_jobs,
+        short_overview,
+        write_reproduction,
+    )
     from vftcli.reproduction.paper import paper_of
     from vftcli.signals.packages import check_installed
 
