@@ -28,9 +28,10 @@ RETURNS = 0.015
 #: A valley is worth refining if a quarter of the samples come back within this share.
 SHORTLIST = 0.15
 CANDIDATES = 40  #: Valleys looked at, the deepest ones.
+SEARCHED = 0.01  #: Clock on which a period is looked for, where the log's is finer. [s]
 MULTIPLES = 12  #: Multiples of the period that refine it.
 AROUND = 0.03  #: How far from a stated period the true one is looked for, relative: clocks drift.
-ENOUGH = 2560  #: Samples that refine a period: more of them only take longer.
+ENOUGH = 2560  #: Samples that choose and refine a period: more of them only take longer.
 #: Spans this many times what the samples fill at their usual step are gaps, not motion.
 SPARSE = 10.0
 
@@ -70,11 +71,12 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
             f"{recording.name}: {len(t)} samples over {t[-1] - t[0]:.4g} s: nearly all of that is "
             "a gap, in which no repetition can be looked for; leave the gap out with --interval"
         )
+    step *= max(1, int(SEARCHED / step))
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
     for lag in valleys(lag_fit(x, x, 0.0).difference[len(x) - 1 :], step, stated):
-        seconds, deviation = lag * step, returned(t, q, lag * step)
+        seconds, deviation = lag * step, returned(t, q, lag * step, -(-len(t) // ENOUGH))
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
             deviation = returned(t, q, seconds)
@@ -150,10 +152,11 @@ def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
     return [float(x) for x in deep + np.clip(tilt / np.where(bend > 0, bend, np.inf), -0.5, 0.5)]
 
 
-def returned(t: Array, q: Array, seconds: float) -> float:
-    """Lower quartile of the distance of q and q `seconds` later. [rad]"""
-    inside = t + seconds <= t[-1]
-    distance = resample_columns(t[inside] + seconds, t, q) - q[inside]
+def returned(t: Array, q: Array, seconds: float, every: int = 1) -> float:
+    """Lower quartile of the distance of q, one in `every`, and q `seconds` later. [rad]"""
+    here, path = t[::every], q[::every]
+    inside = here + seconds <= t[-1]
+    distance = resample_columns(here[inside] + seconds, t, q) - path[inside]
     return float(np.quantile(np.sqrt(np.sum(distance**2, axis=1)), 0.25))
 
 

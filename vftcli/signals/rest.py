@@ -39,8 +39,9 @@ def duration(t: Array, dq: Array) -> Array:
     length = np.zeros(dq.shape)
     step = median_step(t)
     for j, slow in enumerate(slower(dq).T):
-        for start, stop in runs_of(slow):
-            length[start:stop, j] = t[stop - 1] - t[start] + step
+        if stops := runs_of(slow):
+            start, stop = np.array(stops).T
+            length[slow, j] = np.repeat(t[stop - 1] - t[start] + step, stop - start)
     return length
 
 
