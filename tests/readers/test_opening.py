@@ -7,7 +7,7 @@ import pytest
 import zstandard
 
 from vftcli.readers import FORMATS, opening, read
-from vftcli.readers.opening import HEAD_BYTES, Digest, open_log
+from vftcli.readers.opening import HEAD_BYTES, open_log, sha256_of
 from vftcli.signals.errors import LogError
 
 CONTENT = bytes(range(256)) * 1000
@@ -58,8 +58,8 @@ def test_the_digest_of_a_folder_is_that_of_its_files_in_name_order(tmp_path):
     (tmp_path / "bag" / "sub").mkdir(parents=True)
     for name, content in {"b": b"2", "a": b"1", "sub/c": b"3"}.items():
         (tmp_path / "bag" / name).write_bytes(content)
-    assert Digest((tmp_path / "bag",)).hexdigest() == hashlib.sha256(b"123").hexdigest()
-    assert Digest((tmp_path / "bag" / "a",)).hexdigest() == hashlib.sha256(b"1").hexdigest()
+    assert sha256_of(tmp_path / "bag") == hashlib.sha256(b"123").hexdigest()
+    assert sha256_of(tmp_path / "bag" / "a") == hashlib.sha256(b"1").hexdigest()
 
 
 @pytest.mark.parametrize("name", [n for n, layout in FORMATS.items() if not layout.folder])

@@ -96,10 +96,13 @@ class ColumnSpec:
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     """Parse a --columns text, of a log unless it is of a reference, which has no positions."""
-    if not _split(text):
+    if not (parts := _split(text)):
         raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
-    parts, segment = _without_segment(_split(text))
-    items = tuple(_parse_item(part) for part in parts)
+    numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
+    if numbers and (len(numbers) > 1 or not re.fullmatch(r"[0-9]+", numbers[0])):
+        raise LogError(f"--columns: segment={numbers[0]} must be one whole number, from 1.")
+    segment = int(numbers[0][:9]) if numbers else None
+    items = tuple(_parse_item(part) for part in parts if not part.startswith("segment="))
     signals = {item.signal for item in items}
     # Nothing can be counted without positions: what is left says a unit or a sign.
     single = all(item.count == 1 or item.signal == "wrench" for item in items)
@@ -125,15 +128,6 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
 def _split(text: str) -> list[str]:
     parts = re.split(r",(?![^\[]*\])", text)
     return [part.strip() for part in parts if part.strip()]
-
-
-def _without_segment(parts: list[str]) -> tuple[list[str], int | None]:
-    numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
-    if not numbers:
-        return parts, None
-    if len(numbers) > 1 or not numbers[0].isascii() or not numbers[0].isdigit():
-        raise LogError(f"--columns: segment={numbers[0]} must be one whole number, from 1.")
-    return [part for part in parts if not part.startswith("segment=")], int(numbers[0][:9])
 
 
 def _parse_item(part: str) -> Item:
@@ -190,7 +184,7 @@ def tick_of(stamps: Array, name: str) -> tuple[float, str]:
     Whole numbers one apart are milliseconds of a 1 kHz log; epoch stamps tell by their size;
     everything else is seconds.
     """
-    units = {"ns": 1e-9, "us": 1e-6, "ms": 1e-3, "s": 1.0}
+    units = UNITS["t"]
     if match := re.search(r"[_\[(.](ns|us|ms|s)[\])]?$", name.lower()):
         return units[match[1]], match[1]
     if len(stamps) == 0:

@@ -4,9 +4,8 @@ import hashlib
 import math
 import mmap
 import re
-import threading
 import zlib
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -213,31 +212,10 @@ def files_of(path: Path) -> list[Path]:
     return sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
 
 
-class Digest:
-    """SHA-256 of files, of a folder all in name order, computed beside other work.
-
-    It keeps a core busy, so it should start while the reader's own libraries are being imported,
-    or else when the reader is done with the cores.
-    """
-
-    def __init__(self, paths: Iterable[Path]) -> None:
-        self._paths = [file for path in paths for file in files_of(path)]
-        self._sum = hashlib.sha256()
-        # hashlib releases the interpreter for large pieces, so a thread is enough.
-        self._thread = threading.Thread(target=self._run, daemon=True)
-
-    def start(self) -> None:
-        """Start computing, if that has not begun."""
-        if self._thread.ident is None:
-            self._thread.start()
-
-    def _run(self) -> None:
-        for path in self._paths:
-            with suppress(OSError), path.open("rb", buffering=0) as file:
-                hashlib.file_digest(file, lambda: self._sum)
-
-    def hexdigest(self) -> str:
-        """Wait for the end and return the digest."""
-        self.start()
-        self._thread.join()
-        return self._sum.hexdigest()
+def sha256_of(*paths: Path) -> str:
+    """SHA-256 of files, of a folder all in name order."""
+    total = hashlib.sha256()
+    for file in (file for path in paths for file in files_of(path)):
+        with suppress(OSError), file.open("rb", buffering=0) as content:
+            hashlib.file_digest(content, lambda: total)
+    return total.hexdigest()

@@ -2,10 +2,11 @@
 
 import re
 import shlex
-import sys
 import tomllib
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -14,8 +15,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vftcli.readers.cleaning import RestartError, cleaned, without_unknown_rows
-from vftcli.readers.opening import HEAD_BYTES, Digest, LogFile, open_log
+from vftcli.readers.opening import HEAD_BYTES, LogFile, open_log, sha256_of
 from vftcli.readers.reader import RawLog, ReadChoice, episode_of
+from vftcli.readers.table import listed
 from vftcli.signals.arrays import number_array
 from vftcli.signals.errors import (
     LogError,
@@ -142,20 +144,16 @@ def read_chosen(path: str | Path, choice: ReadChoice, label: str = "") -> Record
     reader = _reader(file, choice)
     if choice.episode is not None and not reader.episodes:
         raise LogError(f"{path}: one recording, without episodes; leave --episode out.")
-    digest = Digest((path,))
-    if "polars" not in sys.modules and not reader.episodes:
-        digest.start()  # its import takes longer than the hash and leaves a core idle
-
     with np.errstate(all="ignore"):  # what a damaged file holds is judged when it is cleaned
         raw = reader.read(file, choice)
         raw = replace(raw, remarks=(*file.remarks, *raw.remarks))
         raw = without_unknown_rows(raw) if choice.skips_unknown else raw
     if choice.arm is not None and not raw.part.endswith("arm"):
         raise LogError(f"{path}: a log of one arm; leave --arm out.")
-    digest = Digest(raw.files) if raw.files else digest
-    if not raw.part:
-        digest.start()  # of one of many parts it may never be asked for
-    return cleaned(raw, path, reader.name, digest.hexdigest, label)
+    sha256: Callable[[], str] = partial(sha256_of, *(raw.files or (path,)))
+    if not raw.part:  # of one of many parts it may never be asked for
+        sha256 = ThreadPoolExecutor(1).submit(sha256).result
+    return cleaned(raw, path, reader.name, sha256, label)
 
 
 def episode_numbers(path: str | Path, choice: ReadChoice) -> Sequence[int]:
@@ -261,9 +259,7 @@ LOGS = (".csv", ".tsv", ".txt", ".gz", ".zst", ".npy", ".npz", ".parquet", ".bag
         ".pkl", ".log", ".bin", ".json", ".jsonl", ".mat", ".hdf5", ".h5", ".feather",
         ".arrow")  # fmt: skip
 
-SHOWN = 4
-
-
+SHOWN = 4  #: Names of files that a message shows.
 #: How files begin that users give by mistake → what they are, and what to do.
 KINDS = (
     (rb"\x89PNG|\xff\xd8\xff|GIF8|BM....\0\0\0\0", "a picture; give the log it was drawn from"),
@@ -342,20 +338,14 @@ def of_folder(path: Path, entries: Sequence[str]) -> str:
     ours = (".truth.parquet", "estimates.parquet")
     logs = [n for n in entries if n.lower().endswith(LOGS) and not n.lower().endswith(ours)]
     if not logs:
-        shown = listed(entries)
+        shown = listed(entries, SHOWN)
         return f"a folder without a log ({shown}); give a log, or the folder of a bag"
     endings = [name[name.rindex(".") :] for name in logs]
     ending = max(endings, key=endings.count)
     count = f"{len(logs)} files that may be logs" if len(logs) > 1 else "a file that may be a log"
     every = f"{shlex.quote(printable(str(path)))}/*{ending}"
     return (
-        f"a folder of {count} ({listed(logs)}), no bag and no data set; give them by name, all at "
-        f"once where the command takes several (vftcli report {every} -o OUT), or one by one: "
-        f"for f in {every}; do vftcli inspect $f; done"
+        f"a folder of {count} ({listed(logs, SHOWN)}), no bag and no data set; give them by name, "
+        f"all at once where the command takes several (vftcli report {every} -o OUT), or "
+        f"one by one: for f in {every}; do vftcli inspect $f; done"
     )
-
-
-def listed(names: Sequence[str]) -> str:
-    """A few names for a message."""
-    more = f" and {len(names) - SHOWN} more" if len(names) > SHOWN else ""
-    return ", ".join(printable(name[:40]) for name in names[:SHOWN]) + more

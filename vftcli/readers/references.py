@@ -9,7 +9,7 @@ from vftcli.readers.aliases import NamedColumns
 from vftcli.readers.cleaning import measured, seconds, without_repeats
 from vftcli.readers.columns import parse_columns
 from vftcli.readers.delimited import TextTable
-from vftcli.readers.opening import Digest, open_log
+from vftcli.readers.opening import open_log, sha256_of
 from vftcli.readers.parquet import ParquetTable
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import (
@@ -119,8 +119,7 @@ class JacobianLog:
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with
 def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str) -> JacobianLog:
     """Read the log in which positions were looked for in vain."""
-    table, digest = found.table, Digest((path,))
-    digest.start()
+    table = found.table
     signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
     cells, n = _jacobian_cells(found)
     if "tau_ext" not in signals or len(signals["tau_ext"].cells) != n:
@@ -141,7 +140,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     return JacobianLog(
         name=name,
         path=path,
-        sha256=digest.hexdigest(),
+        sha256=sha256_of(path),
         t=t[inside],
         tau_ext=raw.signals["tau_ext"][inside],
         jacobian=jacobian[inside],
@@ -199,13 +198,9 @@ def stored_observers(path: Path) -> list[str]:
     with path.open("rb") as file:
         if file.read(4) != b"PAR1":
             return []
-    import polars as pl
-    from polars.exceptions import PolarsError
-
     try:
-        with path.open("rb") as file:  # polars cannot open a name that is not UTF-8
-            names = pl.read_parquet_schema(file)
-    except PolarsError:  # what is damaged is said by whoever reads it
+        names = ParquetTable(open_log(path)).names
+    except LogError:  # what is damaged is said by whoever reads it
         return []
     held = sorted({n.split("/")[1] for n in names if n.startswith(PREFIX) and n.count("/") == 2})
     return held if "t" in names and "q/1" in names else []
