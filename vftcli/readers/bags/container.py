@@ -1,11 +1,10 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
-import io
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,11 +107,8 @@ class Census:
             ingest.note(caution("recorder-stopped", kept=kept))
 
 
-USUAL_RATIO = 15  #: Recorded numbers shrink by 3 to 15.
-
-#: Pieces that libraries may read of chunks that shrank more: some seconds of their work.
-#:
-#: They read some seven a message, and no recorded message takes less than some bytes.
+#: Records that may be read of a container: no recorded message takes less than some bytes, and
+#: recorded numbers shrink by 3 to 15.
 SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
 
 
@@ -124,13 +120,13 @@ class Ingest:
     size: int  #: Its size. [B]
     remarks: list[Remark] = field(default_factory=list)  #: What was left behind.
     unpacked: int = 0  #: Bytes that were unpacked.
-    pieces: int = 0  #: What libraries may still read of chunks that shrank more than usual.
+    pieces: int = 0  #: Records and parts of records that may still be read.
 
     def __post_init__(self) -> None:
         self.pieces = SPARE_PIECES + PIECES_PER_BYTE * self.size
 
     def spend(self, pieces: int) -> None:
-        """Count pieces that a library is about to read."""
+        """Count pieces that are about to be read."""
         self.pieces -= pieces
         if self.pieces < 0:
             raise LogError(
@@ -211,25 +207,31 @@ def type_name(name: str) -> str:
     return f"{parts[0]}/{parts[-1]}" if len(parts) > 1 else name
 
 
-def file_of(content: memoryview) -> BinaryIO:
-    """A log's content as a file that libraries read, from its start, without a copy."""
-    whole: Any = content.obj
-    if isinstance(whole, bytes):
-        return io.BytesIO(whole)
-    whole.seek(0)  # a mapped file
-    mapped: BinaryIO = whole
-    return mapped
+class CutError(ValueError):
+    """The content ends inside a record."""
 
 
-def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesIO:
-    """One chunk of a bag or MCAP, unpacked to the size that it claims, as libraries read a file."""
+def sized(content: Any, place: int, width: int = 4) -> tuple[bytes, int]:  # noqa: ANN401
+    """The bytes behind their own length, which takes so many, and where they end.
+
+    Of bytes, or of a mapped file.
+    """
+    start = place + width
+    end = start + int.from_bytes(content[place:start], "little")
+    if end > len(content):
+        raise CutError("a record ends outside its content")
+    return content[start:end], end
+
+
+def unpacked(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
+    """One chunk of a bag or MCAP, unpacked to the size that it claims."""
     import bz2
 
     import lz4.frame
     import zstandard
 
     if name in {"", "none"}:
-        return io.BytesIO(packed)
+        return packed
     ingest.claim(size)
     content: bytes
     if name == "lz4":
@@ -242,21 +244,7 @@ def chunk_file(ingest: Ingest, name: str, packed: bytes, size: int) -> io.BytesI
         raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
     if len(content) != size:
         raise LogError(f"{ingest.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
-    usual = len(content) <= USUAL_RATIO * len(packed)
-    return io.BytesIO(content) if usual else _Counted(content, ingest)
-
-
-class _Counted(io.BytesIO):
-    """A chunk that shrank more than recorded numbers do: what it costs to read is bounded."""
-
-    def __init__(self, content: bytes, ingest: Ingest) -> None:
-        super().__init__(content)
-        self.ingest = ingest
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Read as every file does."""
-        self.ingest.spend(1)
-        return super().read(size)
+    return content
 
 
 def strided(buffer: Bytes, offsets: Integers, a: int, b: int) -> Bytes:

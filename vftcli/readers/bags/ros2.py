@@ -1,8 +1,7 @@
 """Bags of ROS 2: MCAP files and SQLite databases.
 
-An MCAP file (https://mcap.dev/spec) is read by mcap's stream reader from the start, so that a cut
-one reads up to its last chunk. The reader unpacks a chunk to whatever it holds, so chunks are
-unpacked here, within bounds, and handed to it as files of records.
+An MCAP file (https://mcap.dev/spec) is read from the start, so that a cut one reads up to its last
+chunk. mcap's reader unpacks a chunk to whatever it holds, and takes three times as long.
 
 A database is code as much as data: a column may be computed by functions of SQLite from nothing.
 So only stored columns of plain tables are read, no function runs, and what is read is bounded by
@@ -14,32 +13,32 @@ import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import closing, suppress
-from typing import Any, BinaryIO
+from typing import Any
 
-from mcap import records
-from mcap.exceptions import EndOfFile, RecordLengthLimitExceeded
-from mcap.stream_reader import MAGIC_SIZE, StreamReader
+from mcap.opcode import Opcode
+from mcap.stream_reader import MAGIC_SIZE
 
 from vftcli.readers.bags.container import (
     Batch,
     Census,
     Channel,
+    CutError,
     Ingest,
     Message,
     batched,
-    chunk_file,
-    file_of,
     printable,
+    sized,
     type_name,
+    unpacked,
 )
 from vftcli.readers.opening import LogFile
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import warning
 
-DATA = (
-    records.Schema, records.Channel, records.Message, records.Chunk, records.MessageIndex,
-    records.Attachment, records.Metadata,
-)  # fmt: skip
+DATA = {
+    Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.MESSAGE_INDEX,
+    Opcode.ATTACHMENT, Opcode.METADATA,
+}  # fmt: skip
 DATA_END_BYTES = 13  #: Length of the record that ends the data, its head included.
 
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
@@ -47,18 +46,11 @@ ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised 
 
 def mcap_batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of an MCAP file, up to the last whole chunk."""
-    return batched(_Mcap(ingest).messages(file.content), ingest)
+    return batched(_Mcap(ingest).messages(file.content.obj), ingest)
 
 
-def _records(
-    file: BinaryIO, size: int, *, inside: bool
-) -> Iterator[tuple[records.McapRecord, int]]:
-    """The records of a file, or inside a chunk, up to the last whole one; where each ends."""
-    # A chunk inside a chunk is none: they could hold one another without end.
-    reader = StreamReader(file, skip_magic=inside, emit_chunks=True, record_size_limit=size)
-    with suppress(EndOfFile, RecordLengthLimitExceeded, struct.error):
-        for record in reader.records:
-            yield record, file.tell()
+def _text(value: object) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""
 
 
 class _Mcap:
@@ -67,73 +59,92 @@ class _Mcap:
     def __init__(self, ingest: Ingest) -> None:
         self.ingest = ingest
         self.census = Census()
-        self.schemas: dict[int, records.Schema] = {}
+        #: Number of a schema → its name, encoding and data.
+        self.schemas: dict[int, tuple[bytes, bytes, bytes]] = {}
         self.channels: dict[int, Channel] = {}
         self.indexed = 0
 
-    def messages(self, content: memoryview) -> Iterator[Message]:
+    def messages(self, content: Any) -> Iterator[Message]:  # noqa: ANN401 - bytes or a mapped file
         """The messages of the file, chunk by chunk, those outside chunks one by one."""
         census, end = self.census, MAGIC_SIZE
-        for record, place in _records(file_of(content), len(content), inside=False):
-            end = place
-            if isinstance(record, DATA) and not census.closed:
-                census.data_end = end
-            if isinstance(record, records.Chunk):
-                census.chunks += 1
-                yield from self._chunk(record)
-            elif isinstance(record, records.Footer):
-                if (left := len(content) - end) != MAGIC_SIZE:
-                    raise LogError(
-                        f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} "
-                        "should; it is damaged."
-                    )
-                if record.summary_start:  # the messages should end before it
-                    census.missing = record.summary_start - DATA_END_BYTES - census.data_end
-                end = len(content)
-                break
-            else:
-                yield from self._take(record, end)
+        with suppress(CutError, struct.error):
+            for op, body, place in self._records(content, MAGIC_SIZE):
+                end = place
+                if op in DATA and not census.closed:
+                    census.data_end = end
+                if op == Opcode.CHUNK:
+                    census.chunks += 1
+                    yield from self._chunk(body)
+                elif op == Opcode.FOOTER:
+                    if (left := len(content) - end) != MAGIC_SIZE:
+                        raise LogError(
+                            f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} "
+                            "should; it is damaged."
+                        )
+                    (summary,) = struct.unpack_from("<Q", body)
+                    if summary:  # the messages should end before it
+                        census.missing = summary - DATA_END_BYTES - census.data_end
+                    end = len(content)
+                    break
+                else:
+                    yield from self._take(op, body, end)
         if self.indexed > census.chunks:
             census.counted_chunks = self.indexed
         census.tell(self.ingest, len(content) - end, "its statistics")
 
-    def _take(self, record: records.McapRecord, end: int) -> Iterator[Message]:
+    def _records(self, content: Any, place: int) -> Iterator[tuple[int, bytes, int]]:  # noqa: ANN401
+        """Kind and content of the records, and where each ends."""
+        while place < len(content):
+            op = content[place]
+            body, place = sized(content, place + 1, 8)
+            self.ingest.spend(1)
+            yield op, body, place
+
+    def _take(self, op: int, body: bytes, end: int) -> Iterator[Message]:
         """Remember what a record says; the message that it is, if it is one."""
-        if isinstance(record, records.Message):
+        if op == Opcode.MESSAGE:
             self.census.kept += 1
-            yield self.channels.get(record.channel_id), record.log_time, record.data
-        elif isinstance(record, records.Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, records.Channel):
-            schema = self.schemas.get(record.schema_id, records.Schema(0, b"", "", ""))
-            is_ros = schema.encoding in {"ros1msg", "ros2msg", "ros2idl"}
-            text = schema.data.decode("utf-8", "replace") if is_ros else ""
-            encoding = record.message_encoding
-            self.channels[record.id] = Channel(
-                topic=printable(record.topic),
-                type=type_name(schema.name) if text else printable(schema.name),
-                encoding=encoding if encoding in ENCODINGS else "other",
+            number, _, time, _ = struct.unpack_from("<HIQQ", body)
+            yield self.channels.get(number), time, body[22:]
+        elif op == Opcode.SCHEMA:
+            name, place = sized(body, 2)
+            encoding, place = sized(body, place)
+            number = int.from_bytes(body[:2], "little")
+            self.schemas[number] = name, encoding, sized(body, place)[0]
+        elif op == Opcode.CHANNEL:
+            number, schema = struct.unpack_from("<HH", body)
+            topic, place = sized(body, 4)
+            serialised = _text(sized(body, place)[0])
+            name, language, data = self.schemas.get(schema, (b"", b"", b""))
+            text = _text(data) if language in {b"ros1msg", b"ros2msg", b"ros2idl"} else ""
+            self.channels[number] = Channel(
+                topic=printable(_text(topic)),
+                type=type_name(_text(name)) if text else printable(_text(name)),
+                encoding=serialised if serialised in ENCODINGS else "other",
                 definition=text,
-                idl=schema.encoding == "ros2idl",
+                idl=language == b"ros2idl",
             )
-        elif isinstance(record, records.Statistics):
-            self.census.closed, self.census.counted = True, record.message_count
-        elif isinstance(record, records.ChunkIndex):
+        elif op == Opcode.STATISTICS:
+            self.census.closed, self.census.counted = True, struct.unpack_from("<Q", body)[0]
+        elif op == Opcode.CHUNK_INDEX:
             self.indexed += 1
-        elif isinstance(record, records.DataEnd):
+        elif op == Opcode.DATA_END:
             self.census.closed, self.census.data_end = True, end - DATA_END_BYTES
 
-    def _chunk(self, chunk: records.Chunk) -> Iterator[Message]:
+    def _chunk(self, body: bytes) -> Iterator[Message]:
         """The messages of a chunk, unpacked and checked."""
-        file = chunk_file(self.ingest, chunk.compression, chunk.data, chunk.uncompressed_size)
+        *_, size, checksum = struct.unpack_from("<QQQI", body)
+        compression, place = sized(body, 28)
+        packed, _ = sized(body, place, 8)
+        content, end = unpacked(self.ingest, _text(compression), packed, size), 0
         # A checksum of zero means that the writer made none.
-        if chunk.uncompressed_crc and zlib.crc32(file.getbuffer()) != chunk.uncompressed_crc:
+        if checksum and zlib.crc32(content) != checksum:
             raise LogError(f"{self.ingest.path}: a chunk does not match its checksum; damaged.")
-        end, size = 0, len(file.getbuffer())
-        for record, place in _records(file, size, inside=True):
-            end = place
-            yield from self._take(record, 0)
-        if end < size:
+        with suppress(CutError, struct.error):
+            for op, inner, place in self._records(content, 0):
+                yield from self._take(op, inner, 0)  # a chunk inside a chunk is none
+                end = place
+        if end < len(content):
             raise LogError(f"{self.ingest.path}: a record ends outside its chunk; damaged.")
 
 
@@ -252,7 +263,3 @@ def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
                 "computed or not there. No recorder writes such a bag; it was edited."
             )
     return found
-
-
-def _text(value: object) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else ""

@@ -14,12 +14,14 @@ from vftcli.readers.bags.container import (
     Batch,
     Census,
     Channel,
+    CutError,
     Ingest,
     Message,
     batched,
-    chunk_file,
     printable,
+    sized,
     type_name,
+    unpacked,
 )
 from vftcli.readers.opening import LogFile
 from vftcli.signals.errors import LogError
@@ -32,28 +34,15 @@ BYTES_PER_FIELD = 8
 Header = dict[bytes, bytes]  #: Name of a field → its bytes.
 
 
-class CutError(ValueError):
-    """The content ends before a record does, or inside it."""
-
-
 def batches(file: LogFile, ingest: Ingest) -> Iterator[Batch]:
     """Messages of a bag, chunk by chunk, up to the last whole chunk."""
     return batched(_Bag(ingest).messages(file.content.obj), ingest)
 
 
-def _sized(content: Any, place: int) -> tuple[bytes, int]:  # noqa: ANN401 - bytes or a mapped file
-    """The bytes at a place behind their length, and where they end."""
-    start = place + 4
-    end = start + int.from_bytes(content[place:start], "little")
-    if end > len(content):
-        raise CutError("a record ends outside its content")
-    return content[start:end], end
-
-
 def _fields(head: bytes) -> Header:
     fields, place = {}, 0
     while place < len(head):
-        field, place = _sized(head, place)
+        field, place = sized(head, place)
         name, equal, value = field.partition(b"=")
         if not equal:
             raise CutError("a header without fields")
@@ -93,9 +82,9 @@ class _Bag:
         self.census.tell(self.ingest, len(content) - end, "its index")
 
     def _record(self, content: Any, place: int) -> tuple[Header, bytes, int]:  # noqa: ANN401
-        head, place = _sized(content, place)
+        head, place = sized(content, place)
         self.ingest.spend(1 + len(head) // BYTES_PER_FIELD)
-        data, place = _sized(content, place)
+        data, place = sized(content, place)
         return _fields(head), data, place
 
     def _take(self, header: Header, data: bytes) -> Iterator[Message]:
@@ -135,7 +124,7 @@ class _Bag:
 
     def _chunk(self, header: Header, data: bytes) -> Iterator[Message]:
         name, size = header[b"compression"].decode(), int.from_bytes(header[b"size"], "little")
-        chunk, place = chunk_file(self.ingest, name, data, size).getvalue(), 0
+        chunk, place = unpacked(self.ingest, name, data, size), 0
         while place < len(chunk):
             start = place
             inner, content, place = self._record(chunk, start)
