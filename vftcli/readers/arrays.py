@@ -80,7 +80,11 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
                 f"{file.path}: the pickle holds a {type(log).__name__}, not a dictionary of "
                 "arrays. Save the log with np.savez."
             )
-        yield {0: partial(_read_list, file, log)}
+        if log and all(isinstance(row, dict) for row in log):
+            yield {0: lambda request: _read_arrays(file, request, columns_of(file, log, 1))}
+        else:
+            rows = _arrays_of_lists(file, {"rows": log})["rows"]
+            yield {0: partial(_read_rows, file, rows)}
         return
     held = [value.get(SKILL) for value in log.values() if isinstance(value, dict)]
     if skills := [states for states in held if isinstance(states, dict)]:
@@ -99,12 +103,6 @@ def _read_skill(file: LogFile, log: Mapping[Any, Any], request: ReadChoice) -> R
         request = replace(request, columns=request.columns or ",".join(items))
         log = {name: arrays[name] for name in usual if name in arrays}
     return _read_arrays(file, request, _arrays_of_lists(file, log))
-
-
-def _read_list(file: LogFile, log: list[Any], request: ReadChoice) -> RawLog:
-    if log and all(isinstance(row, dict) for row in log):
-        return _read_arrays(file, request, columns_of(file, log, 1))
-    return _read_rows(file, _arrays_of_lists(file, {"rows": log})["rows"], request)
 
 
 def _read_rows(file: LogFile, rows: Column, request: ReadChoice) -> RawLog:
@@ -280,24 +278,19 @@ def _flat(variables: Mapping[str, Any], prefix: str = "") -> list[tuple[str, Col
 def _check_matlab(file: LogFile) -> None:
     """Check what the packed variables of a file unpack to, before any is kept."""
     content, place, total = file.content, HEADER, 0
+    limit = unpacked_limit(len(content))
     order: Literal["little", "big"] = "little" if bytes(content[126:128]) == b"IM" else "big"
     while place + TAG <= len(content):
         kind = int.from_bytes(content[place : place + 4], order)
         size = int.from_bytes(content[place + 4 : place + TAG], order)
-        packed = content[place + TAG : place + TAG + size]
+        packed = bytes(content[place + TAG : place + TAG + size])
         if len(packed) < size:
             raise LogError(f"{file.path}: the MATLAB file is cut within a variable.")
-        total += size
-        if kind == COMPRESSED:
-            total += _unpacked_size(packed, unpacked_limit(len(content))) - size
-        check_unpacked(file.path, total, len(content))
         place += TAG + size
-
-
-def _unpacked_size(packed: memoryview, limit: int) -> int:
-    unpacker, total, rest = zlib.decompressobj(), 0, bytes(packed)
-    with suppress(zlib.error):  # said when it is read
-        while rest and total <= limit and not unpacker.eof:
-            total += len(unpacker.decompress(rest, 1 << 20))
-            rest = unpacker.unconsumed_tail
-    return total
+        unpacker = zlib.decompressobj()
+        total += 0 if kind == COMPRESSED else size
+        with suppress(zlib.error):  # said when it is read
+            while kind == COMPRESSED and packed and total <= limit and not unpacker.eof:
+                total += len(unpacker.decompress(packed, 1 << 20))
+                packed = unpacker.unconsumed_tail
+        check_unpacked(file.path, total, len(content))

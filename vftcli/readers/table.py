@@ -172,15 +172,13 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     }
     if not found:
         raise missing_column(table, item.signal, pattern)
-    # Indices may count from 0 or from 1, but without holes.
-    first = min(found)
-    for index in range(first, first + len(found)):
-        if index not in found:
-            raise LogError(
-                f"{table.path}: {item.signal}={pattern} finds {len(found)} columns but none for "
-                f"index {index}. Name them one by one with |."
-            )
-    return tuple(Cell(found[index]) for index in range(first, first + len(found)))
+    indices = range(min(found), min(found) + len(found))  # from 0 or from 1, but without holes
+    if missing := [index for index in indices if index not in found]:
+        raise LogError(
+            f"{table.path}: {item.signal}={pattern} finds {len(found)} columns but none for "
+            f"index {missing[0]}. Name them one by one with |."
+        )
+    return tuple(Cell(found[index]) for index in indices)
 
 
 def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
@@ -189,11 +187,11 @@ def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
     if name not in names and name.startswith("-"):
         return tuple(cell._replace(turned=True) for cell in _exact(table, item, name[1:]))
     bare, elements = name, slice(None)
-    if name not in names and (match := re.fullmatch(r"(.+)\[(\d{0,9}):(\d{0,9})\]", name)):
-        bare = match[1]
-        elements = slice(*(int(text) if text else None for text in match.group(2, 3)))
-    elif name not in names and (match := re.fullmatch(r"(.+)\[(\d{1,9})\]", name)):
-        bare, elements = match[1], slice(int(match[2]), int(match[2]) + 1)
+    match = re.fullmatch(r"(.+)\[(\d{1,9}|\d{0,9}:\d{0,9})\]", name)
+    if name not in names and match:
+        bare, (first, colon, last) = match[1], match[2].partition(":")
+        stop = last if colon else int(first) + 1
+        elements = slice(int(first or 0), int(stop) if stop else None)
     if names.count(bare) != 1:
         if bare in names:
             raise LogError(
@@ -202,14 +200,10 @@ def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
             )
         raise missing_column(table, item.signal, bare)
     column = names.index(bare)
-    if column not in table.lists:
-        if bare != name:
-            raise LogError(
-                f"{table.path}: {bare!r} is a column of numbers, not of lists: {name!r}."
-            )
-        return (Cell(column),)
-    length, cells = table.lists[column], cells_of(table, column, elements)
-    if not cells or (elements.stop or 0) > length:
+    length, cells = table.lists.get(column), cells_of(table, column, elements)
+    if length is None and bare != name:
+        raise LogError(f"{table.path}: {bare!r} is a column of numbers, not of lists: {name!r}.")
+    if length is not None and (not cells or (elements.stop or 0) > length):
         raise LogError(f"{table.path}: {bare!r} holds lists of {length}; there is no {name!r}.")
     return cells
 
@@ -225,7 +219,7 @@ def listed(names: Sequence[str], most: int = 24) -> str:
     """Names for a message; a long list is cut."""
     clean = [printable(name[:41]) for name in names[:most]]
     shown = ", ".join(name if len(name) <= 40 else name[:37] + "…" for name in clean)
-    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
+    return f"{shown} and {len(names) - most} more" if len(names) > most else shown
 
 
 def checked(table: Table, picks: Picks) -> Picks:

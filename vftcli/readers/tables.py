@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, robot_of, table_clock
-from vftcli.readers.columns import ColumnSpec, Item, guessed, parse_columns, tick_of
+from vftcli.readers.columns import ColumnSpec, guessed, parse_columns, tick_of
 from vftcli.readers.delimited import TextTable
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
@@ -58,28 +58,11 @@ def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     return picked(table, picks, request, **more)
 
 
-def read_layout(
-    table: Table,
-    layout: LogFormat,
-    request: ReadChoice,
-    **more: RawField,
-) -> RawLog:
+def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     """Read a table by the columns of its format; what it has not of them is left out."""
     spec, names = parse_columns(layout.columns), table.names
-    if spec.named:
-        spec = replace(spec, items=tuple(_known_items(table, layout, spec)))
-    picks = picks_of(table, spec)
-    # Of the vendors' signals libfranka's residual alone is turned.
-    signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
-    payload = layout.payload.split()
-    constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
-    picks = replace(picks, signals=tuple(signals), constants=constants)
-    return picked(table, picks, request, clock_name=layout.clock, **more)
-
-
-def _known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[Item]:
-    """The items of a layout of which a table has all columns, a joint each."""
-    for item in spec.items:
+    items = []
+    for item in spec.items if spec.named else ():
         cells: tuple[Cell, ...] = ()
         with suppress(LogError):
             cells = named_cells(table, item)
@@ -87,11 +70,18 @@ def _known_items(table: Table, layout: LogFormat, spec: ColumnSpec) -> Iterator[
             table_clock(table, cells[0].column)
         wanted = {"t": 1, "wrench": layout.joints and 6}.get(item.signal, layout.joints)
         if len(cells) == wanted if wanted else len(cells) > 1:
-            yield item
+            items.append(item)
         elif item.signal in {"t", "q"}:
             raise LogError(
                 f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
             )
+    picks = picks_of(table, replace(spec, items=tuple(items)) if spec.named else spec)
+    # Of the vendors' signals libfranka's residual alone is turned.
+    signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
+    payload = layout.payload.split()
+    constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
+    picks = replace(picks, signals=tuple(signals), constants=constants)
+    return picked(table, picks, request, clock_name=layout.clock)
 
 
 def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
@@ -108,21 +98,18 @@ def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -
     if stated.item("q") is not None:
         items = {signal: item for signal, item in items.items() if signal == "t"}
     for item in stated.items:
-        items[item.signal] = _restated(table, item, items.get(item.signal))
+        before, items[item.signal] = items.get(item.signal), item
+        if item.pattern is not None or item.rate is not None:
+            continue
+        if before is None:  # one without columns is of the usual ones
+            raise missing_column(table, item.signal, item.signal)
+        scale = before.factor if item.unit is None else math.copysign(1.0, before.factor)
+        unit = item.unit or before.unit
+        items[item.signal] = replace(before, factor=item.factor * scale, unit=unit)
     spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
     return picked(table, picks_of(table, spec), request, **more)
-
-
-def _restated(table: Table, item: Item, usual: Item | None) -> Item:
-    """An item of a --columns text, its columns the usual ones where it names none."""
-    if item.pattern is not None or item.rate is not None:
-        return item
-    if usual is None:
-        raise missing_column(table, item.signal, item.signal)
-    scale = usual.factor if item.unit is None else math.copysign(1.0, usual.factor)
-    return replace(usual, factor=item.factor * scale, unit=item.unit or usual.unit)
 
 
 def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
@@ -289,19 +276,16 @@ def _stamps(
     name = table.names[cell.column] if table.names else f"column {cell.column + 1}"
     words = clock_name or f"column {name}" if table.names else name
     if rest:
-        return _of_pair(table, stamps, loaded[rest[0].column]), 1e-9, words
+        parts = stamps, loaded[rest[0].column]
+        whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in parts)
+        if not whole or not np.all((parts[1] >= 0) & (parts[1] < 1e9) & (np.abs(stamps) < 9e9)):
+            raise LogError(
+                f"{table.path}: the two columns of the clock are no whole seconds and the "
+                "nanoseconds within them. Name one column of time with --columns, as in t=…"
+            )
+        seconds, nanoseconds = (part.astype(np.int64) for part in parts)
+        return seconds * 1_000_000_000 + nanoseconds, 1e-9, words
     if clock.unit is not None:
         return stamps, clock.factor, f"{words} [{clock.unit}]"
     tick, unit = tick_of(stamps, name)
     return stamps, tick, words if unit == "s" else f"{words}, taken as {unit}"
-
-
-def _of_pair(table: Table, seconds: Column, rest: Column) -> Column:
-    """Stamps of a column of whole seconds and one of the nanoseconds within them. (T,) [ns]"""
-    whole = all(bool(np.all(np.mod(part, 1) == 0)) for part in (seconds, rest))
-    if not whole or not np.all((rest >= 0) & (rest < 1e9) & (np.abs(seconds) < 9e9)):
-        raise LogError(
-            f"{table.path}: the two columns of the clock are no whole seconds and the nanoseconds "
-            "within them. Name one column of time with --columns, as in t=…"
-        )
-    return seconds.astype(np.int64) * 1_000_000_000 + rest.astype(np.int64)
