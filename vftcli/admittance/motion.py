@@ -13,7 +13,7 @@ from vftcli.admittance.law import AXES, Admittance, Controller
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.pose import exp_quaternion, log_quaternion, quaternion_product
-from vftcli.signals.series import runs_of
+from vftcli.signals.series import intervals
 
 PAUSE = 1.0  #: Drags of one axis that follow each other within this time are one. [s]
 #: Return time → share of the deviation at release inside which the axis has to stay.
@@ -170,15 +170,11 @@ class Drag(NamedTuple):
 
 def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
-    found: list[Drag] = []
-    for axis in range(6):
-        spans: list[list[int]] = []
-        for begin, release in runs_of(phases.dragged[:, axis]):
-            if spans and (begin - spans[-1][1]) * period < PAUSE:
-                spans[-1][1] = release
-            else:
-                spans.append([begin, release])
-        ends = [*(begin + 1 for begin, _ in spans[1:]), len(phases.dragged) + 1]
+    found, t = list[Drag](), np.arange(len(phases.dragged), dtype=np.float64) * period
+    for axis, dragged in enumerate(phases.dragged.T):
+        # From the last dragged sample of one to the first of the next; stamps are rounded.
+        spans = intervals(t, dragged, gap=PAUSE + period - 1e-9)
+        ends = [*(begin + 1 for begin, _ in spans[1:]), len(t) + 1]
         numbered = enumerate(zip(spans, ends, strict=False), start=1)
         found += [Drag(axis, number, a, b, end) for number, ((a, b), end) in numbered]
     return tuple(found)
