@@ -46,7 +46,7 @@ def test_rigid_torque_is_pinocchios_without_rotors(motion):
 
 def test_prediction_adds_rotors_and_filtered_friction(motion):
     rotors = UR5.chain.rotor_inertia * motion.ddq
-    bare = motion.under(UR5.without_friction()).predicted
+    bare = motion.with_robot(UR5.without_friction()).predicted
     np.testing.assert_allclose(bare, motion.rigid + rotors, atol=1e-12)
     friction = motion.predicted - bare
     joint, dq = UR5.friction[0], motion.dq[:, 0]
@@ -60,7 +60,7 @@ def test_prediction_adds_rotors_and_filtered_friction(motion):
 @pytest.mark.parametrize("mass", [1.5, -0.8])
 def test_a_load_on_the_flange_is_named(motion, mass):
     load = Payload(mass=abs(mass), com=np.array([0.0, 0.0, 0.05]), inertia=np.zeros((3, 3)))
-    effect = motion.under(UR5.with_payload(load)).rigid - motion.rigid
+    effect = motion.with_robot(UR5.with_payload(load)).rigid - motion.rigid
     residual = np.sign(mass) * effect
     found, share = apparent_load(motion, residual)
     # m, m·c alone are fitted; the point mass's own tensor about the last frame is 2e-3 of it

@@ -94,7 +94,7 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth)
     found = identify([train], load_robot("ur5"), Task(method="base"), [other])
     trace = next(t for t in found.traces if t.role == "held-out")
     motion = prepare(other, truth)
-    floor = root_mean_square(motion.tau - motion.under(truth).predicted)
+    floor = root_mean_square(motion.tau - motion.with_robot(truth).predicted)
     # the floor is what the true arm itself leaves: current noise and stiction at reversals
     assert root_mean_square(trace.residual).mean() <= 1.1 * floor.mean()
     assert is_physical(chain_parameters(found.robot.chain))

@@ -218,7 +218,7 @@ def test_a_vector_becomes_a_robot_without_its_payload(data):
     np.testing.assert_array_equal(robot.chain.rotor_inertia, 2.5)
     log = data.logs[0]
     Y = torque_regressor(UR5.chain, log.q, log.dq, log.ddq)
-    np.testing.assert_allclose(log.under(robot).rigid, Y @ x[:60], atol=1e-9)
+    np.testing.assert_allclose(log.with_robot(robot).rigid, Y @ x[:60], atol=1e-9)
 
 
 @pytest.mark.slow

@@ -28,7 +28,7 @@ def rng() -> np.random.Generator:
 
 def wrench(contact: Contact, t: float, place: Place = HERE) -> Array:
     """The contact's wrench at a time, none outside of its spans."""
-    k = contact.current(t)
+    k = contact.index_at(t)
     return np.zeros(6) if k is None else contact.wrench(k, t, place)
 
 
@@ -64,14 +64,14 @@ def test_hand_pulls_to_where_it_goes_and_lets_go() -> None:
         name="h", spans=((1.0, 2.0),), moves=((0.1, 0, 0),), stiffness=200.0, reach=0.2, release=0.0
     )
     hand = started(spec, rng(), 3.0)
-    assert hand.current(0.5) is None
+    assert hand.index_at(0.5) is None
     np.testing.assert_allclose(wrench(hand, 1.0), 0.0, atol=1e-12)
     np.testing.assert_allclose(wrench(hand, 1.5)[:3], [20.0, 0, 0])
     moved = HERE._replace(
         position=HERE.position + np.array([0.1, 0, 0]), velocity=np.array([0.2, 0, 0])
     )
     np.testing.assert_allclose(wrench(hand, 1.6, moved)[:3], [-15.0 * 0.2, 0, 0], atol=1e-12)
-    assert hand.current(2.0) is None
+    assert hand.index_at(2.0) is None
 
 
 def test_hand_twists_about_its_turn() -> None:

@@ -128,7 +128,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     # What was made from currents with the old constants is made with the new.
     if old is not None and new is not None and uses_current(log, profile):
         measured = measured * (new / old)
-    return Trace(motion, role, measured, motion.under(robot).predicted, before)
+    return Trace(motion, role, measured, motion.with_robot(robot).predicted, before)
 
 
 def score_remarks(traces: Sequence[Trace]) -> list[Remark]:

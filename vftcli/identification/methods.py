@@ -305,7 +305,7 @@ def whole_arm(data: Training) -> MethodResult:
     layout, start = initial_columns(data, fits)
     x = nearest_physical_links(stack(layout, data.logs, start), start)
     refined = with_vector(data.robot, layout, x, data.robot.friction)
-    data = replace(data, logs=tuple(log.under(refined) for log in data.logs))
+    data = replace(data, logs=tuple(log.with_robot(refined) for log in data.logs))
     fits = fit_frictions(data)
     layout, start = initial_columns(data, fits)
     triangles = stack(layout, data.logs, start)

@@ -72,16 +72,16 @@ class PreparedLog:
     #: gap of the clock, in a contact. (M, n)
     weights: Array
     #: Friction columns that were made for this robot. (M,) each
-    made: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
+    columns: dict[tuple[str, int, tuple[float, ...]], Array] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
         """Number of samples M that were kept; 0 where nothing moves."""
         return len(self.t)
 
-    def under(self, robot: Robot) -> "PreparedLog":
+    def with_robot(self, robot: Robot) -> "PreparedLog":
         """The same log with another arm's model."""
-        return replace(self, robot=robot, made={})
+        return replace(self, robot=robot, columns={})
 
     def filtered(self, signals: Array) -> Array:
         """Filter signals on the log's whole clock (T, m) and keep what is kept. (M, m)"""
@@ -139,7 +139,7 @@ class PreparedLog:
             **dict.fromkeys(shape.points, (shape.smoothing, *shape.speeds)),
         }
         key = (term, j, numbers.get(term, ()))
-        if key not in self.made:
+        if key not in self.columns:
             log = self.recording
             if term == "presliding":
                 values = play(log.q[:, j : j + 1], shape.presliding_length).state[:, 0]
@@ -147,8 +147,8 @@ class PreparedLog:
                 values = term_values(term, shape, log.require("dq")[:, j], self.load[:, j])
             if self.warmth is not None and term != "offset":
                 values = values * self.warmth[:, j]
-            self.made[key] = self.filtered(values[:, None])[:, 0]
-        return self.made[key]
+            self.columns[key] = self.filtered(values[:, None])[:, 0]
+        return self.columns[key]
 
     def friction(self, j: int, shape: Shape) -> Array:
         """All terms of a shape for joint j (from 0), one column a term. (M, k)"""

@@ -59,7 +59,7 @@ class Contact(NamedTuple):
     #: Wrench of the k-th application at a time [s] and a place, base axes. (6,) [N, N·m]
     wrench: Callable[[int, float, Place], Array]
 
-    def current(self, t: float) -> int | None:
+    def index_at(self, t: float) -> int | None:
         """Index of the application going on at `t` [s], or None."""
         return next((k for k, (a, b) in enumerate(self.spans) if a <= t < b), None)
 
@@ -261,7 +261,7 @@ class Touching:
 
     def anything(self, t: float) -> bool:
         """Whether any contact may exert something at `t` [s]."""
-        return bool(self.walks) or any(m.contact.current(t) is not None for m in self.mounted)
+        return bool(self.walks) or any(m.contact.index_at(t) is not None for m in self.mounted)
 
     def torque(self, t: float, model: Any, data: Any, v: Array) -> Array:  # noqa: ANN401
         """Joint torque of all contacts; the data's joint Jacobians are current. (n,) [N·m]"""
@@ -272,7 +272,7 @@ class Touching:
             tau += walk[min(int(t / self.step), len(walk) - 1)]
         for k, mounted in enumerate(self.mounted):
             self.wrenches[k] = 0.0
-            if (number := mounted.contact.current(t)) is None:
+            if (number := mounted.contact.index_at(t)) is None:
                 continue
             J = pin.getJointJacobian(model, data, mounted.joint, pin.LOCAL_WORLD_ALIGNED)
             pose = data.oMi[mounted.joint]

@@ -73,13 +73,13 @@ class Simulation:
     truth: Truth  #: What really happened.
 
     @cached_property
-    def actual(self) -> "FlangeMotion":
+    def actual_flange(self) -> "FlangeMotion":
         """The flange as it is measured."""
         seen = self.measured.signals
         return flange_motion(self.nominal.chain, seen["q"], seen["dq"])
 
     @cached_property
-    def target(self) -> "FlangeMotion":
+    def target_flange(self) -> "FlangeMotion":
         """The flange as it is commanded."""
         return flange_motion(self.nominal.chain, self.samples.target_q, self.samples.target_dq)
 

@@ -104,7 +104,7 @@ def vendor_signals(simulation: Simulation) -> dict[str, NDArray[Any]]:
 
     samples, signals = simulation.samples, simulation.measured.signals
     chain, model = simulation.nominal.loaded_chain, simulation.nominal.model
-    actual, target = simulation.actual, simulation.target
+    actual, target = simulation.actual_flange, simulation.target_flange
     time = simulation.measured.stamp + simulation.scenario.sensing.start
     gravity = momentum_terms(chain, samples.target_q, np.zeros_like(samples.target_q)).gravity
     weightless = np.gradient(samples.target_dq, samples.time, axis=0)

@@ -98,7 +98,7 @@ def robot_states(simulation: Simulation, rows: Rows, stamps: Nanoseconds) -> Top
     q, dq, target_q, target_dq = (seen[name][rows] for name in ("q", "dq", "target_q", "target_dq"))
     actual, target = (
         FlangeMotion(*(part[rows] for part in flange))
-        for flange in (simulation.actual, simulation.target)
+        for flange in (simulation.actual_flange, simulation.target_flange)
     )
     tau_ext = -seen["tau_ext"][rows]
     force, regular = wrench_of(tau_ext, actual.jacobian)
