@@ -20,7 +20,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
 from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.pairing import paired
+from vftcli.robots.run import paired
 from vftcli.signals.errors import ExaminationError, LogError
 from vftcli.signals.recording import Recording
 

@@ -30,7 +30,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.regressor import load_wrench
+from vftcli.robots.kernels import load_wrench
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.series import resample_columns
 from vftcli.simulation import load_scenario, simulate

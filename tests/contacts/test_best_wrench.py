@@ -13,7 +13,7 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse, analyse_log
 from vftcli.robots import load_robot
 from vftcli.robots.choice import RobotChoice
-from vftcli.robots.regressor import load_regressor, load_wrench
+from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.signals.series import resample_columns
 from vftcli.virtual_sensor.choice import WrenchChoice
 

@@ -16,8 +16,7 @@ import polars as pl
 from scipy.signal import lfilter
 
 from vftcli.robots import Payload, Robot, load_robot
-from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, momentum_terms, torque_regressor
 from vftcli.signals.arrays import Array
 
 Signals = ("q", "dq", "effort", "tau_ext")

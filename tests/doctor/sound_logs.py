@@ -23,7 +23,7 @@ import numpy as np
 from vftcli.doctor import Examiner, examine
 from vftcli.readers import ReadChoice, read_first_recording
 from vftcli.robots import Robot, load_robot
-from vftcli.robots.pairing import paired
+from vftcli.robots.run import paired
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

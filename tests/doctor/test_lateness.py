@@ -8,7 +8,7 @@ import pytest
 from vftcli.doctor import examine
 from vftcli.doctor.lateness import effort_lag, window_starts
 from vftcli.robots import load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark

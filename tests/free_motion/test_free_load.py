@@ -13,7 +13,7 @@ from vftcli.readers import read
 from vftcli.refinement.baseline import Baseline, baseline_of, free_reading
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
-from vftcli.robots.regressor import load_regressor
+from vftcli.robots.kernels import load_regressor
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
 from vftcli.signals.recording import Recording

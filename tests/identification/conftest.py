@@ -9,7 +9,7 @@ import pytest
 from vftcli.identification.training import CUTOFF, PreparedLog, Training, prepare_training
 from vftcli.robots import JointFriction, Robot, load_robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.recording import Recording
 
 UR5 = load_robot("ur5")

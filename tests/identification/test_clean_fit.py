@@ -22,7 +22,7 @@ from vftcli.identification.clean_fit import (
 from vftcli.identification.friction_fit import fit_frictions
 from vftcli.identification.training import prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.rest import SLIDES
 

@@ -12,7 +12,7 @@ from vftcli.identification.payload import payload_from_pair, payload_from_poses
 from vftcli.identification.training import gravity_torque, prepare
 from vftcli.robots import JointFriction, Payload, load_robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import (
     IdentificationError,
     MissingSignalError,

@@ -18,7 +18,7 @@ from vftcli.identification.links import (
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns, PreparedLog
 from vftcli.robots import load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 
 CHAIN = load_robot("ur5").chain
 LAYOUT = ParameterColumns(CHAIN, True, (Shape(("coulomb", "viscous")), *(Shape(("viscous",)),) * 5))

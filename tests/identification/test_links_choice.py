@@ -12,7 +12,7 @@ from vftcli.identification.training import prepare_training
 from vftcli.observers import MomentumObserver
 from vftcli.readers import read
 from vftcli.robots import load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.terms import dynamics_terms
 
 pytestmark = pytest.mark.slow

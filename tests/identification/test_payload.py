@@ -21,7 +21,7 @@ from vftcli.identification.payload import (
 )
 from vftcli.identification.training import gravity_torque
 from vftcli.robots import Payload, load_robot
-from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
+from vftcli.robots.kernels import LINK, chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import fact

@@ -18,7 +18,7 @@ from vftcli.identification.links import (
 from vftcli.identification.shapes import Shape
 from vftcli.identification.training import ParameterColumns
 from vftcli.robots import load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor, with_parameters
+from vftcli.robots.kernels import chain_parameters, torque_regressor, with_parameters
 
 
 def stacked(chain, phi, noise, seed=0, samples=300):

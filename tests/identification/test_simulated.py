@@ -12,7 +12,7 @@ from vftcli.identification.training import (
 )
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.regressor import chain_parameters
+from vftcli.robots.kernels import chain_parameters
 from vftcli.robots.robot import Robot
 from vftcli.simulation import load_scenario, simulate
 from vftcli.simulation import prepare as build

@@ -20,7 +20,7 @@ from vftcli.identification.methods import (
 )
 from vftcli.identification.training import moving_joints, prepare_training
 from vftcli.robots import JointFriction, Payload, load_robot
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.rest import MOVES
 

@@ -7,7 +7,7 @@ import numpy as np
 from vftcli.refinement.model_error import ModelError, expected_error
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.robots.robot import Limits, SensorNoise
 from vftcli.robots.run import Run
 from vftcli.robots.running_friction import play

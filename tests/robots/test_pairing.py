@@ -11,7 +11,7 @@ from vftcli.doctor.examination import Examiner
 from vftcli.readers.aliases import UR_NAMES, UR_WORDS
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
-from vftcli.robots.pairing import paired, places, unwound
+from vftcli.robots.run import paired, places, unwound
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 

@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from vftcli.robots import PROFILES, Robot, load_robot
-from vftcli.robots.regressor import (
+from vftcli.robots.kernels import (
     chain_parameters,
     load_regressor,
     torque_regressor,

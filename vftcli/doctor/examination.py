@@ -14,8 +14,8 @@ from vftcli.doctor.velocity import clock_findings, velocity_findings, velocity_f
 from vftcli.doctor.windows import spread
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots.choice import RobotChoice, choices_for
-from vftcli.robots.pairing import paired, unwound
 from vftcli.robots.robot import Robot
+from vftcli.robots.run import paired, unwound
 from vftcli.robots.terms import effort_name
 from vftcli.signals.errors import ExaminationError, UnsettledRobotError
 from vftcli.signals.recording import EFFORTS, Recording

@@ -19,7 +19,7 @@ from vftcli.doctor.load import declared_payload, load_remarks
 from vftcli.doctor.signals import efforts_of, inverted_effort
 from vftcli.doctor.windows import Case, Windows, size_of, windows_of
 from vftcli.robots import PROFILES, Robot, load_robot
-from vftcli.robots.pairing import paired
+from vftcli.robots.run import paired
 from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact, on_joints, warning

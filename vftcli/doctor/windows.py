@@ -16,8 +16,7 @@ import numpy as np
 
 from vftcli.robots import Robot
 from vftcli.robots.chain import Chain
-from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.regressor import load_regressor
+from vftcli.robots.kernels import load_regressor, momentum_terms
 from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.least_squares import inverse_of
 from vftcli.signals.recording import Recording

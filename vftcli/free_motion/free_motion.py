@@ -28,7 +28,7 @@ from vftcli.free_motion.cycles import (
 )
 from vftcli.free_motion.paired_runs import Pairing, pair_with_run
 from vftcli.robots.chain import Chain
-from vftcli.robots.regressor import load_regressor, load_wrench
+from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Indices, Mask, handed_over, seal

@@ -22,7 +22,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.identification.training import ParameterColumns, PreparedLog
-from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
+from vftcli.robots.kernels import LINK, TENSOR, torque_regressor
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.least_squares import FOLDS, correlation_time, folds, huber, robust_sd

@@ -36,7 +36,7 @@ from vftcli.identification.links import (
 from vftcli.identification.shapes import Shape, round_digits
 from vftcli.identification.training import ParameterColumns, Training
 from vftcli.robots.friction import SMOOTHING, falling_speed, steady_torque
-from vftcli.robots.regressor import chain_parameters, with_parameters
+from vftcli.robots.kernels import chain_parameters, with_parameters
 from vftcli.robots.robot import JointFriction, Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import IdentificationError

@@ -19,8 +19,7 @@ from vftcli.identification.training import (
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
 from vftcli.robots.friction import SMOOTHING
-from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.regressor import LINK, chain_parameters, torque_regressor
+from vftcli.robots.kernels import LINK, chain_parameters, momentum_terms, torque_regressor
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd

@@ -12,8 +12,13 @@ from numpy.typing import NDArray
 from vftcli.identification.shapes import Shape, term_values
 from vftcli.robots.chain import Chain
 from vftcli.robots.friction import friction_factor
-from vftcli.robots.kernels import momentum_terms
-from vftcli.robots.regressor import INERTIAL_NAMES, LINK, chain_parameters, torque_regressor
+from vftcli.robots.kernels import (
+    INERTIAL_NAMES,
+    LINK,
+    chain_parameters,
+    momentum_terms,
+    torque_regressor,
+)
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
 from vftcli.robots.terms import drive_torque, uses_current

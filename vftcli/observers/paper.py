@@ -293,8 +293,7 @@ class KalmanObserver(BlockObserver):
         elif self.prints_hold:
             every = self.model(np.broadcast_to(terms.dt, (len(d), 1)), n)
             if state is None:
-                p11, p12, p22 = self.first_prior(step, n)
-                P = np.array([[p11, p12], [p12, p22]])
+                P = np.stack(self.first_prior(step, n))[[[0, 1], [1, 2]]]
                 if self.initial_covariance is None:
                     P = settled_prior(self.model(step, n), densities)
                 state = KalmanState(zero, P)

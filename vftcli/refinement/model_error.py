@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from vftcli.robots.chain import Chain
 from vftcli.robots.friction import dry_friction, steady_torque
-from vftcli.robots.kernels import CHUNK, momentum_terms
-from vftcli.robots.regressor import (
+from vftcli.robots.kernels import (
+    CHUNK,
     LINK,
     TENSOR,
     chain_parameters,
+    momentum_terms,
     torque_regressor,
     with_parameters,
 )

@@ -23,9 +23,8 @@ import numpy as np
 
 from vftcli.robots.arm import BASE, BodyTree, LumpedArm, shortened
 from vftcli.robots.chain import Chain
-from vftcli.robots.kernels import momentum_terms
+from vftcli.robots.kernels import LINK, TENSOR, momentum_terms, torque_regressor
 from vftcli.robots.profile import assemble, column
-from vftcli.robots.regressor import LINK, TENSOR, torque_regressor
 from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
 from vftcli.robots.robot_file import (
     BOUNDS,

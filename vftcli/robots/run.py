@@ -1,18 +1,24 @@
-"""A run: a recording with its robot, and what the model says of it, each evaluated once."""
+"""A run: a log in its robot's order of joints, and what the model says of it, evaluated once."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from vftcli.readers.aliases import UR_NAMES, UR_WORDS, kinematic_order
 from vftcli.robots.friction import dry_friction
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import check_joints, drive_torque, dynamics_terms
 from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.errors import RobotError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import low_pass
-from vftcli.signals.recording import Recording
+from vftcli.signals.parsing import printable
+from vftcli.signals.recording import JOINT_SIGNALS, Recording
+from vftcli.signals.remarks import Where, fact
 from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
 from vftcli.signals.series import median_step, white_noise
@@ -187,3 +193,146 @@ def band(step: float, cutoff: float | None) -> tuple[float, float]:
     """The band above the signal in which noise is measured. [Hz]"""
     low = min(12.0 if cutoff is None else cutoff, 0.22 / step)
     return low, min(2.0 * low, 0.45 / step)
+
+
+NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
+
+
+def paired(recording: Recording, robot: Robot) -> Recording:
+    """A log in the robot's order of joints, positions and torques of the links.
+
+    Where both have joint names these alone decide, and joints that the robot has not are left out.
+    """
+    named = recording.joint_names
+    tables = robot.document.get("joints", ())
+    nameless = bool(tables) and all("name" not in table for table in tables)
+    if len(named) == recording.joints and not nameless:
+        order = places(named, robot.chain.names)
+        if order is None:
+            raise RobotError(
+                f"{recording.name}: the joints of the log ({listed(named)}) do not tell those of "
+                f"robot {robot.name!r} ({listed(robot.chain.names)}). Choose the arm of this log "
+                "with --robot, or call the joints in the robot file as the log does (name in "
+                "[[joints]])"
+            )
+        if order != tuple(range(recording.joints)):
+            left = [name for k, name in enumerate(named) if k not in order]
+            remarks = [fact("joints-by-name", joints=[named[k] for k in order])]
+            remarks += [fact("joints-left-out", joints=left)] if left else []
+            there = set(JOINT_SIGNALS).intersection(recording.signals)
+            fields: dict[str, Any] = {x: getattr(recording, x)[:, order] for x in there}
+            names = tuple(named[k] for k in order)
+            recording = recording.changed(*remarks, joint_names=names, **fields)
+    done = {remark.code for remark in recording.source.remarks}
+    if robot.gear is None or "gear-applied" in done or recording.joints != robot.joints:
+        return recording
+    # Logged at the motors: q = q_m / N, τ = N η τ_m. Currents and the vendor's estimate stay.
+    torque = robot.gear if robot.efficiency is None else robot.gear * robot.efficiency
+    scales = dict.fromkeys(("q", "dq", "target_q", "target_dq"), 1 / robot.gear)
+    scales |= dict.fromkeys(("torque", "torque_without_gravity", "target_torque"), torque)
+    there = set(scales).intersection(recording.signals)
+    fields = {name: getattr(recording, name) * scales[name] for name in there}
+    return recording.changed(fact("gear-applied", ratios=robot.gear.tolist()), **fields)
+
+
+def unwound(recording: Recording, robot: Robot) -> Recording:
+    """The recording without jumps of a turn in the positions of endless joints.
+
+    A position that changes by more than half a turn between two samples was taken back into one.
+    """
+    columns = [j for j, name in enumerate(robot.chain.names) if name in robot.endless]
+    if recording.joints != robot.joints:
+        return recording
+    changed: dict[str, Any] = {}
+    jumping = set[int]()
+    for signal in ("q", "target_q"):
+        if (values := getattr(recording, signal)) is not None:
+            # A sample that is missing is no number; what is wound up behind it would be none.
+            steps = np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
+            if turns := [j for j in columns if steps[j] > np.pi]:
+                changed[signal] = smooth = values.copy()
+                smooth[:, turns] = np.unwrap(values[:, turns], axis=0)
+                jumping.update(turns)
+    if not changed:
+        return recording
+    said = fact("endless-joint-unwound", Where(joints=tuple(j + 1 for j in sorted(jumping))))
+    return recording.changed(said, **changed)
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names for a message."""
+    return ", ".join(printable(name[:40]) for name in names[:24]) or "none"
+
+
+def places(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """Places of a robot's joints among a log's, None where names do not tell.
+
+    Names are compared as they are; then without a shared prefix and a trailing `_joint`; then by
+    number, or by the order that is known of a maker's names.
+    """
+    if all(logged.count(name) == 1 for name in joints):
+        return tuple(logged.index(name) for name in joints)
+    return prefixed(logged, joints) or numbered(logged, joints)
+
+
+def prefixed(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """The places of joints that a log calls by the same names behind a prefix.
+
+    None without one, and where several prefixes fit: two arms.
+    """
+    there, wanted = [plain(name) for name in logged], [plain(name) for name in joints]
+    # What all of the robot's names share up to a separator says nothing of a joint.
+    first = wanted[0].split("_")
+    heads = ("".join(f"{part}_" for part in first[:k]) for k in range(len(first) - 1, 0, -1))
+    own = next((head for head in heads if all(name.startswith(head) for name in wanted)), "")
+    bare = [name.removeprefix(own) for name in wanted]
+    if all(name.isdigit() for name in bare):
+        return None
+    prefixes = {name.removesuffix(bare[0]) for name in there if name.endswith(bare[0])}
+    fits = [
+        prefix
+        for prefix in sorted(prefixes)
+        if prefix[-1:] in {"", "_"} and all(there.count(prefix + name) == 1 for name in bare)
+    ]
+    if len(fits) != 1:
+        return None
+    return tuple(there.index(fits[0] + name) for name in bare)
+
+
+def numbered(logged: Sequence[str], joints: Sequence[str]) -> tuple[int, ...] | None:
+    """The places of joints by their numbers, or by an order known of a maker's names."""
+    count = len(joints)
+    if found := by_number(logged, count):
+        return found
+    known = kinematic_order(logged)
+    names = [plain(logged[k]) for k in known]
+    is_known = len(known) == count and (
+        names == [plain(word) for word in UR_WORDS]
+        or all(name.endswith(plain(ur)) for name, ur in zip(names, UR_NAMES, strict=False))
+    )
+    generic = by_number(joints, count) == tuple(range(count))
+    maker = [plain(name) for name in joints] == [plain(name) for name in UR_NAMES]
+    return known if is_known and (generic or maker) else None
+
+
+def by_number(names: Sequence[str], count: int) -> tuple[int, ...] | None:
+    """The places of names that differ in a number alone, in its order.
+
+    None where there are not as many of one stem as are wanted, of two stems, or with holes.
+    """
+    stems: dict[tuple[str, str], dict[int, int]] = {}
+    for place, name in enumerate(names):
+        if match := NUMBER.fullmatch(name):
+            stems.setdefault((match[1], match[3]), {})[int(match[2])] = place
+    fitting = [found for found in stems.values() if len(found) == count]
+    if len(fitting) != 1:
+        return None
+    numbers = sorted(fitting[0])
+    if numbers[0] > 1 or numbers[-1] - numbers[0] != count - 1:
+        return None
+    return tuple(fitting[0][number] for number in numbers)
+
+
+def plain(name: str) -> str:
+    """A joint's name in lower case, joined by `_`, without `_joint`."""
+    return re.sub(r"[\s/.:\-]+", "_", name.strip().lower()).removesuffix("_joint")

@@ -6,7 +6,7 @@ import pytest
 from vftcli.identification import Task, identify
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
-from vftcli.robots.regressor import chain_parameters, torque_regressor
+from vftcli.robots.kernels import chain_parameters, torque_regressor
 from vftcli.signals.recording import Recording, Source
 
 
