@@ -25,7 +25,7 @@ from vftcli.robots.arm import BASE, BodyTree, LumpedArm, shortened
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import LINK, TENSOR, momentum_terms, torque_regressor
 from vftcli.robots.profile import assemble, column
-from vftcli.robots.robot import JointFriction, Limits, Robot, SensorNoise
+from vftcli.robots.robot import JointFriction, Limits, Robot
 from vftcli.robots.robot_file import (
     BOUNDS,
     DESCRIPTIONS,
@@ -77,11 +77,13 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     while stem.suffix.lower() in DESCRIPTIONS:
         stem = stem.with_suffix("")
     beside = stem.with_name(f"{stem.name}.toml")
-    file = RobotFile(beside).root if beside.is_file() else None
-    angles = locked_angles(file, tree) if file is not None else {}
-    wanted = tip or (file.text("tip") if file is not None else "")
-    lumped = LumpedArm(tree, wanted, angles)
-    robot = robot_of(lumped, file, beside)
+    alone = not beside.is_file()
+    file = RobotFile(beside, text="" if alone else None).root
+    lumped = LumpedArm(tree, tip or file.text("tip"), locked_angles(file, tree))
+    robot = robot_of(lumped, file)
+    if alone:
+        said = caution("urdf-alone", file=beside.name)
+        robot = replace(robot, name=tree.name, title=tree.name, remarks=(said,))
     remarks = (*remarks, *arm_remarks(lumped, robot.chain), *inertia_remarks(lumped, robot.chain))
     rotors = [joint.rotor_inertia for joint in lumped.joints]
     if any(rotors):
@@ -110,35 +112,21 @@ def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> 
     )
 
 
-def robot_of(lumped: LumpedArm, file: Section | None, beside: Path) -> Robot:
+def robot_of(lumped: LumpedArm, file: Section) -> Robot:
     """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
-    chain, name = lumped.chain, lumped.tree.name
+    chain = lumped.chain
     if why := weightless(float(np.sum(chain.mass))):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
-    limits = {
-        key: np.array([joint.limits.get(key, np.nan) for joint in lumped.joints])
-        for key in Limits.__dataclass_fields__
-    }
-    if file is None:
-        nothing = np.full(chain.joints, np.nan)
-        return Robot(
-            name=name,
-            title=name,
-            chain=chain,
-            limits=Limits(**limits),
-            noise=SensorNoise(current=nothing, tau=nothing, q=nothing, qd=nothing),
-            remarks=(caution("urdf-alone", file=beside.name),),
-        )
     joints = matched_joints(file, chain, lumped.tree)
     rotor = column(joints, "rotor_inertia")
     rotor = np.where(np.isnan(rotor), chain.rotor_inertia, rotor)
     gravity = file.vector("gravity", 3, chain.gravity.tolist())
     robot = assemble(file, joints, replace(chain, rotor_inertia=rotor, gravity=gravity))
-    known = {
-        name: np.where(np.isnan(mine := getattr(robot.limits, name)), described, mine)
-        for name, described in limits.items()
-    }
-    return replace(robot, limits=Limits(**known))
+    limits = {}
+    for name, values in vars(robot.limits).items():
+        described = [joint.limits.get(name, np.nan) for joint in lumped.joints]
+        limits[name] = np.where(np.isnan(values), described, values)
+    return replace(robot, limits=Limits(**limits))
 
 
 def locked_angles(file: Section, tree: BodyTree) -> dict[str, float]:

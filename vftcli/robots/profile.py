@@ -42,8 +42,7 @@ Table = dict[str, Any]
 def load_profile(path: Path) -> Robot:
     """Read a robot file."""
     root = RobotFile(path).root
-    schema = root.values.get("schema", SCHEMA)
-    check_count(root, "schema", schema, SCHEMA, f"; this version reads schema {SCHEMA}")
+    check_count(root, "schema", SCHEMA, f"; this version reads schema {SCHEMA}")
     joints = joint_sections(root)
     return assemble(root, joints, build_chain(root, joints))
 
@@ -96,8 +95,9 @@ def assemble(root: Section, joints: Sequence[Section], chain: Chain) -> Robot:
     )
 
 
-def check_count(root: Section, key: str, stated: object, count: int, message: str) -> None:
-    """Refuse a whole number that a key states unless it is this one."""
+def check_count(root: Section, key: str, count: int, message: str) -> None:
+    """Refuse a whole number that a key may state unless it is this one."""
+    stated = root.values.get(key, count)
     if isinstance(stated, bool) or stated != count:
         root.refuse(f"{key} is {shown(stated)}{message}", key)
 
@@ -107,8 +107,8 @@ def joint_sections(root: Section) -> list[Section]:
     tables = root.tables("joints")
     if not tables:
         root.refuse("there are no [[joints]] tables; a robot file has one for each joint")
-    count, dof = len(tables), root.values.get("dof", len(tables))
-    check_count(root, "dof", dof, count, f" but the file has {count} [[joints]] tables")
+    count = len(tables)
+    check_count(root, "dof", count, f" but the file has {count} [[joints]] tables")
     joints = [Section(root.file, table, "joints", j) for j, table in enumerate(tables)]
     names = joint_names(joints)
     for j, (joint, name) in enumerate(zip(joints, names, strict=True)):

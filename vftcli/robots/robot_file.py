@@ -170,9 +170,9 @@ LARGEST = 16 << 20  #: Largest robot file; one with all its words has a hundredt
 class RobotFile:
     """A parsed robot file that can point at the line a complaint is about."""
 
-    def __init__(self, path: Path, what: str = "robot file") -> None:
+    def __init__(self, path: Path, what: str = "robot file", text: str | None = None) -> None:
         self.path = path
-        self.text = robot_text(path, what)
+        self.text = robot_text(path, what) if text is None else text
         try:
             self.document = toml_tables(self.text)
         except ParameterError as error:

@@ -8,7 +8,7 @@ import os
 import re
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -92,38 +92,47 @@ class UrdfPart(NamedTuple):
         kind = self.element.get("type", "")
         if kind not in KINDS:
             self.refuse(f"type is {shown(kind)}; it is one of {', '.join(KINDS)}")
-        mimic = self.element.find("mimic")
-        known = {} if mimic is None else mimic.attrib
-        follows = known.get("joint", "")
-        if mimic is not None and not follows:
+        mimic, limit = self.part("mimic"), self.part("limit")
+        follows = mimic.get("joint", "")
+        if self.element.find("mimic") is not None and not follows:
             self.refuse("<mimic> names no joint")
+        limits = self.given(limit, LIMITS)
+        # Of an endless joint no positions; other limits that are zero say nothing.
+        endless = kind == "continuous"
+        known = {k: v for k, v in limits.items() if (not endless if k[:2] == "q_" else v > 0)}
+        followed = self.given(mimic, {key: key for key in ("multiplier", "offset")})
         return TreeJoint(
             name=self.name,
             kind=kind,
             parent=self.link("parent"),
             child=self.link("child"),
             placement=self.origin(self.element),
-            axis=self.axis() if kind in MOVING else np.array([1.0, 0.0, 0.0]),
-            limits=self.limits(endless=kind == "continuous"),
+            axis=self.axis(moving=kind in MOVING),
+            limits=known,
             follows=follows,
-            **{
-                key: self.numbers(mimic, key, 1)[0]
-                for key in ("multiplier", "offset")
-                if mimic is not None and key in known
-            },
+            **followed,
         )
+
+    def part(self, tag: str) -> ET.Element:
+        """The element of this tag within it, an empty one where there is none."""
+        found = self.element.find(tag)
+        return ET.Element(tag) if found is None else found
+
+    def given(self, element: ET.Element, fields: Mapping[str, str]) -> dict[str, float]:
+        """Field → number of each attribute that the element has."""
+        there = {key: name for key, name in fields.items() if key in element.attrib}
+        return {name: self.numbers(element, key, 1)[0] for key, name in there.items()}
 
     def link(self, tag: str) -> str:
         """The link that <parent> or <child> names."""
-        found = self.element.find(tag)
-        if found is None or not (name := found.get("link", "")):
+        if not (name := self.part(tag).get("link", "")):
             self.refuse(f"<{tag}> is missing, or names no link")
         return name
 
-    def axis(self) -> Array:
+    def axis(self, *, moving: bool) -> Array:
         """The unit axis; x where none is given. (3,)"""
         axis = self.element.find("axis")
-        if axis is None:
+        if axis is None or not moving:
             return np.array([1.0, 0.0, 0.0])
         vector = np.array(self.numbers(axis, "xyz", 3))
         # An axis is normalised: shorter, it is rounding, longer, its square overflows.
@@ -131,19 +140,6 @@ class UrdfPart(NamedTuple):
             self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
         unit: Array = vector / np.linalg.norm(vector)
         return unit
-
-    def limits(self, *, endless: bool) -> dict[str, float]:
-        """What <limit> gives; of an endless joint no positions."""
-        found = self.element.find("limit")
-        if found is None:
-            return {}
-        values = {
-            field: self.numbers(found, key, 1)[0]
-            for key, field in LIMITS.items()
-            if key in found.attrib
-        }
-        ends = set() if endless else {"q_min", "q_max"}
-        return {k: v for k, v in values.items() if k in ends or (k[:2] != "q_" and v > 0)}
 
     def origin(self, parent: ET.Element) -> Pose:
         """The pose that <origin> gives; both of its keys may be left out."""
