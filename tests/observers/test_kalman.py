@@ -12,9 +12,9 @@ from vftcli.observers.kalman_model import (
     NOISE_CONVENTIONS,
     Covariance,
     Densities,
-    gain_sequence,
     zero_order_hold,
 )
+from vftcli.observers.smoother import gain_sequence
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.steady_filter import PIECE

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from vftcli.observers.choice import ObserverChoice
-from vftcli.observers.observer import (
+from vftcli.observers.choice import (
     LEAD,
     LONGEST,
+    ObserverChoice,
     estimate_from_rest,
     lead_samples,
     settling_samples,

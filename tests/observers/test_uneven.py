@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from vftcli.observers import KalmanObserver
-from vftcli.observers.kalman_model import Covariance, Gains, gain_sequence
+from vftcli.observers.kalman_model import Covariance, Gains
+from vftcli.observers.smoother import gain_sequence
 from vftcli.signals.external_torque import DynamicsTerms
 
 SAMPLES = 3000

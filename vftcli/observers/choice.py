@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from math import ceil
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -194,9 +195,50 @@ class ObserverChoice(Choice):
 
     def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
         """Run one of the observers over a log, from where it is to start."""
-        from vftcli.observers.observer import estimate_from_rest
-
         return estimate_from_rest(observer, terms) if self.from_rest else observer.estimate(terms)
+
+
+LEAD = 60.0  #: Assumed rest of the arm before a log, in 1/ω_n of the slowest joint.
+LONGEST = 1 << 17  #: Samples of that time at most.
+SETTLED = 0.01  #: Share of its start that an estimate has forgotten once it counts as settled.
+
+
+def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":
+    """Run an observer as if the log's first sample had lasted for long: τ̂⁰ = −μ⁰ where unbiased.
+
+    From zero a log that begins in contact rises over some delays; with ṗ = μ + τ_ext it is −μ⁰.
+    """
+    import numpy as np
+
+    from vftcli.signals.external_torque import DynamicsTerms
+
+    step = terms.clock.step
+    count = lead_samples(observer, step, terms.joints)
+    before = terms.t[0] - step * np.arange(count, 0, -1)
+    p, mu = (np.vstack([np.repeat(x[:1], count, axis=0), x]) for x in (terms.p, terms.mu))
+    found = observer.estimate(DynamicsTerms(t=np.concatenate([before, terms.t]), p=p, mu=mu))
+    sd = None if found.sd is None else found.sd[count:]
+    return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
+
+
+def settling_samples(observer: "Observer", step: float, joints: int) -> int:
+    """Samples until `SETTLED` of a start is left at a sample time [s], of the slowest joint."""
+    import numpy as np
+
+    from vftcli.signals.external_torque import DynamicsTerms
+
+    samples = 2 + lead_samples(observer, step, joints)
+    zero = np.zeros((samples, joints))
+    terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
+    answer = observer.estimate(terms).tau
+    left = np.max(np.abs(answer - answer[-1]), axis=1)
+    return int(np.flatnonzero(left > SETTLED * np.max(np.abs(answer[-1])))[-1]) + 1
+
+
+def lead_samples(observer: "Observer", step: float, joints: int) -> int:
+    """Samples in which an observer forgets all that was before. [s] → count"""
+    slowest = float(observer.tuning(step, joints).omega_n.min())
+    return min(LONGEST, max(1, ceil(LEAD / (slowest * step))))
 
 
 @dataclass(frozen=True, kw_only=True)

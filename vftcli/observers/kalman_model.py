@@ -230,25 +230,6 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
     return np.array([[f11, -f12], [-f21, f22]]), np.array([f11, gains.l2])
 
 
-def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """The gains and covariances of a whole log. (T, n) each
-
-    Args:
-        model: The models of all samples; that of sample 0 only has its noise used. (T, n) each
-        prior: Covariance before the first sample's update. (n,)
-        guess: Where blocks start before they know better, the stationary posterior. (n,)
-    """
-    first = update(prior, model.r[0])
-    rows = [np.array(first)[:, None]]
-    entering = first.posterior
-    for span in spans(len(model.r), begins=True):
-        fold = Fold.of(span.stop - span.start)
-        gains = settle(Discrete(*(fold.fold(entry[span]) for entry in model)), entering, guess)
-        entering = Covariance(*map(fold.last, gains.posterior))
-        rows.append(fold.unfold(np.array(gains)))
-    return Gains(*np.concatenate(rows, axis=1))
-
-
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     """Gains of one piece, everything in blocks. (length, n, blocks) each
 

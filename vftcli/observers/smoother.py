@@ -20,13 +20,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vftcli.observers.kalman_model import closed_loop, error_filter, gain_sequence
+from vftcli.observers.kalman_model import (
+    Covariance,
+    Discrete,
+    Gains,
+    closed_loop,
+    error_filter,
+    settle,
+    update,
+)
 from vftcli.observers.observer import Complex, Tuning
 from vftcli.observers.paper import TORQUE, KalmanObserver
 from vftcli.signals.arrays import Array, handed_over
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.shown import Shown
-from vftcli.signals.steady_filter import filtered
+from vftcli.signals.steady_filter import Fold, filtered, spans
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -99,3 +107,22 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> Array:
     (found,), _ = filtered(F, g, d[::-1], np.zeros((len(F), d.shape[1])), [weights])
     found[-1] = 0.0
     return np.roll(found[::-1], -1, axis=0)
+
+
+def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
+    """The gains and covariances of a whole log. (T, n) each
+
+    Args:
+        model: The models of all samples; that of sample 0 only has its noise used. (T, n) each
+        prior: Covariance before the first sample's update. (n,)
+        guess: Where blocks start before they know better, the stationary posterior. (n,)
+    """
+    first = update(prior, model.r[0])
+    rows = [np.array(first)[:, None]]
+    entering = first.posterior
+    for span in spans(len(model.r), begins=True):
+        fold = Fold.of(span.stop - span.start)
+        gains = settle(Discrete(*(fold.fold(entry[span]) for entry in model)), entering, guess)
+        entering = Covariance(*map(fold.last, gains.posterior))
+        rows.append(fold.unfold(np.array(gains)))
+    return Gains(*np.concatenate(rows, axis=1))
