@@ -5,10 +5,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from made_urdfs import arm, link, robot, written
 
+from vftcli.doctor.examination import Examiner
 from vftcli.readers import read
+from vftcli.readers.aliases import UR_NAMES, UR_WORDS
+from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
-from vftcli.robots.run import SERIES, Run, Runs
+from vftcli.robots.run import SERIES, Run, Runs, paired, places, unwound
+from vftcli.signals.errors import RobotError
 from vftcli.signals.recording import Recording
 
 FIXTURE = Path(__file__).parents[2] / "fixtures" / "ur5_circle.csv"
@@ -71,3 +76,138 @@ def test_a_run_is_made_once_for_a_recording_and_a_robot() -> None:
     assert runs.of(circle, ROBOT, literal=True) is not first
     assert runs.of(circle, replace(ROBOT)) is not first
     assert runs.of(replace(circle), ROBOT) is not first
+
+
+UR = load_robot("ur5")
+PANDA = load_robot("panda")
+NAMES = ("base_yaw", "shoulder_pitch", "elbow_pitch", "wrist_a", "wrist_b", "wrist_c")
+
+
+def log_of(names: tuple[str, ...]) -> Recording:
+    """A log whose column j holds j everywhere. 10 samples"""
+    t = 0.01 * np.arange(10)
+    q = np.tile(np.arange(len(names), dtype=float), (10, 1))
+    wrench = np.zeros((10, 6))
+    return Recording(t=t, q=q, dq=q, torque=q, tau_ext=q, wrench=wrench, joint_names=names)
+
+
+@pytest.mark.parametrize(
+    ("logged", "joints", "expected"),
+    [
+        (("b", "finger", "a"), ("a", "b"), (2, 0)),
+        (tuple(reversed(UR_NAMES)), UR.chain.names, (5, 4, 3, 2, 1, 0)),
+        (("gripper", *(f"left_{name}" for name in UR_NAMES)), UR.chain.names, (1, 2, 3, 4, 5, 6)),
+        (tuple(f"ns/{name}" for name in UR_NAMES), UR.chain.names, (0, 1, 2, 3, 4, 5)),
+        (("Wrist 3", *UR_WORDS[:5]), UR.chain.names, (1, 2, 3, 4, 5, 0)),
+        (
+            ("fr3_finger_joint1", *(f"fr3_joint{j}" for j in range(7, 0, -1)), "fr3_finger_joint2"),
+            PANDA.chain.names,
+            (7, 6, 5, 4, 3, 2, 1),
+        ),
+        # Numbers of the log alone, from zero or one, and of the robot alone.
+        (("axis_2", "axis_0", "axis_1"), NAMES[:3], (1, 2, 0)),
+        (("A3", "A1", "A2"), ("lbr_joint_1", "lbr_joint_2", "lbr_joint_3"), (1, 2, 0)),
+        (UR_NAMES, tuple(f"joint{j}" for j in range(1, 7)), (0, 1, 2, 3, 4, 5)),
+    ],
+)
+def test_joints_are_found_by_name(logged, joints, expected) -> None:
+    assert places(logged, joints) == expected
+
+
+@pytest.mark.parametrize(
+    ("logged", "joints"),
+    [
+        (NAMES, UR.chain.names),  # other names
+        (NAMES[:5], NAMES),  # one is missing
+        ((*NAMES, "base_yaw"), NAMES),  # one stands twice
+        (("a_1", "a_2", "b_1", "b_2"), ("x", "y")),  # two arms
+        (("joint1", "joint3", "joint4"), NAMES[:3]),  # a hole
+        (
+            tuple(f"{side}_{name}" for side in ("left", "right") for name in UR_NAMES),
+            UR.chain.names,
+        ),
+    ],
+)
+def test_names_that_do_not_tell_find_nothing(logged, joints) -> None:
+    assert places(logged, joints) is None
+
+
+def test_every_joint_signal_follows_and_what_goes_is_said() -> None:
+    shuffled = ("finger", "elbow_joint", "wrist_1_joint", "shoulder_pan_joint", "wrist_3_joint",
+                "shoulder_lift_joint", "wrist_2_joint")  # fmt: skip
+    log = paired(log_of(shuffled), UR)
+    assert log.joint_names == UR_NAMES
+    for signal in ("q", "dq", "torque", "tau_ext"):
+        np.testing.assert_array_equal(log.require(signal)[0], [3, 5, 1, 2, 6, 4])
+    assert log.require("wrench").shape == (10, 6)
+    assert {r.code: r.values["joints"] for r in log.source.remarks} == {
+        "joints-by-name": list(UR_NAMES),
+        "joints-left-out": ["finger"],
+    }
+    assert paired(log, UR) is log
+
+
+def test_names_that_do_not_cover_the_arm_are_refused_with_both_lists() -> None:
+    with pytest.raises(RobotError, match=r"wrist_c.*do not tell.*shoulder_pan.*\[\[joints\]\]"):
+        paired(log_of(NAMES), UR)
+
+
+def test_without_names_on_either_side_the_order_stays() -> None:
+    log = replace(log_of(NAMES), joint_names=())
+    assert paired(log, UR) is log
+    nameless = replace(UR, document={"joints": [{} for _ in range(6)]})
+    named = log_of(NAMES)
+    assert paired(named, nameless) is named
+
+
+def test_a_log_of_the_motors_side_is_brought_to_the_joints_once() -> None:
+    gear, efficiency = np.array([101.0, -50, 1, 1, 1, 1]), np.array([0.9, 1, 1, 1, 1, 1])
+    robot = replace(UR, gear=gear, efficiency=efficiency)
+    log = replace(log_of(NAMES), joint_names=(), current=np.ones((10, 6)))
+    found = paired(log, robot)
+    np.testing.assert_allclose(found.q, log.q / gear, rtol=1e-15)
+    np.testing.assert_allclose(found.require("dq"), log.q / gear, rtol=1e-15)
+    np.testing.assert_allclose(found.require("torque"), log.q * gear * efficiency, rtol=1e-15)
+    np.testing.assert_array_equal(found.require("tau_ext"), log.q)
+    np.testing.assert_array_equal(found.require("current"), np.ones((10, 6)))
+    assert paired(found, robot) is found
+
+
+def test_a_gear_is_read_from_the_robot_file(tmp_path) -> None:
+    text = UR.path.read_text("utf-8")
+    path = tmp_path / "geared.toml"
+    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear = -101.0\n", 1), "utf-8")
+    robot = load_robot(path)
+    np.testing.assert_array_equal(robot.gear, [-101, 1, 1, 1, 1, 1])
+    assert robot.efficiency is None
+    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear = 0.0\n", 1), "utf-8")
+    with pytest.raises(RobotError, match=r"joint 1 \(shoulder_pan\): gear is 0"):
+        load_robot(path)
+    path.write_text(text.replace("mass = 3.7\n", "mass = 3.7\ngear_efficiency = 1.2\n", 1), "utf-8")
+    with pytest.raises(RobotError, match=r"gear_efficiency is 1.2; it is above 0, at most 1"):
+        load_robot(path)
+
+
+def test_a_jump_of_a_turn_is_taken_back_and_said(tmp_path: Path) -> None:
+    arm6 = load_robot(written(tmp_path, robot(link("base"), arm(6, kind="continuous"))))
+    t = np.arange(0.0, 8.0, 0.01)
+    q = np.stack([(k - 2.5) * t for k in range(6)], axis=1)
+    within = (q + np.pi) % (2.0 * np.pi) - np.pi
+    log = Recording(t=t, q=within, target_q=within)
+    found = unwound(log, arm6)
+    np.testing.assert_allclose(found.q, q, atol=1e-13)  # rounding of a few turns
+    assert found.target_q is not None
+    np.testing.assert_allclose(found.target_q, q, atol=1e-13)
+    (remark,) = found.source.remarks
+    assert remark.where.joints == (1, 2, 3, 4, 5, 6)
+    assert Examiner().taken(log, arm6, ReadChoice()).source.remarks == (remark,)
+
+
+def test_what_does_not_jump_is_the_log_itself(tmp_path: Path) -> None:
+    endless = load_robot(written(tmp_path, robot(link("base"), arm(5, kind="continuous"))))
+    limited = replace(endless, endless=())
+    jumping = Recording(t=np.array([0.0, 0.1]), q=np.array([[0.0] * 5, [6.0] * 5]))
+    still = replace(jumping, q=np.zeros((2, 5)))
+    missing = replace(jumping, q=np.array([[0.0] * 5, [np.nan] * 5]))
+    for log, robot_ in ((jumping, limited), (still, endless), (missing, endless)):
+        assert unwound(log, robot_) is log

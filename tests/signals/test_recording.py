@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from vftcli.signals.errors import MissingSignalError
-from vftcli.signals.recording import Recording
+from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
+from vftcli.signals.recording import (
+    Recording,
+    Source,
+    refuse_repeated_logs,
+    refuse_repeated_runs,
+    same_run,
+)
 
 T = np.arange(4.0)
 Q = np.zeros((4, 6))
@@ -34,3 +40,47 @@ def test_of_several_the_one_that_is_called_so_stays_alone() -> None:
         both.with_effort("torque_without_gravity")
     with pytest.raises(MissingSignalError, match="no effort"):
         Recording(t=T, q=Q).with_effort("torque")
+
+
+def recording(sha256="", label="", rows=3, t0=0.0):
+    """A recording of three samples, from a file with that digest."""
+    source = Source(sha256=sha256, label=label, rows=rows, t0=t0)
+    return Recording(t=np.arange(3.0), q=np.zeros((3, 6)), source=source)
+
+
+def test_equal_digests_are_one_run_whatever_the_label():
+    assert same_run(recording("f00", "a.csv"), recording("f00", "b.csv"))
+    assert not same_run(recording("f00", "a.csv"), recording("f01", "a.csv"))
+
+
+def test_recordings_made_in_memory_are_one_only_if_they_are_the_same_object():
+    one = recording()
+    assert same_run(one, one)
+    assert not same_run(one, recording())
+
+
+def test_two_recordings_of_one_file_are_two_runs():
+    assert not same_run(recording("f00", t0=0.0), recording("f00", t0=90.0))
+
+
+def test_the_digest_is_not_waited_for_where_the_rows_tell():
+    def awaited():
+        raise AssertionError("waited")
+
+    assert not same_run(recording(awaited, rows=3), recording(awaited, rows=4))
+
+
+def test_a_log_given_twice_is_refused_by_both_names():
+    logs = [recording("f00", "a.csv"), recording("f01", "b.csv"), recording("f00", "c.csv")]
+    with pytest.raises(ParameterError, match=r"a\.csv and c\.csv, each given as LOG"):
+        refuse_repeated_logs(logs)
+    refuse_repeated_logs(logs[:2])
+
+
+def test_a_free_run_is_neither_the_log_nor_another_free_run():
+    log, free = recording("f00", "log.csv"), recording("f01", "free.csv")
+    refuse_repeated_runs(log, [free, recording("f02")])
+    with pytest.raises(ReferenceTorqueError, match=r"copy\.csv is the log itself"):
+        refuse_repeated_runs(log, [free, recording("f00", "copy.csv")])
+    with pytest.raises(ReferenceTorqueError, match=r"free\.csv and again\.csv are the same run"):
+        refuse_repeated_runs(log, [free, recording("f01", "again.csv")])
