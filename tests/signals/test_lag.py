@@ -80,7 +80,7 @@ def test_the_offset_is_that_of_the_best_normalised_correlation(seed: int) -> Non
     for lag in range(-4, 5):
         a, b = x[max(lag, 0) : count + min(lag, 0)], y[max(-lag, 0) : count - max(lag, 0)]
         value[lag] = np.sum(a * b) / np.sqrt(np.sum(a**2) * np.sum(b**2))
-    found = time_offset(t, late, early, limit=0.5)
+    found = time_offset(t, late, early)
     assert found.correlation == pytest.approx(max(value.values()), rel=1e-9)
     assert abs(found.lag / step - max(value, key=lambda lag: value[lag])) <= 0.5
 

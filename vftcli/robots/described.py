@@ -57,7 +57,7 @@ SPEED, ACCELERATION = 1.0, 2.0
 POSES = 64  #: Poses that it is the worst of.
 
 
-def load_described(path: Path, tip: str = "", arguments: Sequence[str] = ()) -> Robot:
+def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
     """Read an arm from a URDF, xacro or MJCF, and from the TOML beside it."""
     text = robot_text(path)
     root = xml_root(text, path)

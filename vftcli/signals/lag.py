@@ -14,6 +14,7 @@ from vftcli.signals.series import bridge_unknown, median_step, resample_columns
 
 LONGEST = 1.0  #: Longest delay looked for. [s]
 LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]
+FARTHEST = 0.5  #: Largest offset of two series that all columns tell. [s]
 LEAST_FIT = 0.3  #: Below this correlation at the best delay there is nothing to tell a delay by.
 BLOCK = 8192  #: Samples that one Fourier transform takes, unless the lags looked for need more.
 
@@ -110,7 +111,7 @@ class Offset(NamedTuple):
     correlation: float  #: Correlation once that is taken out.
 
 
-def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offset:
+def time_offset(t: Array, late: Array, early: Array) -> Offset:
     """The lag of `late` behind `early` at which they correlate best.
 
     All columns (T, k) count by their size: those of a wrench are to be in one unit. Unknown
@@ -120,7 +121,7 @@ def time_offset(t: Array, late: Array, early: Array, limit: float = 0.5) -> Offs
     even = t if is_uniform(t) else np.arange(t[0], t[-1], step)
     x, y = (resample_columns(even, t, bridge_unknown(t, series)) for series in (late, early))
     x, y, count = x - x.mean(axis=0), y - y.mean(axis=0), len(even)
-    reach = min(int(limit / step), count - 2)
+    reach = min(int(FARTHEST / step), count - 2)
     at = np.arange(-reach, reach + 1)
     cross = sliding(x.T, y.T, at).sum(axis=0)
     energy = overlap_energy(x, at, count) * overlap_energy(y, -at, count)

@@ -102,9 +102,9 @@ def solve(A: Array, y: Array) -> Array:
     return normal_equations(A, y, np.ones_like(y)).solution()
 
 
-def huber(z: Array, limit: float = HUBER) -> Array:
-    """Weights of residuals in standard deviations: 1 up to the limit."""
-    weights: Array = limit / np.maximum(np.abs(z), limit)
+def huber(z: Array) -> Array:
+    """Weights of residuals in standard deviations: 1 up to `HUBER`."""
+    weights: Array = HUBER / np.maximum(np.abs(z), HUBER)
     return weights
 
 
