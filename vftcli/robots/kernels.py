@@ -294,7 +294,7 @@ def chain_parameters(chain: Chain) -> Array:
     return phi.ravel()
 
 
-def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array) -> Chain:
+def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array | None = None) -> Chain:
     """The chain with other parameters φ (10n,) and rotor inertias. (n,)"""
     bodies = []
     for row in phi.reshape(chain.joints, LINK):
@@ -305,4 +305,5 @@ def with_parameters(chain: Chain, phi: Array, rotor_inertia: Array) -> Chain:
             tensor[r, c] = tensor[c, r] = value
         bodies.append((mass, com, tensor - mass * point_tensor(com)))
     masses, coms, inertias = map(np.array, zip(*bodies, strict=True))
-    return replace(chain, mass=masses, com=coms, inertia=inertias, rotor_inertia=rotor_inertia)
+    rotors = chain.rotor_inertia if rotor_inertia is None else rotor_inertia
+    return replace(chain, mass=masses, com=coms, inertia=inertias, rotor_inertia=rotors)
