@@ -168,10 +168,7 @@ def analyse_log(path: str | Path, choice: AnalysisChoice) -> "Analysis":
 def analyse(
     recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs | None = None
 ) -> "Analysis":
-    """Estimates of a recording and, if a reference is asked for, their errors.
-
-    The robot has its payload mounted. Several logs that share a free run share the models so far.
-    """
+    """Estimates of a recording and, if a reference is asked for, their errors."""
     tell, name = choice.progress, recording.name
     tell(f"{name}: examining", 0.05, 0.15)
     motion = read(recording, robot, choice, models or Runs())
@@ -308,11 +305,7 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
 
 def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
-    """The contacts, outside of which nothing touches; None where the whole log may be one.
-
-    That is so under a load, where no free motion tells what is no contact, and where the user asks
-    for the smoother by its name.
-    """
+    """The contacts, outside of which nothing touches; None where the whole log may be one."""
     from vftcli.contacts.rows import with_wider_force
     from vftcli.virtual_sensor.sensing import Gate
 
@@ -349,10 +342,13 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
     told = known_contacts(analysis, choice) if choice.reference.contacts else None
-    found = references.judge(analysis.motion, analysis.estimates, sensed, choice.reference, told)
-    if sensed is None:
-        found = found._replace(virtual_sensor=analysis.virtual_sensor)
-    remarks = analysis.remarks
-    if choice.observers.of_robot_file:
-        remarks = references.with_measured_gap(remarks, found.errors, analysis.tunings)
-    return replace(analysis, **found._asdict(), remarks=remarks)
+    reference, errors, sensed = references.judge(
+        analysis.motion, analysis.estimates, sensed, choice.reference, told
+    )
+    analysis = replace(analysis, reference=reference, errors=errors)
+    if sensed is not None:
+        analysis = replace(analysis, virtual_sensor=sensed)
+    if not choice.observers.of_robot_file:
+        return analysis
+    remarks = references.with_measured_gap(analysis.remarks, errors, analysis.tunings)
+    return replace(analysis, remarks=remarks)

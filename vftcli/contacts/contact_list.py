@@ -171,11 +171,7 @@ class Contact(Shown):
 
     @property
     def is_told(self) -> bool:
-        """Whether it says more than that something may be there: a force, or sure evidence.
-
-        The band at the place that fits best decides. Where no force is known its torques are what
-        it says.
-        """
+        """Whether it says more than that something may be there: a force, or sure evidence."""
         if self.peak_force is None or self.place_band is None:
             return True
         return self.peak_force > self.place_band or (self.evidence or 0.0) >= SURE_NATS
@@ -316,10 +312,7 @@ class ContactList(Shown):
         return figure
 
     def weighed(self, load: tuple[float, float] | None, doubted: bool) -> "ContactList":
-        """The list by the log's examination: its load, mass and deviation [kg], and doubts.
-
-        Every size rests on velocities that may be in doubt.
-        """
+        """The list by the log's examination: its load with deviation [kg], its doubts."""
         carried, rows = self.load, self.contacts
         if carried is not None and load is not None:
             carried = carried._replace(mass=load[0], sd=load[1])

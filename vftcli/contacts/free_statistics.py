@@ -141,10 +141,7 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
 def noise_of(
     log: Run, pieces: Sequence[RunSamples], seconds: float, *, known: bool
 ) -> tuple[TorqueNoise, tuple[Blocks, ...]] | None:
-    """Noise of free pieces, and the pieces in blocks of a length [s]; None where they are short.
-
-    Where they are not known to be free it is inferred from the whole log.
-    """
+    """Noise of free pieces, else of the log, and the pieces in blocks [s]; or None."""
     blocks = tuple(disturbance_blocks(run.terms, run.q, seconds, at) for run, at in pieces)
     dry = dry_torques(log.robot)
     noise = learned = learn_noise(blocks, dry)
@@ -154,10 +151,7 @@ def noise_of(
 
 
 def free_part(motion: FreeMotion) -> FreePart | None:
-    """The free part of a log, None where there is none, or it is found and to be doubted.
-
-    Its remarks say of free runs that they are: nothing is paired with them.
-    """
+    """The free part of a log, None where there is none, or it is found and to be doubted."""
     try:
         part = motion.known
     except ReferenceTorqueError:  # nothing repeats, or too little of it was recorded

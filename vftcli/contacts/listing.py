@@ -278,10 +278,7 @@ def felt_by(run: Run, torque: Array) -> float:
 
 
 def without_list(run: Run) -> ContactList:
-    """A list without rows, where nothing tells a contact from an error of the model.
-
-    It has the largest torque that the momentum observer reads along the log.
-    """
+    """A list without rows, where nothing tells a contact from an error of the model."""
     unknown = np.full(run.robot.joints, np.nan)
     torque = np.abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
@@ -376,10 +373,7 @@ def load_row(motion: FreeMotion, contacts: Sequence[Contact]) -> Contact:
 
 
 def follows_stop(recording: Recording, start: float, stop: float, block: float) -> bool:
-    """Whether a row begins where every joint that moved comes to rest at once, and is over soon.
-
-    It lasts from start to stop and is known to a block. [s]
-    """
+    """Whether a row [s] begins where all joints come to rest at once, and is brief."""
     if stop - start > BRIEF + block:
         return False
     t, speed = recording.t - start, np.abs(recording.require("dq"))

@@ -319,10 +319,7 @@ def split_run(t: Array, wrench: WindowWrench, run: BlockSpan, jacobian: Array) -
 
 
 def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> list[BlockSpan]:
-    """A stretch of a contact, split at valleys of force and torque between different directions.
-
-    Along the contact are t, the force (k, 3) and the torque |Jᵀw|.
-    """
+    """A stretch of a contact, split at valleys of force and torque between different directions."""
     span = slice(*piece)
     at, there, load = t[span], force[span], torque[span]
     size = np.linalg.norm(there, axis=1)

@@ -106,10 +106,7 @@ class Tail(NamedTuple):
 
 
 def tail_of(maxima: Array) -> Tail | None:
-    """The tail of block maxima (B,), None where there are fewer than five of them.
-
-    k = min(max(30, 60 an hour), B/5) of them are taken for the tail.
-    """
+    """The tail of block maxima (B,), None where there are fewer than five of them."""
     hours = len(maxima) * BLOCK / 3600.0
     count = min(max(LEAST_READINGS, round(AN_HOUR * hours)), len(maxima) // SHARE)
     if count < 1:
@@ -198,10 +195,7 @@ class SignalThreshold(NamedTuple):
 
     @property
     def more_share(self) -> float:
-        """How much more of its log's motion would narrow the interval to the value, of its length.
-
-        The width falls with the root of the tail's readings, see `tail_of`.
-        """
+        """Share of its log's motion that is missing to narrow the interval to the value."""
         if self.tail is None or not self.is_wide:
             return 0.0
         width = (self.interval[1] - self.interval[0]) / max(self.value, LEAST)

@@ -184,10 +184,7 @@ def contact_lanes(
     priors: Sequence[WrenchPrior | None],
     margin: float = MARGIN,
 ) -> list[Lane]:
-    """A lane for every run of blocks, the others' hidden, with J (K, 6, n) and prior of each.
-
-    One run may come several times.
-    """
+    """A lane for every run of blocks, the others' hidden, with J (K, 6, n) and prior of each."""
     count = len(log.blocks.t)
     every, own = covered(runs, count, 1), {}
     for run in runs:

@@ -313,10 +313,7 @@ class JointMeans(NamedTuple):
 
 
 def joint_means(errors: pl.DataFrame) -> JointMeans:
-    """The mean RMSE of every observer, over the joints with a reference to be trusted.
-
-    Where none can, over all: a mean is wanted, and every joint of it is marked.
-    """
+    """The mean RMSE of every observer over trusted joints, over all if none is."""
     rows = errors.filter(pl.col("joint").is_not_null())
     joints = set(rows["joint"])
     doubted = set[int]()

@@ -217,10 +217,7 @@ def facts(
 
 
 def step_response(observer: Observer, step: float, joints: int) -> Array:
-    """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]
-
-    The step begins after the first sample; its momentum is the integral of it.
-    """
+    """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]"""
     t = np.arange(0.0, STEP_TIME, step)
     p = np.repeat(t[:, None], joints, axis=1)
     seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED

@@ -133,10 +133,7 @@ def load_of(
 def make_reference(
     motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
-    """The reference that is asked for, on the clock of the log that is compared.
-
-    The mounting says where tool and sensor sit on the flange.
-    """
+    """The reference that is asked for, on the clock of the log that is compared."""
     log, recording, robot = motion.log, motion.log.recording, motion.log.robot
     if choice.path is not None:
         return file_reference(choice.path, recording, robot, mounting, choice.columns)
@@ -209,15 +206,6 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
     return np.where(inside[:, None], there, np.nan)
 
 
-class Judgement(NamedTuple):
-    """Errors of one log's estimates against a reference; fields of `vftcli.Analysis`."""
-
-    reference: ExternalTorque  #: The torque they are judged by.
-    errors: pl.DataFrame  #: The tidy error table (`vftcli.evaluation.SCHEMA`).
-    #: The wrenches, with the reference's beside them; None without wrenches.
-    virtual_sensor: SensorReading | None
-
-
 def with_measured_gap(
     remarks: Sequence[Remark], errors: pl.DataFrame, tunings: Mapping[str, Tuning]
 ) -> tuple[Remark, ...]:
@@ -236,7 +224,7 @@ def judge(
     sensed: SensorReading | None,
     choice: ReferenceChoice,
     told: KnownContacts | None = None,
-) -> Judgement:
+) -> tuple[ExternalTorque, pl.DataFrame, SensorReading | None]:
     """The chosen reference, and errors of estimates and of their wrenches, if any, beside it.
 
     Contacts are judged by what is known of them.
@@ -261,7 +249,7 @@ def judge(
         except VftError as error:
             reason = caution("contacts-not-judged", reason=str(error))
             reference = replace(reference, remarks=(*reference.remarks, reason))
-    return Judgement(reference=reference, errors=errors, virtual_sensor=sensed)
+    return reference, errors, sensed
 
 
 def reference_wrench(

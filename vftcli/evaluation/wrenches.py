@@ -38,10 +38,7 @@ WRENCH_SCHEMA: dict[str, type[pl.DataType]] = {
 def evaluate_wrenches(
     recording: str, wrenches: Iterable[Wrench], reference: Wrench
 ) -> pl.DataFrame:
-    """One row per observer and axis, over the samples where the reference is known.
-
-    All wrenches are on the reference's clock and in its frame.
-    """
+    """One row per observer and axis, over the samples where the reference is known."""
     rows: list[dict[str, object]] = []
     for wrench in wrenches:
         answered = np.isfinite(wrench.known)

@@ -81,10 +81,7 @@ def is_same_path(recording: Recording, found: Alignment) -> bool:
 
 
 def why_slower(recording: Recording, free: Recording, rate: float) -> str:
-    """Reason of `rate` times the duration: speed or a clock; a remedy.
-
-    Logged velocities contradict a wrong clock, not a slower motion.
-    """
+    """Reason of `rate` times the duration: speed or a clock; a remedy."""
     longer = f"the same motion takes {rate:.4g} times as long in {free.name}"
     speed = f"{100.0 * abs(rate - 1.0):.2g} % {'slower' if rate > 1.0 else 'faster'}"
     again = (
@@ -166,10 +163,7 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
 
 
 def apart(t: Array, q: Array, free: Recording) -> Array:
-    """Free run less positions q at instants t of its clock. (T, n) [rad]
-
-    NaN before its first sample and after its last.
-    """
+    """Free run less positions q at instants t of its clock, NaN beyond it. (T, n) [rad]"""
     return resample_columns(t, free.t, free.q, np.nan) - q
 
 
@@ -179,10 +173,7 @@ def near(t: Array, q: Array, free: Recording) -> Mask:
 
 
 def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None:
-    """Alignment at a ratio of rates that makes two logs one path, if any.
-
-    The first of `RATES` that leaves half of the limit of two trajectories.
-    """
+    """Alignment at a ratio of rates that makes two logs one path, if any."""
     for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
         lengths = (recording.duration * rate, free.duration)
         if min(lengths) < LEAST_OVERLAP * max(lengths):

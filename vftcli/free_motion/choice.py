@@ -46,10 +46,7 @@ def cutoff(text: str) -> float | str | None:
 
 @dataclass(frozen=True, kw_only=True)
 class FreeChoice(Choice):
-    """Free motion, and its use in the two-cycle difference.
-
-    With nothing chosen the free cycles of a repeated motion are found.
-    """
+    """Free motion, and its use in the two-cycle difference."""
 
     GROUP = LOG
 

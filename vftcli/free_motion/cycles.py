@@ -257,10 +257,7 @@ def settled(t: Array, on_path: Mask, seconds: float) -> float:
 
 
 def pair_with_cycle(motion: Run, cycles: Cycles, free: int, period: float) -> Pairing:
-    """Pair a log with one of its own cycles, from 0, which itself has no partner.
-
-    By the commanded or the found period [s].
-    """
+    """A log paired with one of its cycles, from 0, by a period [s]."""
     t, number = motion.t, cycles.number(motion.t)
     first, last = cycles.span(free)
     times = t - np.rint((t - 0.5 * (first + last)) / period) * period
@@ -278,10 +275,7 @@ class FreeCycles(NamedTuple):
 
     @property
     def drawn(self) -> tuple[int, ...]:
-        """Those that are laid under the others: all, or `MOST_LAID` from the first to the last.
-
-        Every cycle more costs a pass over the whole log, and takes little off the error.
-        """
+        """Those that are laid under the others: all, or `MOST_LAID` from the first to the last."""
         if len(self.numbers) <= MOST_LAID:
             return self.numbers
         at = np.linspace(0, len(self.numbers) - 1, MOST_LAID).round().astype(int)

@@ -64,10 +64,7 @@ class FreePart(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FreeRun:
-    """A motion in another recording that nobody touched, beside the log it serves.
-
-    Everything that is asked of it, by references, zero and bands, is made once.
-    """
+    """A motion in another recording that nobody touched, beside the log it serves."""
 
     run: Run  #: The free run.
     log: Run  #: The log.
@@ -160,10 +157,7 @@ class FreeMotion(Shown):
 
     @cached_property
     def known(self) -> FreePart:
-        """The free part: the given spans and runs, else the free cycles of the log.
-
-        Its remarks are on the log alone: where in a free run the log's motion lies is not asked.
-        """
+        """The free part: the given spans and runs, else the free cycles of the log."""
         log, choice, t = self.log, self.choice, self.log.t
         own, spans = within(t, choice.spans), choice.spans
         if spans and (np.count_nonzero(own) < 2 or own.all()):

@@ -97,10 +97,7 @@ def mean_of(pairings: Sequence[Pairing], signals: Sequence[Array]) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PairedRuns:
-    """A log and its free runs, each sample of the log with its partners.
-
-    Every way of alignment and every low-pass starts from these; each is made once.
-    """
+    """A log and its free runs, each sample of the log with its partners."""
 
     motion: Run  #: The log.
     pairings: Sequence[Pairing]  #: Its free runs.

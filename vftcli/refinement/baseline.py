@@ -80,10 +80,7 @@ class Baseline:
 
     @property
     def correction_sd(self) -> Array | None:
-        """Standard deviation of the model's error as the correction has it. (T, n) [N·m]
-
-        On joints left alone too; None without a correction.
-        """
+        """Deviation of the model's error, None without a correction. (T, n) [N·m]"""
         return None if self.correction is None else self.correction.sd
 
     @property
@@ -236,10 +233,7 @@ def on_quiet_samples(found: Baseline, quiet: Mask) -> Baseline:
 
 
 def corrected(found: Baseline, bias: WholeLogBias) -> Baseline:
-    """A baseline with the bias of the whole log off, where its guards apply any of it.
-
-    What its fit says of contact and of slow loads holds also where none of it is applied.
-    """
+    """A baseline with the bias of the whole log off, where its guards apply any of it."""
     fitted = bias if bias.fitted else None
     made = replace(found, on_correction=bias.remarks, correction=fitted)
     if not bias.applied.any() or made.part is None or made.spectra is None:

@@ -62,10 +62,7 @@ def smooth_motion(run: Run) -> SmoothMotion:
 
 
 def without_waits(t: Array) -> Array:
-    """A clock that waits no longer than `WAIT`; itself where it does not. (T,) [s]
-
-    What was between is not known, and to fill an hour with a line takes minutes.
-    """
+    """A clock that waits no longer than `WAIT`; itself where it does not. (T,) [s]"""
     steps = np.diff(t)
     longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
     if not np.any(steps > longest):
@@ -138,11 +135,7 @@ class ModelError:
         return np.concatenate([self.inertial, mine.ravel()])
 
     def torque(self, run: Run, motion: SmoothMotion) -> Array:
-        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]
-
-        The rigid body's part is the difference of two inverse dynamics: a fiftieth of the
-        regressor.
-        """
+        """The torque A δx that a model with this error asks for too little. (T, n) [N·m]"""
         chain = run.robot.loaded_chain
         wrong = with_parameters(
             chain, chain_parameters(chain) + self.inertial, chain.rotor_inertia + self.rotor
@@ -175,10 +168,7 @@ def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
 
 
 def expected_error(robot: Robot) -> ModelError:
-    """Standard deviation of the model's error in every column, from the robot's own numbers.
-
-    Torque behind the gears has no rotor in it.
-    """
+    """Standard deviation of the model's error in every column, from the robot's own numbers."""
     chain, friction = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):

@@ -311,11 +311,7 @@ def refine(
     *,
     gains_of_file: bool = False,
 ) -> Refinement:
-    """The observers' estimates, in this order, with their bands and what limits them.
-
-    ``bias.method`` asked for what is `removed`; the paper's observers may have run with the gains
-    of the robot's file.
-    """
+    """The observers' estimates, in this order, with their bands and what limits them."""
     remarks, budgets, shown, plain = [*found.remarks], list[Budget](), [], found.plain
     for observer, estimate in zip(observers, estimates, strict=True):
         # Observers may run on different terms: each is measured on its own.

@@ -82,10 +82,7 @@ def frame_pose(frame: str, mounting: Mounting) -> Pose:
 
 
 def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
-    """Matrices that take a wrench in base axes about the flange point to a named frame. (T, 6, 6)
-
-    The flange has the orientation (T, 3, 3) in the base.
-    """
+    """Matrices to a frame from base axes about a flange turned so. (T, 6, 6)"""
     if check_frame(frame) == "base":
         # A wrench in base axes needs no pose at all, not even the tool's.
         return np.broadcast_to(np.eye(6), (len(flange), 6, 6))

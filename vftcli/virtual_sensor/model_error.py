@@ -99,10 +99,7 @@ class TorqueNoise:
         return np.where(self.seen, self.time, np.maximum(self.time, UNSEEN_TIME))
 
     def stationary(self, blocks: Blocks, touched: Mask | None = None) -> tuple[Array, Array]:
-        """Stationary variance and correlation time of b in every block of a log. (K, n) each
-
-        In the `touched` blocks (K,) a contact may re-settle stiction; None for none.
-        """
+        """Variance and time of b in blocks; `touched` ones may re-settle. (K, n) each"""
         rests = np.column_stack([grown(blocks.t, rest, self.near) for rest in blocks.rests.T])
         variance = np.where(rests, self.variance + self.at_rest, self.moving)
         time = np.where(rests, np.maximum(self.time, REST_TIME), self.moving_time)
@@ -181,10 +178,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
 
 
 def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueNoise | None:
-    """Noise of a log without known free motion, None where it has too few known blocks.
-
-    Learned is that of the samples that the fit of the whole log calls free; None without.
-    """
+    """Noise of a log without known free motion, None in too few blocks."""
     bends = [np.diff(log.d[a:b], n=2, axis=0) for a, b in runs_of(log.known) if b - a > 2]
     if not bends:
         return None
@@ -218,10 +212,7 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
 
 
 def fitted_noise(stretches: Sequence[Blocks], dry: Array) -> TorqueNoise:
-    """Noise by Whittle's likelihood over all stretches together, joint by joint.
-
-    Rest adds the shares of creep, and of a push under one.
-    """
+    """Noise by Whittle's likelihood over all stretches together, joint by joint."""
     # A block holds whole samples, so that it is not quite as long as was asked.
     seconds = median(np.concatenate([s.length for s in stretches]))
     f = np.concatenate([np.fft.rfftfreq(len(s.d), seconds)[1:] for s in stretches])

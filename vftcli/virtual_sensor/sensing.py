@@ -190,10 +190,7 @@ def smooth_all(
     unloaded: Mask,
     gate: Gate | None = None,
 ) -> dict[str, SmoothedWrench]:
-    """The smoothed wrench of each observer, computed once for all that have the same log.
-
-    A log is an observer's own, else the plain one, as the robot's model alone has it.
-    """
+    """The smoothed wrench of each observer, computed once for all that have the same log."""
     logs = {name: own.get(name, plain) for name in names}
     each = {log.run: log for log in reversed(logs.values())}
     wrenches = {run: smooth_log(log, plain, unloaded, gate) for run, log in each.items()}
@@ -272,10 +269,7 @@ def torque_error(
     torques: Sequence[ExternalTorque],
     free: Mask,
 ) -> TorqueError:
-    """The torque error behind the band: as ``virtual-sensor.torque-sd`` states, else measured.
-
-    It is measured on the samples of the zero spans (T,); without any there is none.
-    """
+    """The torque error behind the band: as stated, else of the zero spans (T,)."""
     if stated is not None:
         return given_error(stated, torques)
     known = {torque.name: torque.error_sd for torque in torques if torque.error_sd is not None}

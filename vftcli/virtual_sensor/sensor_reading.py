@@ -69,10 +69,7 @@ def null_space_limit(wrench: Wrench, free: Mask) -> float | None:
 
 
 def contact_elsewhere(wrench: Wrench, free: Mask) -> tuple[Remark, ...]:
-    """A remark where the torque of an arm of more than six joints is no tip wrench's.
-
-    Contact elsewhere on the arm exceeds the limit of the null-space channel, or a wrong model.
-    """
+    """A remark where the torque of an arm of more than six joints is no tip wrench's."""
     limit = null_space_limit(wrench, free)
     if limit is None or wrench.null_space is None:
         return ()
@@ -235,10 +232,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
 
 
 def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
-    """A warning if a zero interval looks like a contact; none if it does not.
-
-    It does where the wrench changes within it, or lies far from the level of the log's start.
-    """
+    """A warning if a zero interval looks like a contact; none if it does not."""
     inside, start = wrench.between(*drift.span), unloaded_start(wrench)
     swing = np.percentile(inside, 95, axis=0) - np.percentile(inside, 5, axis=0)
     tried: list[tuple[str, Array, Array, dict[str, object]]]

@@ -173,10 +173,7 @@ def block_model(
 
 
 def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:
-    """Blocks in which there may be a wrench: listed intervals [s] and a block on either side. (K,)
-
-    All of them without a list, where the whole log is one contact.
-    """
+    """Blocks in listed intervals [s] and one beside each; all without a list. (K,)"""
     if intervals is None:
         return np.ones(len(blocks.t), dtype=bool)
     inside = np.zeros(len(blocks.t), dtype=bool)
@@ -375,10 +372,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
 
 
 def coasted(quiet: Array, v: Array, kept: Array, count: int) -> Array:
-    """Variance of the model error `count` blocks after the last one that shows it. (K, n)
-
-    There it is `quiet`, at the log's start v, to which it tends as each block keeps a share of it.
-    """
+    """Variance of b so many blocks after it was `quiet`; it tends to v. (K, n)"""
     blocks = np.arange(len(v))
     found = np.where((blocks >= count)[:, None], quiet[np.maximum(blocks - count, 0)], v)
     for back in range(count - 1, -1, -1):

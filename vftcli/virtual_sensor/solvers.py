@@ -4,8 +4,9 @@ Everything is solved at the flange point in base axes with lengths in units of 0
 newton and a newton-metre weigh alike: J_s = S J, S = diag(1, 1, 1, 0.3, 0.3, 0.3), w_s = S⁻¹w.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -79,10 +80,7 @@ def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
 
 
 def pinv(parts: Decomposition, sd: Array) -> Solution:
-    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
-
-    Its covariance is that of the torque, seen through it.
-    """
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0."""
     gain = least_squares_gain(parts)
     return Solution(gain, gain * sd[:, None, :])
 
@@ -132,10 +130,7 @@ class FlangeWrench(NamedTuple):
 
 
 def wrench_of(tau: Array, jacobian: Array, left_out: float = 0.0) -> FlangeWrench:
-    """Least squares (46) from torques and given Jacobians, for logs and loops that hold one.
-
-    `VirtualSensor` takes the Jacobian from the robot, and knows frames and bands besides.
-    """
+    """Least squares (46) from torques and given Jacobians, for logs and loops that hold one."""
     parts = decompose(jacobian)
     gain = least_squares_gain(parts, left_out)
     values = np.squeeze(gain @ tau[:, :, None], axis=2)
@@ -160,18 +155,16 @@ class VirtualSensor(Shown):
         check_known(self.solver, SOLVERS, f"no solver {self.solver!r} for a wrench")
         frame_pose(check_frame(self.frame), self.mounting)
 
-    def wrench(
-        self, torque: ExternalTorque, q: Array, chain: Chain, sd: Array | None = None
-    ) -> Wrench:
-        """The wrench of one estimate, with a band where `sd` is given; see `wrenches`."""
-        return self.wrenches((torque,), q, chain, {} if sd is None else {torque.name: sd})[0]
+    def wrench(self, torque: ExternalTorque, q: Array, chain: Chain) -> Wrench:
+        """The wrench of one estimate, without a band; see `wrenches`."""
+        return self.wrenches((torque,), q, chain)[0]
 
     def wrenches(
         self,
         torques: Sequence[ExternalTorque],
         q: Array,
         chain: Chain,
-        sd: dict[str, Array] | None = None,
+        sd: Mapping[str, Array] = MappingProxyType({}),
     ) -> tuple[Wrench, ...]:
         """The wrench of every estimate at q (T, n) [rad], about the flange, tool or sensor.
 
@@ -182,10 +175,9 @@ class VirtualSensor(Shown):
         for torque in torques:
             if torque.tau.shape != q.shape:
                 raise ShapeError(f"{torque.name}: torque {torque.tau.shape} against q {q.shape}")
-        known = sd or {}
         # A view: one row stands for every sample. Zero is raised, so that weights stay finite.
         errors = [
-            np.broadcast_to(np.maximum(known.get(torque.name, TORQUE_SD), 1e-6), q.shape)
+            np.broadcast_to(np.maximum(sd.get(torque.name, TORQUE_SD), 1e-6), q.shape)
             for torque in torques
         ]
         values = np.empty((len(torques), samples, 6))
@@ -213,7 +205,7 @@ class VirtualSensor(Shown):
                 t=torque.t,
                 values=handed_over(values[k].copy()),
                 frame=self.frame,
-                sd=handed_over(spread[k].copy()) if torque.name in known else None,
+                sd=handed_over(spread[k].copy()) if torque.name in sd else None,
                 sigma_min=sigma,
                 masked=masked,
                 null_space=handed_over(residual[k].copy()) if n > 6 else None,
@@ -222,10 +214,7 @@ class VirtualSensor(Shown):
         )
 
     def arrow(self, force: Array, q: Array, chain: Chain) -> "ForceArrow":
-        """Where forces in this sensor's frame (S, 3) [N] act, and where they point, from the base.
-
-        The arm is at q (S, n) [rad] then.
-        """
+        """Where forces (S, 3) [N] of this sensor act at q (S, n) [rad], and point."""
         poses = link_poses(chain, q)
         flange, pose = poses.rotation[:, -1], frame_pose(self.frame, self.mounting)
         origin = poses.translation[:, -1] + flange @ pose.translation
