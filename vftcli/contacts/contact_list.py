@@ -34,6 +34,18 @@ OF_FORCES = (
     "peak_force", "peak_band", "place_band", "wrench", "wrench_sd", "mean_force", "impulse",
     "anywhere", "course", "vendor_force",
 )  # fmt: skip
+#: Field of a contact → its key in a record and in columns, in order; a wrench has four.
+KEYS = {
+    "number": "number", "kind": "kind", "start": "start_s", "stop": "stop_s", "peak": "peak_s",
+    "peak_force": "peak_force_N", "peak_band": "peak_force_band_N", "place_band": "place_band_N",
+    "force": "force_N", "force_sd": "force_sd_N", "moment": "moment_Nm",
+    "moment_sd": "moment_sd_Nm", "mean_force": "mean_force_N", "impulse": "impulse_Ns",
+    "where": "where", "lead": "where_lead_nats", "places": "places", "anywhere": "anywhere_N",
+    "trust": "trust", "size_known": "size_known", "evidence": "evidence_nats",
+    "joint_torque": "joint_torque_Nm", "joint_torque_sd": "joint_torque_sd_Nm",
+    "at_rest": "at_rest", "remarks": "remarks", "vendor_force": "vendor_force_N",
+    "sensor_force": "sensor_force_N",
+}  # fmt: skip
 #: Columns that a table of contacts has even where it has no row.
 FIRST_COLUMNS = ("number", "start_s", "stop_s", "peak_s", "peak_force_N")
 
@@ -110,36 +122,16 @@ class Contact(Shown):
 
     def record(self) -> dict[str, Any]:
         """The contact for machines, units in the names."""
-        wrench, sd = self.wrench, self.wrench_sd
-        return {
-            "number": self.number,
+        parts: dict[str, Any] = {
             "kind": "load" if self.is_load else "contact",
-            "start_s": self.start,
-            "stop_s": self.stop,
-            "peak_s": self.peak,
-            "peak_force_N": self.peak_force,
-            "peak_force_band_N": self.peak_band,
-            "place_band_N": self.place_band,
-            "force_N": None if wrench is None else wrench[:3],
-            "force_sd_N": None if sd is None else sd[:3],
-            "moment_Nm": None if wrench is None else wrench[3:],
-            "moment_sd_Nm": None if sd is None else sd[3:],
-            "mean_force_N": self.mean_force,
-            "impulse_Ns": self.impulse,
-            "where": self.where,
-            "where_lead_nats": self.lead,
             "places": [link or "flange" for link in self.places],
             "anywhere_N": None if self.anywhere is None else list(self.anywhere),
-            "trust": self.trust,
-            "size_known": self.size_known,
-            "evidence_nats": self.evidence,
-            "joint_torque_Nm": self.joint_torque,
-            "joint_torque_sd_Nm": self.joint_torque_sd,
-            "at_rest": self.at_rest,
             "remarks": list(self.remarks),
-            "vendor_force_N": self.vendor_force,
-            "sensor_force_N": self.sensor_force,
         }
+        for sd, wrench in (("", self.wrench), ("_sd", self.wrench_sd)):
+            force, moment = (None, None) if wrench is None else np.split(wrench, 2)
+            parts |= {f"force{sd}_N": force, f"moment{sd}_Nm": moment}
+        return {key: parts.get(key, getattr(self, name, None)) for name, key in KEYS.items()}
 
     def row(self) -> dict[str, Any]:
         """The record in one row: ``force_N`` becomes ``force_N_x`` …, joints are numbered."""

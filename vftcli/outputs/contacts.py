@@ -5,6 +5,7 @@ The words are the same on screen, page, index and batch.
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from vftcli.contacts.contact_list import (
     FIRST_COLUMNS,
+    KEYS,
     SURE_NATS,
     TIGHT,
     CarriedLoad,
@@ -39,17 +41,6 @@ LIST_KEYS = {
     "recording": "recording", "duration": "duration_s", "basis": "basis", "free_seconds": "free_s",
     "false_on_free": "false_on_free", "threshold": "evidence_threshold_nats",
     "smallest_force": "smallest_force_N",
-}  # fmt: skip
-#: Field of a contact → its key in the record, in the same way; and of vectors.
-CONTACT_KEYS = {
-    "number": "number", "start": "start_s", "stop": "stop_s", "peak": "peak_s",
-    "peak_force": "peak_force_N", "peak_band": "peak_force_band_N", "place_band": "place_band_N",
-    "where": "where", "lead": "where_lead_nats", "evidence": "evidence_nats", "at_rest": "at_rest",
-    "vendor_force": "vendor_force_N", "sensor_force": "sensor_force_N",
-}  # fmt: skip
-VECTOR_KEYS = {
-    "mean_force": "mean_force_N", "impulse": "impulse_Ns", "joint_torque": "joint_torque_Nm",
-    "joint_torque_sd": "joint_torque_sd_Nm",
 }  # fmt: skip
 
 
@@ -352,15 +343,17 @@ def stored_list(record: Mapping[str, Any]) -> ContactList:
 
 def stored_contact(row: Mapping[str, Any]) -> Contact:
     """One contact from its record."""
-    vectors = {field: row[key] for field, key in VECTOR_KEYS.items()}
-    for field, unit in (("wrench", ""), ("wrench_sd", "_sd")):
+    stored = {field.name for field in fields(Contact)} & KEYS.keys()
+    given: dict[str, Any] = {
+        name: row[KEYS[name]] for name in stored - {"places", "anywhere", "remarks"}
+    }
+    for name, unit in (("wrench", ""), ("wrench_sd", "_sd")):
         force = row[f"force{unit}_N"]
-        vectors[field] = None if force is None else [*force, *row[f"moment{unit}_Nm"]]
-    fields = {field: row[key] for field, key in CONTACT_KEYS.items()}
-    fields |= {field: None if v is None else numbers(v) for field, v in vectors.items()}
+        given[name] = None if force is None else [*force, *row[f"moment{unit}_Nm"]]
     anywhere = row["anywhere_N"]
+    given |= {name: numbers(v) for name, v in given.items() if isinstance(v, list)}
     return Contact(
-        **fields,
+        **given,
         is_load=row["kind"] == "load",
         anywhere=None if anywhere is None else (anywhere[0], anywhere[1]),
         places=tuple(0 if place == "flange" else place for place in row["places"]),
