@@ -11,7 +11,7 @@ from vftcli.robots.run import Run, band
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
-from vftcli.signals.lag import lag_fit
+from vftcli.signals.lag import overlap_energy, sliding
 from vftcli.signals.least_squares import robust_sd
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, fact
@@ -75,7 +75,7 @@ def find_period(recording: Recording, stated: float | None = None) -> Period:
     x = resample_columns(np.arange(t[0], t[-1], step), t, q)
     spread = float(np.sqrt(np.mean((x - x.mean(axis=0)) ** 2) * x.shape[1]))
     closest = (float("nan"), float("inf"))
-    for lag in valleys(lag_fit(x, x, 0.0).difference[len(x) - 1 :], step, stated):
+    for lag in valleys(distances(x), step, stated):
         seconds, deviation = lag * step, returned(t, q, lag * step, -(-len(t) // ENOUGH))
         if deviation <= SHORTLIST * spread:
             seconds = refined_period(t, q, seconds)
@@ -132,6 +132,15 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
         )
     span = slice(moving[0], moving[-1] + 1)
     return t[span], q[span]
+
+
+def distances(x: Array) -> Array:
+    """Mean squared distance of x and x so many samples later, for every lag. (N,)"""
+    x, lags, samples = x - x.mean(axis=0), np.arange(len(x)), len(x)
+    energy = overlap_energy(x, lags, samples) + overlap_energy(x, -lags, samples)
+    for column in x.T[:, None]:
+        energy -= 2.0 * sliding(column, column, lags)[0]
+    return np.asarray(np.maximum(energy, 0.0) / (samples - lags))
 
 
 def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
