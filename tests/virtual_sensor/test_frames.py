@@ -86,9 +86,8 @@ def sensed(frame: str, mounting: Mounting, robot: str = "ur5", turn: np.ndarray 
     q = motion(joints=chain.joints)
     tau = np.random.default_rng(5).normal(size=q.shape)
     torque = ExternalTorque(name="x", t=np.arange(len(q)) * 0.01, tau=tau)
-    return VirtualSensor(frame=frame, mounting=mounting).wrench(
-        torque, q, chain, np.ones(chain.joints)
-    )
+    sensor = VirtualSensor(frame=frame, mounting=mounting)
+    return sensor.wrenches((torque,), q, chain, {"x": np.ones(chain.joints)})[0]
 
 
 TOOL = Pose(rpy_matrix((0.2, 0.5, -0.4)), np.array([0.05, -0.1, 0.15]))
