@@ -97,7 +97,16 @@ def rerun_file(
     for tab in tabs:
         for plot in tab.plots:
             send_plot(stream, plot)
-        send_log(stream, tab.log)
+        # Each line to its entity, in the order of time.
+        for entity in dict.fromkeys(line.path for line in tab.log):
+            own = sorted((line for line in tab.log if line.path == entity), key=lambda line: line.t)
+            rows = rr.TextLog.columns(
+                text=[drawable(line.text) for line in own],
+                level=[line.level for line in own],
+                color=rgba(*(line.colour for line in own)),
+            )
+            clock = rr.TimeColumn("t", duration=[line.t for line in own])
+            stream.send_columns(entity, [clock], rows)
     for name, text in words.items():
         document = rr.TextDocument(drawable(text), media_type="text/markdown")
         stream.log(f"/{name.lower()}", document, static=True)
@@ -174,19 +183,18 @@ def arm_view(poses: ArmPoses, name: str) -> rrb.Spatial3DView:
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
     """One tab, in two columns if there are many plots; the first one's legend holds for all."""
-    views = [
-        rrb.TimeSeriesView(
+    views = []
+    for k, plot in enumerate(tab.plots):
+        # It would cover a corner; of a plot with points the title says it all.
+        named = k == 0 and len(lines_of(plot)) == len(plot.series)
+        view = rrb.TimeSeriesView(
             origin=plot.key,
             name=drawable(title_of(tab, plot)),
-            # It would cover a corner; of a plot with points the title says it all.
-            plot_legend=rrb.PlotLegend(
-                rrb.Corner2D.LeftTop, visible=k == 0 and len(lines_of(plot)) == len(plot.series)
-            ),
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.LeftTop, visible=named),
             axis_x=rrb.archetypes.TimeAxis(link="LinkToGlobal"),
             axis_y=rrb.ScalarAxis(range=tab.ends(plot)),
         )
-        for k, plot in enumerate(tab.plots)
-    ]
+        views.append(view)
     plots = rrb.Grid(*views, grid_columns=2 if len(views) > 3 else 1, name=tab.name)
     if not tab.log:
         return plots
@@ -202,11 +210,9 @@ def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
 
 def title_of(tab: Tab, plot: Chart) -> str:
     """A plot's title; in small plots, where few ticks are labelled, with the axis' ends."""
-    title = f"{plot.title} [{plot.units[0]}]"
-    if len(tab.plots) <= 3:
-        return title
     low, high = tab.ends(plot)
-    return f"{title}, {low:.3g} to {high:.3g}"
+    ends = f", {low:.3g} to {high:.3g}" if len(tab.plots) > 3 else ""
+    return f"{plot.title} [{plot.units[0]}]{ends}"
 
 
 def send_plot(stream: Stream, plot: Chart) -> None:
@@ -240,18 +246,6 @@ def width_of(line: ChartLine) -> float:
     if line.name.startswith(BAR):
         return 6.0
     return 2.5 if line.colour == REFERENCE else 2.0 if line.leads else 1.2
-
-
-def send_log(stream: Stream, log: Sequence[LogLine]) -> None:
-    """Send the lines of a text log, each to its entity, in the order of time."""
-    for path in dict.fromkeys(line.path for line in log):
-        own = sorted((line for line in log if line.path == path), key=lambda line: line.t)
-        rows = rr.TextLog.columns(
-            text=[drawable(line.text) for line in own],
-            level=[line.level for line in own],
-            color=rgba(*(line.colour for line in own)),
-        )
-        stream.send_columns(path, [rr.TimeColumn("t", duration=[line.t for line in own])], rows)
 
 
 #: How to write what the viewer's font may lack.

@@ -89,10 +89,9 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
 def tabs_of(analysis: Analysis, detail: str) -> list[Tab]:
     """All plots; of a long log what `STRETCHES` show, every sample where contacts begin."""
     found = analysis.contacts.contacts if analysis.contacts is not None else ()
-    strongest = sorted(found, key=lambda c: -(c.peak_force or 0.0))[
-        : int(0.5 * WHOLE_TIME / AROUND)
-    ]
-    whole, tabs = [(c.start - AROUND, c.start + AROUND) for c in strongest], []
+    hardest = sorted(found, key=lambda c: -(c.peak_force or 0.0))
+    strongest, tabs = hardest[: int(0.5 * WHOLE_TIME / AROUND)], []
+    whole = [(c.start - AROUND, c.start + AROUND) for c in strongest]
     for name, group in steps(list(plot_groups(analysis).items())):
         # One plot after the other: of a long log all of them have no room at once.
         shown = group if detail == FULL else (thinned(plot, STRETCHES, whole) for plot in group)
@@ -267,14 +266,13 @@ def summary(analysis: Analysis) -> str:
 
 def arrow_words(analysis: Analysis) -> str:
     """Meaning of the arrow and the arm's colours."""
-    scale = f"1 m is {newton_per_metre(analysis):g} N"
+    scale, source = f"1 m is {newton_per_metre(analysis):g} N", force_source(analysis)
     if analysis.contacts is not None:
         return (
             "the force on the robot while it is touched, at the flange or in the middle of the "
             f"link that the list names, which has its colour then; {scale}. On the wrist it is the "
             "force as it runs, elsewhere that of the contact's peak"
         )
-    source = force_source(analysis)
     name = source.name if source is not None else "no estimate"
     return (
         f"force on the robot from {name}, as in the tables of the wrench where one was asked for, "
@@ -284,12 +282,11 @@ def arrow_words(analysis: Analysis) -> str:
 
 def force_source(analysis: Analysis) -> ExternalTorque | None:
     """The estimate the force arrow is made from: `best`, else a Kalman filter's, else the first."""
-
-    def rank(estimate: ExternalTorque) -> tuple[bool, bool]:
-        """The least comes first."""
-        return estimate.name != BEST, not estimate.name.startswith("kfo")
-
-    return min(analysis.estimates, key=rank, default=None)
+    return min(
+        analysis.estimates,
+        key=lambda estimate: (estimate.name != BEST, not estimate.name.startswith("kfo")),
+        default=None,
+    )
 
 
 def force_arrow(
