@@ -83,7 +83,7 @@ def test_the_wrench_of_best_stands_in_the_flange(
 
 def test_wrenches_in_base_axes_say_about_which_point(with_wrench: Analysis) -> None:
     """The flange is where their moment refers to: the frame of base would be another."""
-    topics = conversion.estimated_topics(with_wrench, with_wrench.robot.chain.names)
+    topics = conversion.estimated_topics(with_wrench)
     frames = {topic.values.get("header.frame_id") for topic in topics}
     assert frames == {None, "base@flange"}
 

@@ -65,7 +65,7 @@ def work_on_log(task: LogTask) -> None:
         return
     analysis = analysed(task)
     begin("writing")
-    write_result(folder.result(task.key), analysis, task)
+    write_result(folder.path / folder.place(task.key), analysis, task)
     folder.put_rows(task.key, rows_of(analysis, task.key))
 
 

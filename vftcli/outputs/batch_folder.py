@@ -46,10 +46,6 @@ class BatchFolder:
         """Place of a log's rows."""
         return self.rows / key[:2] / f"{key}.parquet"
 
-    def result(self, key: str) -> Path:
-        """Place of a log's other results."""
-        return self.path / self.place(key)
-
     @staticmethod
     def place(key: str) -> str:
         """Place of a log's result, relative to the folder."""
@@ -124,27 +120,21 @@ class BatchFolder:
         page: Callable[[], str],
         record: Mapping[str, Any],
     ) -> None:
-        """Write the tables and the page, and at last their seal."""
+        """Write the tables, a row group a piece, and the page, and at last their seal."""
+        import polars as pl
+        from pyarrow.parquet import ParquetWriter
+
         (self.path / SEAL).unlink(missing_ok=True)
         for name, pieces in ((TABLE, tables), (FAILURES, (failures,))):
-            with atomic(self.path / name, force=True) as temporary:
-                put_pieces(temporary, pieces)
+            with atomic(self.path / name, force=True) as temporary, ExitStack() as stack:
+                writer = None
+                for piece in pieces:
+                    # What other programs read: text of the kind that Arrow has always had.
+                    table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
+                    if writer is None:
+                        writer = ParquetWriter(temporary, table.schema, compression="zstd")
+                        stack.enter_context(writer)
+                    writer.write_table(table)
         write_text(self.path / PAGE, page(), force=True)
         files = {name: digest(self.path / name) for name in (TABLE, FAILURES, PAGE)}
         write_text(self.path / SEAL, to_json({**record, "files": files}), force=True)
-
-
-def put_pieces(path: Path, pieces: "Iterable[pl.DataFrame]") -> None:
-    """Write one table of several pieces, a row group each; there is one at least."""
-    import polars as pl
-    from pyarrow.parquet import ParquetWriter
-
-    with ExitStack() as stack:
-        writer = None
-        for piece in pieces:
-            # What other programs read: text of the kind that Arrow has always had.
-            table = piece.to_arrow(compat_level=pl.CompatLevel.oldest())
-            if writer is None:
-                writer = ParquetWriter(path, table.schema, compression="zstd")
-                stack.enter_context(writer)
-            writer.write_table(table)

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import beginning, contact_name, contacts_record
-from vftcli.outputs.files import atomic, check_file, table_file
+from vftcli.outputs.files import atomic, check_file, put_table, table_file
 from vftcli.outputs.run_record import jsonable
 from vftcli.readers.bags.ros_messages import (
     Value,
@@ -33,7 +33,7 @@ from vftcli.readers.bags.ros_messages import (
 )
 from vftcli.robots.terms import drive_torque
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame, described_schema
+from vftcli.signals.columns import StatedFrame
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
 
@@ -98,14 +98,14 @@ def joint_topic(
 
 def write_mcap(path: Path, analysis: Analysis) -> None:
     """Write the recording's torques and its estimates; an existing file is replaced."""
-    names = analysis.recording.joint_names or analysis.robot.chain.names
     stamps = stamps_of(analysis.recording)
-    write_topics(path, stamps, estimated_topics(analysis, names), events(analysis, int(stamps[0])))
+    write_topics(path, stamps, estimated_topics(analysis), events(analysis, int(stamps[0])))
 
 
-def estimated_topics(analysis: Analysis, names: Sequence[str]) -> Iterator[OutputTopic]:
+def estimated_topics(analysis: Analysis) -> Iterator[OutputTopic]:
     """The log's own signals, every estimate, the reference."""
     recording = analysis.recording
+    names = recording.joint_names or analysis.robot.chain.names
     torque = drive_torque(recording, analysis.robot)
     yield joint_topic("/joint_states", names, recording.q, recording.dq, torque)
     for estimate in analysis.estimates:
@@ -240,7 +240,6 @@ def write_parquet(recording: Recording, path: Path) -> None:
     """Write flat columns, zstd; what has no column (joint names, frame) is in the metadata."""
     import polars as pl
 
-    table = pl.DataFrame(dict(columns_of(recording)))
     frame = recording.wrench_frame
     metadata = {
         "format": recording.source.format,
@@ -251,10 +250,8 @@ def write_parquet(recording: Recording, path: Path) -> None:
         "repairs": [str(repair) for repair in recording.source.repairs],
     }
     stated = {"wrench": StatedFrame(str(frame), frame.sign)} if frame is not None else None
-    schema = described_schema(table, stated)
-    about = {"vftcli": json.dumps(metadata)}
-    with table_file(path) as file:
-        table.write_parquet(file, compression="zstd", metadata=about, arrow_schema=schema)
+    table = pl.DataFrame(dict(columns_of(recording)))
+    put_table(path, table, stated, metadata={"vftcli": json.dumps(metadata)})
 
 
 def write_csv(recording: Recording, path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from vftcli.analysis import Analysis
 from vftcli.outputs.choice import PLAIN, OutputChoice
 from vftcli.outputs.examination import overridden_lines
-from vftcli.outputs.files import SEAL, OutputFolder, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, put_table, table_file
 from vftcli.outputs.run_record import run_record, seal
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame, described_schema
@@ -94,16 +94,14 @@ def write_estimates(path: Path, analysis: Analysis) -> None:
         groups = ((analysis, slice(start, start + GROUP_ROWS)) for start in steps(starts))
         write_groups(path, groups)
         return
-    table = estimates_table(analysis)
-    with table_file(path) as file:
-        table.write_parquet(
-            file,
-            compression="zstd",
-            compression_level=1,
-            statistics=False,
-            metadata=doubts_of(analysis) or None,
-            arrow_schema=described_schema(table, frames_of(analysis)),
-        )
+    put_table(
+        path,
+        estimates_table(analysis),
+        frames_of(analysis),
+        metadata=doubts_of(analysis) or None,
+        compression_level=1,
+        statistics=False,
+    )
 
 
 def write_groups(path: Path, groups: Iterable[Group], csv: Path | None = None) -> Analysis:

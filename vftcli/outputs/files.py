@@ -9,17 +9,21 @@ known to be incomplete, whenever a run was killed.
 import hashlib
 import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Any, Self
 
 from vftcli.outputs.partial import PARTIAL, check_writable, held, partial_folder, to_disk
+from vftcli.signals.columns import StatedFrame, described_schema
 from vftcli.signals.errors import OutputError
 from vftcli.signals.packages import installed, remedy
 from vftcli.signals.parsing import whole
+
+if TYPE_CHECKING:
+    import polars as pl
 
 #: The last file of a run to come and the first to go; beside other files `NAME.run.json`.
 SEAL = "run.json"
@@ -82,6 +86,18 @@ def table_file(path: Path) -> Iterator[Path]:
     except ComputeError as error:
         why = re.sub(r".*IO error: | \(os error \d+\)", "", " ".join(str(error).split())[:200])
         raise unwritable(Path(path.name), OSError(why)) from None
+
+
+def put_table(
+    path: Path,
+    table: "pl.DataFrame",
+    frames: Mapping[str, StatedFrame] | None = None,
+    **how: Any,  # noqa: ANN401 - of `write_parquet`
+) -> None:
+    """Write a table as Parquet, beside each column what it holds."""
+    schema = described_schema(table, frames)
+    with table_file(path) as file:
+        table.write_parquet(file, compression="zstd", arrow_schema=schema, **how)
 
 
 def write_text(path: Path, text: str, force: bool = False) -> None:

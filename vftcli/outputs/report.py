@@ -4,7 +4,7 @@ Of a log of torques and a Jacobian: estimates, errors and run.json.
 """
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
@@ -18,7 +18,7 @@ from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.error_tables import paper_bounds
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
-from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_text, table_file
+from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, put_text
 from vftcli.outputs.paper import figure_files, write_figures
 from vftcli.outputs.run_record import (
     CONVENTIONS,
@@ -30,7 +30,7 @@ from vftcli.outputs.run_record import (
 )
 from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
-from vftcli.signals.columns import StatedFrame, described_schema
+from vftcli.signals.columns import StatedFrame
 from vftcli.signals.packages import installed
 from vftcli.signals.progress import steps
 from vftcli.signals.shown import per_joint
@@ -197,41 +197,21 @@ def put_errors(
 JACOBIAN_FRAME = StatedFrame("axes and point of the log's own Jacobian, as force on the robot")
 
 
-def jacobian_columns(made: JacobianJudgement) -> Iterator[tuple[str, Array]]:
-    """Name and values of every column of `estimates.parquet`, in order."""
-    both = [made.vendor, *([made.sensor] if made.sensor is not None else [])]
-    yield "t", made.log.t
-    for name, one in zip(("vendor", "reference"), both, strict=False):
-        yield from per_joint(f"tau_ext/{name}", one.torque.tau)
-    for name, one in zip(("vendor", "reference"), both, strict=False):
-        yield from per_axis(f"wrench/{name}", one.wrench.values)
-    if made.vendor.wrench.null_space is not None:
-        yield "null_space/vendor", made.vendor.wrench.null_space
-    if made.vendor.wrench.sigma_min is not None:
-        yield "sigma_min", made.vendor.wrench.sigma_min
-
-
 def write_jacobian_folder(
     path: Path, made: JacobianJudgement, command: str, *, force: bool = False
 ) -> str:
     """Write estimates, the errors if there are any, and `run.json`; return the latter's text."""
     import polars as pl
 
-    table = pl.DataFrame(dict(jacobian_columns(made)))
-    schema = described_schema(
-        table, {"wrench/vendor": JACOBIAN_FRAME, "wrench/reference": JACOBIAN_FRAME}
-    )
-    names = ("estimates.parquet", SEAL, *ERROR_TABLES)
-    with OutputFolder(path, force, names) as folder:
-        with table_file(folder / "estimates.parquet") as file:
-            table.write_parquet(file, compression="zstd", arrow_schema=schema)
-        put_errors(folder, "", made.errors, [])
-        return seal(folder, SEAL, jacobian_record(made, command))
-
-
-def jacobian_record(made: JacobianJudgement, command: str) -> dict[str, Any]:
-    """What `run.json` holds."""
-    log = made.log
+    log, wrench = made.log, made.vendor.wrench
+    both = {"vendor": made.vendor, **({} if made.sensor is None else {"reference": made.sensor})}
+    columns: dict[str, Array | None] = {"t": log.t}
+    for name, one in both.items():
+        columns |= per_joint(f"tau_ext/{name}", one.torque.tau)
+    for name, one in both.items():
+        columns |= per_axis(f"wrench/{name}", one.wrench.values)
+    columns |= {"null_space/vendor": wrench.null_space, "sigma_min": wrench.sigma_min}
+    table = pl.DataFrame({name: x for name, x in columns.items() if x is not None})
     found = {
         "input": {
             "path": str(log.path),
@@ -247,7 +227,13 @@ def jacobian_record(made: JacobianJudgement, command: str) -> dict[str, Any]:
         "conventions": CONVENTIONS,
         "repairs": list(log.remarks),
     }
-    return envelope(command, [jacobian_entry(log)], made.remarks, found)
+    record = envelope(command, [jacobian_entry(log)], made.remarks, found)
+    frames = dict.fromkeys(("wrench/vendor", "wrench/reference"), JACOBIAN_FRAME)
+    names = ("estimates.parquet", SEAL, *ERROR_TABLES)
+    with OutputFolder(path, force, names) as folder:
+        put_table(folder / "estimates.parquet", table, frames)
+        put_errors(folder, "", made.errors, [])
+        return seal(folder, SEAL, record)
 
 
 def jacobian_entry(log: JacobianLog) -> dict[str, Any]:

@@ -55,33 +55,26 @@ def save(
     runs: Mapping[Path, Simulation], format: str = "", force: bool = False, command: str = ""
 ) -> list[Path]:
     """Write each log and its companions; return the paths of all files, of a bag its folder."""
-    from vftcli.simulation.writers import usual_format
+    from vftcli.simulation.writers import WRITERS, usual_format, write_truth
 
     formats = [usual_format(run.scenario, run.robot, format) for run in runs.values()]
     with log_folder(runs, force) as folder:
         for (path, run), form in zip(runs.items(), formats, strict=True):
-            write_run(folder, path, run, form, command)
+            truth, scenario, record = (file.name for file in companions(path))
+            with table_file(folder / path.name) as file:
+                WRITERS[form](file, run)
+            with table_file(folder / truth) as file:
+                write_truth(file, run.truth, run.scenario.sensing.start)
+            folder.write(scenario, to_toml(replace(run.scenario, format=form), run.seed))
+            own = {truth, scenario, path.name}
+            files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
+            # The scenario file says the rest.
+            about = {
+                "scenario": run.scenario.name,
+                "seed": run.seed,
+                "robot": run.scenario.robot,
+                "format": form,
+                "samples": len(run.measured.rows),
+            }
+            seal(folder, record, envelope(command, found=about), files)
     return [file for path in runs for file in (path, *companions(path))]
-
-
-def write_run(folder: OutputFolder, path: Path, run: Simulation, format: str, command: str) -> None:
-    """Write one log and its companions into a folder."""
-    from vftcli.simulation.writers import WRITERS, write_truth
-
-    truth, scenario, record = (file.name for file in companions(path))
-    with table_file(folder / path.name) as file:
-        WRITERS[format](file, run)
-    with table_file(folder / truth) as file:
-        write_truth(file, run.truth, run.scenario.sensing.start)
-    folder.write(scenario, to_toml(replace(run.scenario, format=format), run.seed))
-    own = {truth, scenario, path.name}
-    files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
-    # The scenario file says the rest.
-    about = {
-        "scenario": run.scenario.name,
-        "seed": run.seed,
-        "robot": run.scenario.robot,
-        "format": format,
-        "samples": len(run.measured.rows),
-    }
-    seal(folder, record, envelope(command, found=about), files)
