@@ -15,7 +15,7 @@ from vftcli.cli.options import FORMS, Bundle, Needed, Typed, checked_form, comma
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.choice import OutputChoice
+from vftcli.outputs import OutputChoice
 from vftcli.readers.library import Library
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice

@@ -2,7 +2,7 @@
 
 import pytest
 
-from vftcli.outputs.choice import FULL, LEVELS, NONE, OutputChoice
+from vftcli.outputs import FULL, LEVELS, NONE, OutputChoice
 from vftcli.signals.errors import ParameterError
 
 

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.choice import OutputChoice
+from vftcli.outputs import OutputChoice
 from vftcli.outputs.estimates import (
     estimates_table,
     write_estimate_folder,

@@ -7,8 +7,7 @@ import polars as pl
 import pytest
 
 from vftcli.analysis import Analysis
-from vftcli.outputs import report
-from vftcli.outputs.choice import NONE, OutputChoice
+from vftcli.outputs import NONE, OutputChoice, report
 from vftcli.outputs.estimates import write_estimate_folder
 from vftcli.outputs.files import digests
 from vftcli.outputs.report import (

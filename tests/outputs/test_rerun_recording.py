@@ -11,7 +11,7 @@ from rerun_rows import rows_of
 
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.choice import FULL, LEVELS
+from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.rerun_arm import NEWTON_PER_METRE, motion
 from vftcli.outputs.rerun_recording import (
     force_arrow,

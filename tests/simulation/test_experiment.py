@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 from vftcli.observers.paper import MomentumObserver
-from vftcli.outputs.simulation import save
+from vftcli.outputs.conversion import save
 from vftcli.robots import load_robot
 from vftcli.robots.chain import flange_jacobian
 from vftcli.robots.terms import dynamics_terms

@@ -7,7 +7,7 @@ import polars as pl
 import pyarrow.parquet as pq
 import pytest
 
-from vftcli.outputs.simulation import companions, save
+from vftcli.outputs.conversion import companions, save
 from vftcli.readers import read
 from vftcli.readers.references import read_reference
 from vftcli.robots import load_robot

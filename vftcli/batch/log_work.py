@@ -16,9 +16,9 @@ from vftcli.batch.cluster import begin
 from vftcli.doctor.examination import Examiner
 from vftcli.evaluation import WRENCH_SCHEMA
 from vftcli.observers.table import BEST
+from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.batch_folder import BatchFolder
 from vftcli.outputs.believability import grounds, health
-from vftcli.outputs.choice import PLAIN, OutputChoice
 from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, prepared
 from vftcli.readers.library import Library
 from vftcli.readers.references import refuse_estimates

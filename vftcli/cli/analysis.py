@@ -8,7 +8,7 @@ from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.observers.choice import ObserverChoice
-from vftcli.outputs.choice import OutputChoice
+from vftcli.outputs import OutputChoice
 from vftcli.readers.reader import ReadChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.robots.choice import RobotChoice

@@ -92,7 +92,7 @@ def simulate_log(
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
     from vftcli.cli.console import command_line, say, say_json, say_left_out, steps_of
-    from vftcli.outputs.simulation import free_path, log_folder, save
+    from vftcli.outputs.conversion import free_path, log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario

@@ -1,6 +1,7 @@
-"""Conversion: any log as a flat Parquet or CSV table or as an MCAP, and estimates as an MCAP.
+"""Logs as files: any as a flat table or an MCAP, a simulated one with its truth beside it.
 
-An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove. Topics of `estimates.mcap`:
+An MCAP holds ROS 2 messages, for PlotJuggler and Foxglove; estimates become one too. Topics of
+`estimates.mcap`:
 `/joint_states` (positions, velocities, measured drive torque as effort),
 `/vftcli/external/<observer>` and `/vftcli/external/reference` (external torque as effort), all
 sensor_msgs/JointState; `/vftcli/wrench/<observer>` and `/vftcli/wrench/reference`
@@ -13,16 +14,17 @@ underscores. All of it is CDR: a channel of JSON messages in a ros2 file ends ro
 import json
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.analysis import Analysis
 from vftcli.outputs.contacts import beginning, contact_name, contacts_record
-from vftcli.outputs.files import atomic, check_file, put_table, table_file
-from vftcli.outputs.run_record import jsonable
+from vftcli.outputs.files import SEAL, OutputFolder, atomic, check_file, put_table, table_file
+from vftcli.outputs.run_record import envelope, jsonable, seal
 from vftcli.readers.bags.ros_messages import (
     Value,
     in_parts,
@@ -36,6 +38,9 @@ from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import COLUMN_NAMES, JOINT_SIGNALS, Recording
+
+if TYPE_CHECKING:
+    from vftcli.simulation.experiment import Simulation
 
 JOINT_STATE, WRENCH = "sensor_msgs/JointState", "geometry_msgs/WrenchStamped"
 TEXT, LOG = "std_msgs/String", "foxglove_msgs/Log"
@@ -289,3 +294,73 @@ WRITERS: dict[str, Callable[[Recording, Path], None]] = {
     ".mcap": lambda log, path: write_topics(path, stamps_of(log), recorded_topics(log)),
     ".csv": write_csv,
 }
+
+
+def free_path(path: Path) -> Path:
+    """Path of a pair's free run: ``log.csv`` → ``log.free.csv``."""
+    return path.with_name(f"{path.stem}.free{path.suffix}")
+
+
+def companions(path: Path) -> tuple[Path, Path, Path]:
+    """The truth, the scenario and the record beside a log."""
+    return (
+        path.with_name(f"{path.name}.truth.parquet"),
+        path.with_name(f"{path.name}.scenario.toml"),
+        path.with_name(f"{path.name}.{SEAL}"),
+    )
+
+
+def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
+    """The folder of logs that stand beside one another, checked."""
+    names: list[str] = []
+    for path in paths:
+        if not path.name:
+            raise OutputError(f"{path} is a folder; give the name of a log file with -o")
+        # A bag is a folder: the files of the one that is there go when the new ones come.
+        inside = [file for file in path.rglob("*") if not file.is_dir()] if path.is_dir() else []
+        # A killed run may have left it without its metadata, or empty.
+        if any(file.suffix not in {".mcap", ".db3", ".yaml"} for file in inside):
+            raise OutputError(f"{path} is a folder and no bag; give another -o")
+        if not path.parent.is_dir():
+            raise OutputError(
+                f"{path.parent}: there is no such folder; make it, or give another -o"
+            )
+        if inside and not force:
+            raise OutputError(f"{path} exists; give another -o, or --force to overwrite it")
+        names += [
+            file.relative_to(path.parent).as_posix()
+            for file in (*(inside if path.is_dir() else [path]), *companions(path))
+        ]
+    folder = OutputFolder(path.parent, force, names)
+    folder.check()
+    return folder
+
+
+def save(
+    runs: "Mapping[Path, Simulation]", format: str = "", force: bool = False, command: str = ""
+) -> list[Path]:
+    """Write each log and its companions; return the paths of all files, of a bag its folder."""
+    from vftcli.simulation import writers
+    from vftcli.simulation.scenario import to_toml
+
+    formats = [writers.usual_format(run.scenario, run.robot, format) for run in runs.values()]
+    with log_folder(runs, force) as folder:
+        for (path, run), form in zip(runs.items(), formats, strict=True):
+            truth, scenario, record = (file.name for file in companions(path))
+            with table_file(folder / path.name) as file:
+                writers.WRITERS[form](file, run)
+            with table_file(folder / truth) as file:
+                writers.write_truth(file, run.truth, run.scenario.sensing.start)
+            folder.write(scenario, to_toml(replace(run.scenario, format=form), run.seed))
+            own = {truth, scenario, path.name}
+            files = {n: sha for n, sha in folder.digests().items() if n.partition("/")[0] in own}
+            # The scenario file says the rest.
+            about = {
+                "scenario": run.scenario.name,
+                "seed": run.seed,
+                "robot": run.scenario.robot,
+                "format": form,
+                "samples": len(run.measured.rows),
+            }
+            seal(folder, record, envelope(command, found=about), files)
+    return [file for path in runs for file in (path, *companions(path))]

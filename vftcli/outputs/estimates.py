@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vftcli.analysis import Analysis
-from vftcli.outputs.choice import PLAIN, OutputChoice
+from vftcli.outputs import PLAIN, OutputChoice
 from vftcli.outputs.examination import overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder, put_table, table_file
 from vftcli.outputs.run_record import run_record, seal

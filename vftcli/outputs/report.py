@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.analysis import Analysis
 from vftcli.evaluation.wrenches import JacobianJudgement
+from vftcli.outputs import NONE, PLAIN, OutputChoice
 from vftcli.outputs import error_tables as tables
-from vftcli.outputs.choice import NONE, PLAIN, OutputChoice
 from vftcli.outputs.contacts import contacts_csv, contacts_record
 from vftcli.outputs.error_tables import paper_bounds
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras

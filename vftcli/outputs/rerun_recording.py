@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.table import BEST
+from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
-from vftcli.outputs.choice import FULL, LEVELS
 from vftcli.outputs.contacts import beginning
 from vftcli.outputs.error_tables import DAGGER, paper_bounds, to_markdown
 from vftcli.outputs.grid import escape_markdown
