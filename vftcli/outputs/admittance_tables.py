@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Entry, Grid, csv_rows, keyed_grid, latex, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, csv_rows, keyed_grid, latex, terminal, words
 from vftcli.outputs.quantity import minus
 
 TITLE = "The same force through every controller"  #: Of the comparison.
@@ -143,7 +143,7 @@ def parameter_text(replay: Replay) -> str:
 def parameter_grid(replay: Replay) -> Grid:
     """Tables III and IV of the paper with the values used."""
     p = replay.parameters
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for k, axis in enumerate(AXES):
         force, speed = ("N", "m/s") if k < 3 else ("N·m", "rad/s")
         limit = float(np.broadcast_to(p.speed_limit, 6)[k])
@@ -164,7 +164,7 @@ def parameter_grid(replay: Replay) -> Grid:
 
 def stability_grid(replay: Replay) -> Grid:
     """The numbers that decide before anything moves: the worst of the axes of each kind."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     kinds = (("position", slice(0, 3), "m"), ("rotation", slice(3, 6), "rad"))
     for controller in replay.controllers:
         for axes, part, unit in kinds:

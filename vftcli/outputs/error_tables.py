@@ -17,9 +17,9 @@ from vftcli.evaluation.errors import POOLED, JointMeans, joint_means
 from vftcli.outputs.examination import refused_codes
 from vftcli.outputs.grid import (
     Column,
-    Entry,
     Grid,
     GridCell,
+    Rows,
     csv_rows,
     escape_markdown,
     joint_columns,
@@ -147,7 +147,7 @@ def block(rows: pl.DataFrame) -> Block:
 
 def rmse_grid(table: Block) -> Grid:
     """One recording's RMSE: observers down, joints and their mean across, the floor last."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for name, values, bests, floors in zip(
         table.observers, table.rmse, table.best, table.at_floor, strict=True
     ):
@@ -276,7 +276,7 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
         found: dict[str, dict[str, float | None]] = {}
         for name, axis, value in values.iter_rows():
             found.setdefault(name, {})[axis] = value
-        rows: list[Sequence[Entry]] = [(name, *map(own.get, AXES)) for name, own in found.items()]
+        rows: Rows = [(name, *map(own.get, AXES)) for name, own in found.items()]
         # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
         if reference == "sensor" and (limits := (bounds or {}).get(recording)):
             force, moment = limits

@@ -40,6 +40,7 @@ class GridCell(NamedTuple):
 
 
 Entry = GridCell | str | float | None
+Rows = list[Sequence[Entry]]  #: Rows of a table while it is filled.
 
 
 class Column(NamedTuple):

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.quantity import significant
 from vftcli.signals.wrench import AXES, unit_of
 
@@ -49,7 +49,7 @@ def robots_grid(robots: "Iterable[Robot]", maker: str = "") -> Grid:
 def joints_grid(robot: "Robot") -> Grid:
     """One robot joint by joint: masses, drives, limits, friction; units in the first row."""
     chain, constants = robot.chain, robot.torque_constant
-    rows: list[Sequence[Entry]] = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
+    rows: Rows = [("", "kg", "kg·m²", "N·m/A", "N·m", "")]
     for j, joint in enumerate(chain.names):
         table = robot.friction[j].table if robot.friction else {}
         friction = "none"
@@ -76,7 +76,7 @@ def joints_grid(robot: "Robot") -> Grid:
 
 def tuned_grid(tuned: "Sequence[Tuned]", with_alarms: bool) -> Grid:
     """Gains that were found for each observer and what to expect of them, joint by joint."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for line in tuned:
         values = {
             "ω [rad/s]": line.rate,
@@ -132,7 +132,7 @@ def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
     title, width = ("Zero drift; the first span's is removed", 0) if spans else ("", 9)
     axes = (Column(axis, unit_of(axis) if spans else "", ".5f", width=width) for axis in AXES)
     columns = *words("observer"), *[Column("span [s]")] * spans, *axes
-    rows: list[Sequence[Entry]] = [
+    rows: Rows = [
         (d.name, *[f"{d.span[0]:g}–{d.span[1]:g}"] * spans, *map(float, d.mean)) for d in drifts
     ]
     return Grid(columns, rows, title, swatches=True)
@@ -140,7 +140,7 @@ def drift_grid(drifts: "Iterable[Drift]", spans: bool = False) -> Grid:
 
 def pairs_text(table: "pl.DataFrame") -> str:
     """The paired differences of all logs, as a terminal table."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for row in table.iter_rows(named=True):
         names, low, high = (row["observer"], row["other"]), row["low_Nm"], row["high_Nm"]
         # First RMSE less second: above zero the second observer is the better.
@@ -160,7 +160,7 @@ def pairs_text(table: "pl.DataFrame") -> str:
 
 def print_text(found: "Comparison") -> str:
     """A printed table beside one's own: two lines an observer, and why they differ."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for name in found.names:
         rows.append((f"{name}, printed", *(f"{v:.4f}" for v in found.printed(name))))
         rows.append((f"{name}, here", *map(float, found.ours[name])))

@@ -14,7 +14,7 @@ from vftcli.identification.fitting import Identification, Trace
 from vftcli.outputs.charts import SPARE, Chart, ChartLine, Span, families_of
 from vftcli.outputs.examination import health_record, overridden_lines
 from vftcli.outputs.files import SEAL, OutputFolder
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, keyed_grid, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, keyed_grid, terminal, words
 from vftcli.outputs.page.log_charts import joint_panels
 from vftcli.outputs.page.shell import Box, Scales, page, polyline
 from vftcli.outputs.paper import (
@@ -219,7 +219,7 @@ def residual_grid(found: Identification) -> Grid:
     """RMS of measured less predicted torque, a row for each log, role and model. [N·m]"""
     # The place in the command distinguishes two logs of one label.
     keys = ("log_index", "log", "role", "model")
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
         values = part["rms_Nm"].to_list()
         rows.append((", ".join(map(str, names)), *values, sum(values) / len(values)))

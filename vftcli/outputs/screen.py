@@ -27,7 +27,7 @@ from vftcli.outputs.believability import (
 from vftcli.outputs.contacts import MOST_ROWS, answer, contact_grid, hardest_rows, otherwise
 from vftcli.outputs.error_tables import Block, blocks
 from vftcli.outputs.examination import rate_of, refused_codes
-from vftcli.outputs.grid import Column, Entry, Grid, GridCell, terminal
+from vftcli.outputs.grid import Column, Grid, GridCell, Rows, terminal
 from vftcli.outputs.grids import contact_grids
 from vftcli.outputs.quantity import DASH, at_least_shown, percent, significant
 from vftcli.signals.arrays import Array
@@ -312,7 +312,7 @@ def log_table(
         said = canvas.shown(f"{MARKS[standing]} {text}")
         return GridCell("", mark=canvas.painted(said, standing))
 
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for analysis, all_grounds in found:
         summary, listed, rest = log_line(analysis, all_grounds), analysis.contacts, DASH
         if listed is not None and listed.detectable_force is not None and listed.tells_untouched:

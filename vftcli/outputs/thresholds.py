@@ -6,7 +6,7 @@ from typing import Any
 
 from vftcli.contacts.threshold_check import CountedAlarms, ThresholdDetection
 from vftcli.contacts.thresholds import SignalThreshold, Thresholds
-from vftcli.outputs.grid import Column, Entry, Grid, joint_columns, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, joint_columns, terminal, words
 from vftcli.outputs.quantity import DASH, counted, significant
 from vftcli.robots.robot_file import lines_of
 
@@ -28,7 +28,7 @@ def thresholds_text(
 
 def thresholds_grid(thresholds: Thresholds) -> Grid:
     """Every threshold with its interval, and the tail it comes from."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for name, unit, level, one in thresholds.named:
         span, t = DASH.join(map(significant, one.interval)), one.tail
         tail = (None,) * 4 if t is None else (t.start, t.rate, str(t.size), t.hours)
@@ -52,7 +52,7 @@ def left_out_grid(counted: Sequence[CountedAlarms]) -> Grid:
     joints = joint_columns(len(counted[0].joints))
     any_of = (Column("any joint"), *joints, Column("any axis"))
     columns = *words("log"), Column("", "h"), Column("due"), *any_of
-    rows: list[Sequence[Entry]] = [
+    rows: Rows = [
         (one.log, one.hours, one.due, *map(str, (one.any_joint, *one.joints, one.any_axis)))
         for one in counted
     ]

@@ -18,7 +18,7 @@ from vftcli.evaluation.published import Comparison, advice, facts
 from vftcli.observers.table import OBSERVERS
 from vftcli.outputs.charts import Span, thinned
 from vftcli.outputs.contacts import by_force
-from vftcli.outputs.grid import Column, Entry, Grid, GridCell, joint_columns, keyed_grid, words
+from vftcli.outputs.grid import Column, Grid, GridCell, Rows, joint_columns, keyed_grid, words
 from vftcli.outputs.page.shell import Box, Scales, part, path_of, ribbon
 from vftcli.outputs.quantity import DASH, banded, signed, significant, vector
 from vftcli.outputs.run_record import observer_record
@@ -207,8 +207,8 @@ def contact_details(found: ContactList) -> tuple[Grid, ...]:
     """Moments, impulses, evidence and joint torques of every contact."""
     if not found.contacts:
         return ()
-    wrenches: list[Sequence[Entry]] = []
-    torques: list[Sequence[Entry]] = []
+    wrenches: Rows = []
+    torques: Rows = []
     for c in found.contacts:
         vectors: list[Array | None] = [None] * 4
         if c.wrench is not None and c.wrench_sd is not None:
@@ -275,12 +275,12 @@ def bias_grid(table: pl.DataFrame) -> Grid:
 
 def observers_view(analysis: Analysis) -> dict[str, Any]:
     """What each observer's parameters are and mean."""
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     used = {}
     for observer in analysis.observers:
         name, tuning = observer.name, analysis.tunings.get(observer.name)
         what = OBSERVERS[name].title if name in OBSERVERS else ""
-        meant: list[Entry] = [None] * 5
+        meant: list[Any] = [None] * 5
         if tuning is not None:
             columns = (tuning.omega_n, tuning.zeta, 1e3 * tuning.delay, tuning.bandwidth)
             meant = [GridCell("", html=joint_values(column)) for column in columns]
@@ -311,7 +311,7 @@ def selection_guide(analysis: Analysis) -> tuple[Grid, ...]:
         return ()
     advised = [(a.purpose, a.criterion, ", ".join(a.best) or DASH, a.paper) for a in advice(found)]
     heads = words("For", "what decides", "best here", "the paper advises")
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for f in found:
         numbers = map(float, (1e3 * f.response, 1e3 * f.delay, f.noise, f.passed, f.rmse))
         rows.append((f.name, *numbers, f.parameter_count))
@@ -327,7 +327,7 @@ def beside_print(comparison: Comparison) -> Grid:
     columns = list(words("observer"))
     for j in range(1, len(comparison.floor) + 1):
         columns += (Column(f"J{j} print", form=".2f"), Column("here"))
-    rows: list[Sequence[Entry]] = []
+    rows: Rows = []
     for name in comparison.names:
         both = np.column_stack([comparison.printed(name), comparison.ours[name]])
         rows.append((name, *both.ravel().tolist()))
@@ -336,7 +336,7 @@ def beside_print(comparison: Comparison) -> Grid:
 
 def budget_grid(budgets: Sequence[Budget]) -> Grid:
     """Where every observer's error comes from, cause by cause. [N·m]"""
-    rows: list[Sequence[Entry]] = [
+    rows: Rows = [
         (budget.name, cause, *map(float, values))
         for budget in budgets
         # Stiction at rest is a bound, not a cause that adds up: the sum leaves it out.
