@@ -284,7 +284,7 @@ def replay_figures(replay: Replay, run: ClosedLoop | None = None) -> dict[str, D
         columns = min(len(shown), 3 if width > NARROW else 2)
         drawn = [force, deviation] if np.any(replay.wrench) else [deviation]
         plots = []
-        # The plots of an axis stand below one another.
+        # The plots of an axis are below one another.
         for k in range(0, len(shown), columns):
             for chart in drawn:
                 plots += plots_of(chart, only=shown[k : k + columns])

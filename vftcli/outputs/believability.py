@@ -216,13 +216,13 @@ def clock_ground(recording: Recording) -> Ground:
     t, steps = recording.t, np.diff(recording.t)
     longest, at = (steps.max(), t[np.argmax(steps)]) if len(steps) else (0.0, 0.0)
     gaps = int(np.count_nonzero(steps > 0.1))
-    told = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
-    odd = gaps > 0 or any(remark.level != "fact" for remark in told)
+    remarks = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
+    odd = gaps > 0 or any(remark.level != "fact" for remark in remarks)
     words = f"no gap above {1e3 * longest:.0f} ms"
     if gaps:
         words = f"{counted(gaps, 'gap')}, the longest {longest:.2g} s at {at:.1f} s"
-    more = f", and {len(told) - 1} more" if len(told) > 1 else ""
-    words += f"; {sentence(told[0])}{more}" if told else ", nothing repaired"
+    more = f", and {len(remarks) - 1} more" if len(remarks) > 1 else ""
+    words += f"; {sentence(remarks[0])}{more}" if remarks else ", nothing repaired"
     remedy = command("inspect", recording) if odd else None
     return Ground("caution" if odd else "good", "clock", words, remedy)
 
@@ -231,9 +231,10 @@ def list_grounds(analysis: Analysis) -> Iterator[Ground]:
     """Grounds of the list of contacts."""
     found, subject = analysis.contacts, "free motion"
     if found is None:
-        told = [r for r in analysis.remarks if r.code == "contacts-not-told"]
-        if told:
-            yield Ground("unknown", "contacts", sentence(told[0]))
+        for remark in analysis.remarks:
+            if remark.code == "contacts-not-told":
+                yield Ground("unknown", "contacts", sentence(remark))
+                break
         return
     options = ("--robot", robot_option(analysis), "--free", "free.csv")
     remedy = command("contacts", analysis.recording, *options)

@@ -220,7 +220,7 @@ def contact_name(contact: Contact) -> str:
 
 
 def contacts_record(found: ContactList) -> dict[str, Any]:
-    """A log's contacts for machines; units stand in the names."""
+    """A log's contacts for machines, units in the names."""
     model = found.model
     return {
         "recording": found.recording,

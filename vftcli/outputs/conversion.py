@@ -311,7 +311,7 @@ def companions(path: Path) -> tuple[Path, Path, Path]:
 
 
 def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
-    """The folder of logs that stand beside one another, checked."""
+    """The checked folder of logs that are beside one another."""
     names: list[str] = []
     for path in paths:
         if not path.name:

@@ -1,7 +1,6 @@
 """Errors of torques and wrenches as tables for people, and as tidy rows for machines.
 
-Observers stand below one another, joints or axes beside one another; forces are in newtons, moments
-in newton-metres.
+A row is an observer, a column a joint or an axis; forces are in newtons, moments in newton-metres.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -190,7 +190,7 @@ def numbers_of(contacts: ContactList | None) -> dict[int, float]:
 def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    Empty where no joint has an error, or where more than `MOST` logs have no rows that stand for
+    Empty where no joint has an error, or where more than `MOST` logs have no rows for
     all of them.
     """
     from vftcli.evaluation.errors import POOLED

@@ -335,7 +335,7 @@ def is_read(path: Path, given: Path) -> bool:
             files = [file for file in given.iterdir() if file.is_file()]
             inside = path.resolve().is_relative_to(given.resolve())
             if inside or any(path.samefile(file) for file in files):
-                # A report may stand in the folder of its own log.
+                # A report may be in the folder of its own log.
                 return not is_seal(path) and path not in sealed_files(path.with_name(SEAL))
     return False
 

@@ -51,7 +51,7 @@ class Column(NamedTuple):
     unit: str = ""
     #: How a float is printed: a format as ``.3f``, or a function.
     form: str | Callable[[float], str] = significant
-    #: Whether it holds words, which stand to the left; numbers stand to the right.
+    #: Whether it holds words, which are at the left; numbers are at the right.
     words: bool = False
     width: int = 0  #: Least width on the terminal.
     symbol: str = ""  #: The heading in LaTeX where it is a formula.
@@ -86,7 +86,7 @@ class Grid:
     quantity: str = ""  #: What all of its numbers are, as RMSE, where they are one thing.
     unit: str = ""  #: Their unit, where it is one.
     summaries: int = 0  #: How many rows at the end sum up those above, below a rule.
-    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that digits stand
+    #: Whether numbers may bear a mark: the terminal then keeps a place for it, so that digits are
     #: below digits.
     marked: bool = False
     notes: tuple[str, ...] = ()  #: Lines on what the marks mean, footnotes in LaTeX.
@@ -172,7 +172,7 @@ def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = Fal
     for k, (column, height) in enumerate(zip(grid.columns, heights, strict=True)):
         texts = [""] * (high - height) + columns[k]
         wide = max(column.width, *map(len, texts))
-        # Words stand to the left of their columns, numbers to the right.
+        # Words are at the left of their columns, numbers at the right.
         columns[k] = [text.ljust(wide) if column.words else text.rjust(wide) for text in texts]
     lines = ["  ".join(texts).rstrip() for texts in zip(*columns, strict=True)]
     lines = lines[high:] if not any(lines[:high]) else lines
@@ -195,7 +195,7 @@ def markdown(grid: Grid) -> str:
 def latex(*grids: Grid) -> str:
     r"""Tables of equal columns as one ``table``, or ``table*``, of the package booktabs.
 
-    Caption, label and footnotes stand inside; decimal points stand below one another without a
+    Caption, label and footnotes are inside; decimal points are below one another without a
     further package. Of several grids each has its title above its rows.
     """
     first = grids[0]

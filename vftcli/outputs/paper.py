@@ -69,13 +69,13 @@ MARKS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "*")
 #: second is left out. [in]
 DIGIT, BETWEEN = 0.046, 0.02
 SPREAD = 0.66  #: Share of a joint's room that its dots take.
-RANGE = 10.0  #: Numbers that differ by more than this factor stand on a logarithmic axis.
+RANGE = 10.0  #: Numbers that differ by more than this factor have a logarithmic axis.
 PLOTTED = 0.75  #: About which share of a plot's room its axes take.
 AXES = {"s": "Time (s)", "Hz": "Frequency (Hz)"}  #: Unit of a horizontal axis → what it is called.
 
 Look = dict[str, Any]  #: What matplotlib draws with.
 BAND_LOOK: Look = {"color": "black", "linewidth": 0.6, "linestyle": (0, (1.0, 2.0))}
-#: Where the number of a contact stands above a plot.
+#: Where the number of a contact is, above a plot.
 ABOVE: Look = {
     "xycoords": ("data", "axes fraction"), "xytext": (0, 1), "textcoords": "offset points",
     "ha": "center", "va": "bottom", "fontsize": 6.5,
@@ -195,7 +195,7 @@ def line_figure(
 ) -> "Figure":
     """Plots row by row under one legend, in this width. [in]
 
-    Above the first row stand numbers at their times [s]; a name has a mark in each plot, across and
+    Above the first row are numbers at their times [s]; a name has a mark in each plot, across and
     up, 2 × (n,). `columns` plots are beside one another, None for what fits; `below` is the name of
     the horizontal axis, None for what its unit says.
     """
@@ -322,12 +322,12 @@ def legend_handles(plots: Sequence[Plot], marks: Sequence[str]) -> dict[str, Any
 def write_numbers(axes: "Axes", numbers: Mapping[int, float], inches: float) -> None:
     """Numbers of contacts above a plot of about this width, as far as they have room."""
     start, stop = axes.get_xlim()
-    taken = -np.inf
+    end = -np.inf
     for number, at in numbers.items():
         half = 0.5 * DIGIT * len(str(number)) * (stop - start) / inches
-        if at - half >= taken:
+        if at - half >= end:
             axes.annotate(str(number), (at, 1.0), **ABOVE)
-            taken = at + half + BETWEEN * (stop - start) / inches
+            end = at + half + BETWEEN * (stop - start) / inches
 
 
 class DotPlot(NamedTuple):

@@ -41,7 +41,7 @@ def at_least_shown(force: float) -> str:
 
 
 def ranged(low: float, high: float, unit: str = " N") -> str:
-    """Between which forces something lies. [N]"""
+    """The smallest and the largest of some forces. [N]"""
     return f"{low:.0f}–{high:.0f}{unit}"
 
 

@@ -104,7 +104,7 @@ def send_arm(
     for j, shapes in enumerate(capsules(chain)):
         link = f"{ROBOT}/link_{j}" if j else f"{ROBOT}/base"
         if shapes:
-            # Rerun's own capsules lie along z from one end.
+            # Rerun's own capsules are along z from one end.
             turns = np.array([rotation_onto(shape.direction) for shape in shapes])
             batch = rr.Capsules3D(
                 lengths=[np.linalg.norm(shape.direction) for shape in shapes],

@@ -57,7 +57,7 @@ STRETCHES = 5000
 AROUND = 1.0  #: Time before and after the start of a contact in which every sample is kept. [s]
 WHOLE_TIME = 20.0  #: Time of which every sample is kept, all contacts together. [s]
 DOUBT = " (the joint rests: do not trust the reference)"  #: What a dagger says in a plot's title.
-BELOW = 0.06  #: The spans of the contacts lie below zero by this share of the largest force.
+BELOW = 0.06  #: The spans of the contacts are this share of the largest force below zero.
 BAND = "#e98aa2"  #: The band of |F|: the colour of `best`, paler.
 
 
@@ -295,7 +295,7 @@ def force_arrow(
     """The force of the virtual sensor at the drawn poses, None for an arm of less than six joints.
 
     It is that of the wrench that was asked for, its zero removed, as the tables have it; where none
-    was asked for, that of the estimate as it stands, at the flange. The drawn poses are those of
+    was asked for, that of the estimate as it is, at the flange. The drawn poses are those of
     the log's samples `sampled`. (S,)
     """
     source, chain = force_source(analysis), analysis.robot.chain

@@ -85,7 +85,7 @@ def envelope(
 
     Args:
         command: The command line.
-        logs: An entry a log (`log_entry`); of one log its keys stand at the top too.
+        logs: An entry a log (`log_entry`); of one log its keys are at the top too.
         remarks: What a reader of the numbers should know.
         found: The result; a table is its `rows`.
     """

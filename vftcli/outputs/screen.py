@@ -251,10 +251,10 @@ def against(block: Block, analysis: Analysis) -> str:
     if others:
         low, high = min(value for _, value in others), max(value for _, value in others)
         paper = any(remark.code in MEASURED for remark in analysis.remarks)
-        whose = "the paper's gains" if paper else "the others"
+        group = "the paper's gains" if paper else "the others"
         size = significant(low, 2)
         size += f"–{significant(high, 2)}" if significant(high, 2) != size else ""
-        text += f"; {whose} {size}"
+        text += f"; {group} {size}"
     return f"{text} → --details"
 
 

@@ -1,6 +1,6 @@
 """The templates of every page, their parts as functions, and what page and script draw.
 
-Charts that stand still are SVG: here is where values lie, with ticks and the text of paths.
+Charts without a script are SVG: here is where values are drawn, with ticks and the text of paths.
 """
 
 import base64
@@ -209,7 +209,7 @@ class Scales(NamedTuple):
         return places
 
     def near(self, y: Array) -> Array:
-        """Vertical places; what lies far outside of the chart is drawn just outside of it."""
+        """Vertical places; what is far outside of the chart is drawn just outside of it."""
         height = self.y.high - self.y.low
         return self.up(np.clip(y, self.y.low - height, self.y.high + height))
 
@@ -282,7 +282,7 @@ def polyline(points: Array) -> str:
 
 
 def ribbon(scales: Scales, t: Array, low: Array, high: Array) -> str:
-    """What lies between two lines as a path, broken where either is not known."""
+    """The area between two lines as a path, broken where either is not known."""
     x, path = scales.across(t), ""
     above, below = (np.column_stack([x, scales.near(edge)]) for edge in (high, low))
     for start, stop in runs_of(np.isfinite(low) & np.isfinite(high)):
