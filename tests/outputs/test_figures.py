@@ -12,8 +12,6 @@ from vftcli.outputs.figures import (
     MOST,
     error_figures,
     log_figures,
-    torque_drawing,
-    wrench_drawing,
 )
 from vftcli.outputs.paper import WIDTHS, paper_style
 
@@ -52,20 +50,20 @@ def test_every_axis_of_every_figure_has_its_unit(pushed: Analysis) -> None:
 
 @pytest.mark.slow
 def test_torque_shows_best_with_its_band_or_all_or_the_chosen(pushed: Analysis) -> None:
-    shown = names_in(drawn(torque_drawing(pushed)))
+    shown = names_in(drawn(log_figures(pushed)["torque"]))
     assert "reference (two-cycle)" in shown
     assert {"best", "95 % band", "contact"} <= set(shown)
     assert not {"fdo", "gmo"} & set(shown)
     others = tuple(e for e in pushed.estimates if e.name in {"fdo", "gmo"})
     without = replace(pushed, estimates=others)
-    two = names_in(drawn(torque_drawing(without)))
+    two = names_in(drawn(log_figures(without)["torque"]))
     assert {"fdo", "gmo"} <= set(two)
     assert not {"best", "95 % band"} & set(two)
 
 
 @pytest.mark.slow
 def test_forces_stand_above_moments_or_beside_them(pushed: Analysis) -> None:
-    drawing = wrench_drawing(pushed)
+    drawing = log_figures(pushed)["wrench"]
     heads = {w: [a.get_ylabel()[:2] for a in drawn(drawing, w).axes] for w in WIDTHS}
     assert heads["double"] == ["fx", "fy", "fz", "mx", "my", "mz"]
     assert heads["single"] == ["fx", "mx", "fy", "my", "fz", "mz"]
@@ -78,7 +76,7 @@ def test_a_log_without_wrench_and_errors_has_no_figures_of_them(
 
     bare = replace(without_reference, virtual_sensor=None)
     assert "errors" not in log_figures(bare)
-    assert wrench_drawing(bare) is None
+    assert "wrench" not in log_figures(bare)
 
 
 def test_errors_are_drawn_as_the_table_has_them(pushed: Analysis) -> None:

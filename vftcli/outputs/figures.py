@@ -60,11 +60,23 @@ BROKEN = ("1.5 2", "8 2 1.5 2", "4 2", "8 2 1.5 2 1.5 2", "12 4", "")
 
 def log_figures(analysis: Analysis) -> dict[str, Drawing]:
     """Every figure that a log has something to show in."""
-    found = {"torque": torque_drawing(analysis)}
+    name, numbers = analysis.recording.name, numbers_of(analysis.contacts)
+    plots = plots_of(drawn_lines(analysis, torque_chart(analysis)))
+    title = f"{name}: external torque on the robot about each joint's axis"
+    found = {"torque": Drawing(title, partial(line_figure, plots=plots, numbers=numbers))}
     if analysis.errors is not None:
         found |= error_figures(analysis.errors)
-    if (drawn := wrench_drawing(analysis)) is not None:
-        found["wrench"] = drawn
+    if (wrench := wrench_chart(analysis)) is not None:
+        axes = drawn_lines(analysis, wrench)
+        found["wrench"] = Drawing(
+            f"{name}: force and moment on the robot, {wrench.title}",
+            # Forces above moments, or in one column's width beside them.
+            lambda width: line_figure(
+                width,
+                plots_of(axes, only=range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)),
+                numbers=numbers,
+            ),
+        )
     if (refined := analysis.refinement) is not None:
         if (spectra := refined.baselines.plain.spectra) is not None:
             # The |H| of one observer: those of all are a figure of their own.
@@ -72,11 +84,13 @@ def log_figures(analysis: Analysis) -> dict[str, Drawing]:
             found["spectra"] = spectra_drawing(spectra, {lead.name: lead})
         if refined.curves:
             found["tuning"] = tuning_drawing(refined.curves)
-    plots = [plot for chart in response_charts(analysis) for plot in plots_of(chart)]
+    responses = [plot for chart in response_charts(analysis) for plot in plots_of(chart)]
     found["responses"] = Drawing(
         "Gain, phase and delay of the observers, joint 1",
         # One below the other in one column, side by side in two.
-        lambda width: line_figure(width, plots, columns=len(plots) if width > NARROW else 1),
+        lambda width: line_figure(
+            width, responses, columns=len(responses) if width > NARROW else 1
+        ),
     )
     return found
 
@@ -134,31 +148,6 @@ def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "F
     return on_paper(partial(line_figure, plots=plots_of(chart), numbers=numbers_of(found)))
 
 
-def torque_drawing(analysis: Analysis) -> Drawing:
-    """External torque with the reference."""
-    chart = drawn_lines(analysis, torque_chart(analysis))
-    return Drawing(
-        f"{analysis.recording.name}: external torque on the robot about each joint's axis",
-        partial(line_figure, plots=plots_of(chart), numbers=numbers_of(analysis.contacts)),
-    )
-
-
-def wrench_drawing(analysis: Analysis) -> Drawing | None:
-    """The wrench axis by axis with the contacts, None without one."""
-    chart = wrench_chart(analysis)
-    if chart is None:
-        return None
-    chart, numbers = drawn_lines(analysis, chart), numbers_of(analysis.contacts)
-
-    def draw(width: float) -> "Figure":
-        """Forces above moments, or in one column's width beside them."""
-        order = range(6) if width > NARROW else (0, 3, 1, 4, 2, 5)
-        return line_figure(width, plots_of(chart, only=order), numbers=numbers)
-
-    title = f"{analysis.recording.name}: force and moment on the robot, {chart.title}"
-    return Drawing(title, draw)
-
-
 def drawn_lines(analysis: Analysis, chart: Chart, names: Sequence[str] = ()) -> Chart:
     """The chart with the lines of these observers and the reference; a band only of one alone."""
     estimated = [line.name for line in analysis.estimates]
@@ -190,31 +179,28 @@ def numbers_of(contacts: ContactList | None) -> dict[int, float]:
 def error_figures(errors: "pl.DataFrame") -> dict[str, Drawing]:
     """RMSE with its interval, joint by joint and observer by observer, a plot a log.
 
-    Empty where no joint has an error, or where more than `MOST` logs have no rows for
-    all of them.
+    Empty where no joint has an error, or where more than `MOST` logs have no rows for all of them.
     """
+    import polars as pl
+
     from vftcli.evaluation.errors import POOLED
 
     groups = list(logs_of(errors, "joint"))
     if len(groups) > MOST:
         groups = [rows for rows in groups if rows["recording"][0] == POOLED]
-    plots = [error_plot(rows) for rows in groups]
-    if not 0 < len(plots) <= MOST:
+    if not 0 < len(groups) <= MOST:
         return {}
-    paints = colours_of_names(list(dict.fromkeys(row[0] for plot in plots for row in plot.rows)))
-    title = "RMSE of the external torque with its 95 % interval"
+    plots, names = [], list[str]()
+    for rows in groups:
+        found, ends = block(rows), ("rmse_low_Nm", "rmse_high_Nm")
+        intervals = (block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ends)
+        dots = zip(found.observers, found.rmse, np.stack([*intervals], axis=1), strict=True)
+        title = f"{found.recording}, {found.reference}"
+        plots.append(DotPlot(title, found.joint_heads, list(dots), found.floor))
+        names += found.observers
+    paints = colours_of_names(list(dict.fromkeys(names)))
     draw = partial(dot_figure, plots=plots, paints=paints, label="RMSE (N·m)")
-    return {"errors": Drawing(title, draw)}
-
-
-def error_plot(rows: "pl.DataFrame") -> DotPlot:
-    """The rows of one log and reference as dots."""
-    import polars as pl
-
-    found, ends = block(rows), ("rmse_low_Nm", "rmse_high_Nm")
-    intervals = np.stack([block(rows.with_columns(rmse_Nm=pl.col(end))).rmse for end in ends], 1)
-    dots = list(zip(found.observers, found.rmse, intervals, strict=True))
-    return DotPlot(f"{found.recording}, {found.reference}", found.joint_heads, dots, found.floor)
+    return {"errors": Drawing("RMSE of the external torque with its 95 % interval", draw)}
 
 
 def spectra_drawing(spectra: Spectra, observers: Mapping[str, Observer]) -> Drawing:

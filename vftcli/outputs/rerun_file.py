@@ -91,7 +91,7 @@ def rerun_file(
     )
     # Into memory: Rerun writes a file in a thread, which on a full disk stops and is waited for.
     made = stream.memory_recording()
-    shown = blueprint(tabs, words, arm_view(poses, space), marked)
+    shown = blueprint(tabs, words, poses, space, marked)
     stream.send_blueprint(shown, make_active=False, make_default=True)
     stream.send_recording_name(drawable(title))
     for tab in tabs:
@@ -134,17 +134,32 @@ def recording_id(title: str, tabs: Sequence[Tab], words: Mapping[str, str]) -> U
 def blueprint(
     tabs: Sequence[Tab],
     words: Mapping[str, str],
-    space: rrb.Spatial3DView,
+    poses: ArmPoses,
+    space: str,
     marked: tuple[float, float] | None,
 ) -> rrb.Blueprint:
     """How the recording opens: the arm's space and words to the left, plots to the right, paused.
 
+    The eye sees the base and all places where the links have been.
+
     Rerun lets no file say where its time cursor stands: it opens at the first sample. The marked
     span is visible in the time panel, and a click on a time of the text log goes there.
     """
+    corners = poses.translation.reshape(-1, 3)
+    # The base at the origin must be visible too.
+    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
+    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
+    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
+    arm = rrb.Spatial3DView(
+        origin=ROBOT,
+        contents=[f"{ROBOT}/**", f"{CONTACTS}/**"],
+        name=space,
+        eye_controls=rrb.EyeControls3D(position=eye.tolist(), look_target=centre.tolist()),
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
+    )
     documents = [rrb.TextDocumentView(origin=f"/{name.lower()}", name=name) for name in words]
     said = rrb.Tabs(*documents, active_tab=0) if len(documents) > 1 else documents[0]
-    left = rrb.Vertical(space, said, row_shares=[3, 2])
+    left = rrb.Vertical(arm, said, row_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Horizontal(left, rrb.Tabs(*map(grid_of, tabs), active_tab=0), column_shares=[2, 5]),
         time_panel(marked),
@@ -163,22 +178,6 @@ def time_panel(marked: tuple[float, float] | None) -> rrb.TimePanel:
         first, last = (round(1e9 * end) for end in marked)
         span = {"time_selection": rrb.components.AbsoluteTimeRange(min=first, max=last)}
     return rrb.TimePanel(timeline="t", state="collapsed", play_state="paused", **span)
-
-
-def arm_view(poses: ArmPoses, name: str) -> rrb.Spatial3DView:
-    """The space with an eye that sees the base and all places where the links have been."""
-    corners = poses.translation.reshape(-1, 3)
-    # The base at the origin must be visible too.
-    low, high = np.minimum(corners.min(axis=0), 0.0), np.maximum(corners.max(axis=0), 0.0)
-    centre, radius = 0.5 * (low + high), 0.5 * float(np.linalg.norm(high - low))
-    eye = centre + 2.3 * radius * np.array([0.62, -0.66, 0.42])
-    return rrb.Spatial3DView(
-        origin=ROBOT,
-        contents=[f"{ROBOT}/**", f"{CONTACTS}/**"],
-        name=name,
-        eye_controls=rrb.EyeControls3D(position=eye.tolist(), look_target=centre.tolist()),
-        line_grid=rrb.LineGrid3D(visible=True, spacing=0.1),
-    )
 
 
 def grid_of(tab: Tab) -> rrb.Grid | rrb.Vertical:
