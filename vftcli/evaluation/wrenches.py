@@ -150,7 +150,7 @@ def judge_jacobian(
             f"{SENSOR} alone: --reference {SENSOR}"
         )
     parts = decompose(log.jacobian)
-    sigma, loose = parts.sigma_min, null_space(parts, log.tau_ext)
+    sigma, loose = parts.sigma_min, null_space(parts, log.tau_ext[:, :, None])[:, :, 0]
     wrench = Wrench(
         name=VENDOR,
         t=log.t,

@@ -79,28 +79,42 @@ def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
     return gain
 
 
-def pinv(parts: Decomposition, sd: Array) -> Solution:
-    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0."""
-    gain = least_squares_gain(parts)
-    return Solution(gain, gain * sd[:, None, :])
+#: Standard deviations of joint torques (T, n) [N·m] → the estimate for them.
+Solver = Callable[[Array], Solution]
 
 
-def maximum_a_posteriori(parts: Decomposition, sd: Array) -> Solution:
+def pinv(parts: Decomposition, X: Array) -> Solver:
+    """Least squares (46), the pseudo-inverse of Jᵀ: unbiased, and unbounded as σ_min → 0.
+
+    Its covariance is that of the torque, seen through it.
+    """
+    gain = X @ least_squares_gain(parts)
+    return lambda sd: Solution(gain, gain * sd[:, None, :])
+
+
+def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
     """The most probable wrench under a normal prior of 50 N and 10 N·m about zero.
 
     w = C J Σ⁻¹τ with C = (J Σ⁻¹ Jᵀ + P⁻¹)⁻¹, its covariance: next to the least squares where the
     pose is good, and next to the prior where the pose cannot tell.
     """
-    weighted = parts.scaled / sd[:, None, :]
-    information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(PRIOR**-2)
-    root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
-    C = np.swapaxes(root, 1, 2) @ root
-    gain = SCALE[:, None] * (C @ (weighted / sd[:, None, :]))
-    return Solution(gain, SCALE[:, None] * np.swapaxes(root, 1, 2))
+
+    def solve(sd: Array) -> Solution:
+        weighted = parts.scaled / sd[:, None, :]
+        information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(PRIOR**-2)
+        root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
+        C = np.swapaxes(root, 1, 2) @ root
+        scaled = X * SCALE
+        return Solution(
+            scaled @ (C @ (weighted / sd[:, None, :])), scaled @ np.swapaxes(root, 1, 2)
+        )
+
+    return solve
 
 
-#: Name at the command line → what turns a decomposed Jacobian and torque sd (T, n) into A and B.
-SOLVERS: dict[str, Callable[[Decomposition, Array], Solution]] = {
+#: Name at the command line → what solves for the wrenches of poses, given their Jacobian, and X
+#: (T, 6, 6) that takes a wrench in base axes to the frame asked for.
+SOLVERS: dict[str, Callable[[Decomposition, Array], Solver]] = {
     "pinv": pinv,
     "map": maximum_a_posteriori,
 }
@@ -108,7 +122,7 @@ LEAST_SQUARES = "pinv"  #: The solver where none is asked for.
 
 
 def null_space(parts: Decomposition, tau: Array) -> Array:
-    """(I − Jᵀpinv(Jᵀ))τ: the torque that no wrench at the flange explains. (T, n) [N·m]
+    """(I − Jᵀpinv(Jᵀ))τ: the torque of τ (T, n, K) that no wrench at the flange explains. [N·m]
 
     A wrench at the flange leaves it unchanged; a contact further down the arm, or an error of the
     model, does not. Singular directions count as explained by nothing.
@@ -116,9 +130,7 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
     # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
     tall = np.swapaxes(parts.scaled, 1, 2) @ parts.U
     share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
-    along = np.squeeze(np.swapaxes(tall, 1, 2) @ tau[:, :, None], axis=2)
-    explained = np.squeeze(tall @ (share * along)[:, :, None], axis=2)
-    return np.asarray(tau - explained)
+    return np.asarray(tau - tall @ (share[:, :, None] * (np.swapaxes(tall, 1, 2) @ tau)))
 
 
 class FlangeWrench(NamedTuple):
@@ -189,15 +201,16 @@ class VirtualSensor(Shown):
             span = slice(start, min(start + CHUNK, samples))
             parts = decompose(flange_jacobian(chain, q[span]))
             flange = link_poses(chain, q[span]).rotation[:, -1]
-            X = from_base(self.frame, flange, self.mounting)
+            solve = SOLVERS[self.solver](parts, from_base(self.frame, flange, self.mounting))
             sigma[span] = parts.sigma_min
             for k, torque in enumerate(torques):
-                tau = torque.tau[span]
-                gain, root = SOLVERS[self.solver](parts, errors[k][span])
-                values[k, span] = np.squeeze(X @ (gain @ tau[:, :, None]), axis=2)
-                spread[k, span] = np.sqrt(np.sum((X @ root) ** 2, axis=2))
-                if n > 6:
-                    residual[k, span] = np.linalg.norm(null_space(parts, tau), axis=1)
+                gain, root = solve(errors[k][span])
+                values[k, span] = np.squeeze(gain @ torque.tau[span, :, None], axis=2)
+                if torque.name in known:
+                    spread[k, span] = np.sqrt(np.sum(root**2, axis=2))
+            if n > 6:
+                every = np.stack([torque.tau[span] for torque in torques], axis=2)
+                residual[:, span] = np.linalg.norm(null_space(parts, every), axis=1).T
         masked = sigma < self.least_sigma
         return tuple(
             Wrench(
