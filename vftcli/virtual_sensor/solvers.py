@@ -206,7 +206,7 @@ class VirtualSensor(Shown):
             for k, torque in enumerate(torques):
                 gain, root = solve(errors[k][span])
                 values[k, span] = np.squeeze(gain @ torque.tau[span, :, None], axis=2)
-                if torque.name in known:
+                if torque.name in sd:
                     spread[k, span] = np.sqrt(np.sum(root**2, axis=2))
             if n > 6:
                 every = np.stack([torque.tau[span] for torque in torques], axis=2)
