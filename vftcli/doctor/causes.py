@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from vftcli.doctor.signals import TRAVEL
-from vftcli.doctor.windows import Case, Windows, size_of, solve, spread, terms, up_axes, windows_of
+from vftcli.doctor.windows import Case, Terms, Windows, size_of, solve, spread, up_axes, windows_of
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
 from vftcli.robots.terms import effort_name
@@ -196,7 +196,7 @@ def tilted(case: Case) -> Iterator[Cause]:
     if case.misfit < UPRIGHT:
         return
     # No load beside gravity: they trade.
-    fit = solve(case.given - windows.inertial, terms(windows.gravity), windows.friction)
+    fit = solve(case.given - windows.inertial, Terms(windows.gravity), windows.friction)
     up, weight = fit.values[:3], float(np.linalg.norm(fit.values[:3]))
     angle = float(np.arctan2(np.linalg.norm(up[:2]), up[2]))
     if angle <= TILTED or not WEIGHT[0] < weight < WEIGHT[1]:
@@ -232,7 +232,7 @@ def rest_of(case: Case, i: int, j: int, sign: float = 1.0) -> float:
     """Rest of joint i's signed effort beside joint j's model. [N·m]"""
     given = sign * case.given[:, [i]] / case.constant[i] * case.constant[j]
     friction = case.windows.motion[:, :, [j]].swapaxes(1, 2)
-    return solve(given - case.needed[:, [j]], terms(friction, positive=True)).size
+    return solve(given - case.needed[:, [j]], Terms(friction, positive=True)).size
 
 
 def shifted(case: Case) -> Iterator[Cause]:
@@ -246,7 +246,7 @@ def shifted(case: Case) -> Iterator[Cause]:
     for j in np.flatnonzero(tried & moves).tolist():
         column = np.zeros((*case.given.shape, 1))
         column[:, j] = 1.0
-        fit = solve(case.given - case.needed, terms(column), load, friction)
+        fit = solve(case.given - case.needed, Terms(column), load, friction)
         offset, sd = float(fit.values[0]), float(fit.sd[0])
         change = offset * column[:, :, 0]
         if abs(offset) >= max(OFFSET * case.effort_sizes[j], SURE * sd) and case.lasts(fit, change):
@@ -260,7 +260,7 @@ def scaled(case: Case) -> Iterator[Cause]:
     A wrong drive constant scales gravity and inertia; friction has any size beside it.
     """
     n, needed, friction = len(case.constant), case.needed[:, :, None], case.windows.friction
-    fit = solve(case.given, terms(needed), friction)
+    fit = solve(case.given, Terms(needed), friction)
     factor, sd = float(fit.values[0]), float(fit.sd[0])
     # No load lightens an arm; a heavy one explains a factor above 1 too.
     worth = CLEARER if case.loaded.values[0] > 0 else 1 / CLEARER
@@ -269,7 +269,7 @@ def scaled(case: Case) -> Iterator[Cause]:
         # The rest is relative to the effort as logged.
         healed = replace(case, given=case.given / factor, size=case.size / factor)
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
-    fit = solve(case.given, terms(needed * np.eye(n)), friction)
+    fit = solve(case.given, Terms(needed * np.eye(n)), friction)
     factors, sds = fit.values[:n], fit.sd[:n]
     off = np.abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))

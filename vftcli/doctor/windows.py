@@ -39,14 +39,9 @@ class Terms(NamedTuple):
     """Torques that may explain another one, column by column."""
 
     columns: Array  #: Torque per unit of each coefficient. (W, n, k)
-    positive: Mask  #: Coefficients that only make sense above zero, as friction's do. (k,)
-    prior: Array  #: Standard deviation that a coefficient has before any data; inf for none. (k,)
-
-
-def terms(columns: Array, *, positive: bool = False, prior: Array | float = np.inf) -> Terms:
-    """Terms that are all alike."""
-    count = columns.shape[2]
-    return Terms(columns, np.full(count, positive), np.full(count, prior))
+    positive: bool = False  #: Whether they only make sense above zero, as friction's do.
+    #: Standard deviations that they have before any data, one for all or (k,); inf for none.
+    prior: Array | float = np.inf
 
 
 class RobustFit(NamedTuple):
@@ -71,12 +66,14 @@ class RobustFit(NamedTuple):
 def solve(target: Array, *by: Terms) -> RobustFit:
     """Fit of a torque (W, n) [N·m] by terms, priors beside 1 N·m, worst windows left out."""
     columns = np.concatenate([part.columns for part in by], axis=2)
-    positive = np.concatenate([part.positive for part in by])
+    counts = [part.columns.shape[2] for part in by]
+    positive = np.repeat([part.positive for part in by], counts)
+    sizes = [np.full(count, part.prior) for part, count in zip(by, counts, strict=True)]
     across = columns.swapaxes(1, 2)
     gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
     used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
     kept = np.ones(len(target), dtype=bool)
-    prior = np.diag(np.concatenate([part.prior for part in by]) ** -2)
+    prior = np.diag(np.concatenate(sizes) ** -2)
 
     def inverse() -> Array:
         return inverse_of((gram[kept].sum(axis=0) + prior)[np.ix_(used, used)])
@@ -147,13 +144,13 @@ class Windows:
     def friction(self) -> Terms:
         """Coulomb and viscous friction of every joint, which only ever take energy."""
         each = self.motion[..., None] * np.eye(self.q.shape[2])
-        return terms(np.concatenate([each[:, 0], each[:, 1]], axis=2), positive=True)
+        return Terms(np.concatenate([each[:, 0], each[:, 1]], axis=2), positive=True)
 
     @cached_property
     def load(self) -> Terms:
         """Torque that carries a load, by its mass and its first moment about the flange."""
         middle = self.q[:, self.q.shape[1] // 2]
-        return terms(-load_regressor(self.chain, middle), prior=LOAD)
+        return Terms(-load_regressor(self.chain, middle), prior=LOAD)
 
     def mean(self, value: Array) -> Array:
         """Mean of a signal over each window, of all its samples. (W, n)"""
