@@ -99,6 +99,13 @@ def cleaned(
     if raw.degrees_possible:
         _refuse_degrees(fresh, path)
     t, counts = seconds(fresh), raw.stamps.dtype.kind in "iu" and not raw.origin
+    gaps = list[Remark]()
+    if len(places := gaps_of(t, GAP_STEPS)):
+        lengths = t[places + 1] - t[places]
+        k = int(np.argmax(lengths))
+        at, length = float(t[places[k]]), float(lengths[k])
+        code = "clock-gaps" if len(places) > 1 else "clock-gap"
+        gaps = [caution(code, gaps=len(places), steps=GAP_STEPS, longest_s=length, at_s=at)]
     # In whole nanoseconds, where the log counts its stamps in them.
     per_tick = round(raw.tick * 1e9) if counts else 0
     source = Source(
@@ -113,7 +120,7 @@ def cleaned(
         rows=rows,
         duplicates=len(raw.stamps) - len(fresh.stamps),
         row_samples=row_samples(fresh, rows),
-        remarks=(*fresh.remarks, *_gap_remarks(t)),
+        remarks=(*fresh.remarks, *gaps),
     )
     arrays: dict[str, Any] = {
         name: handed_over(np.ascontiguousarray(v)) for name, v in fresh.signals.items()
@@ -342,16 +349,6 @@ def without_repeats(raw: RawLog, path: Path) -> RawLog:
     if different:
         remarks.append(caution("repeats-differ", changed=different, repeats=repeats))
     return kept(raw, fresh, *remarks)
-
-
-def _gap_remarks(t: Array) -> tuple[Remark, ...]:
-    gaps = gaps_of(t, GAP_STEPS)
-    if not len(gaps):
-        return ()
-    longest = int(gaps[np.argmax(t[gaps + 1] - t[gaps])])
-    code, at = "clock-gaps" if len(gaps) > 1 else "clock-gap", float(t[longest])
-    length = float(t[longest + 1] - t[longest])
-    return (caution(code, gaps=len(gaps), steps=GAP_STEPS, longest_s=length, at_s=at),)
 
 
 #: Share of samples below which positions of another size are errors, and not of another unit.

@@ -159,11 +159,11 @@ def storage_files(file: LogFile) -> list[str]:
     return sorted(plain, key=natural)
 
 
-#: How a file of a container begins → the module and function here that read it.
+#: How a file of a container begins → the function of `records` that reads it.
 CONTAINERS = {
-    b"#ROSBAG V2.0\n": ("rosbag1", "batches"),
-    b"\x89MCAP0\r\n": ("ros2", "mcap_batches"),
-    b"SQLite format 3\0": ("ros2", "db3_batches"),
+    b"#ROSBAG V2.0\n": "bag_messages",
+    b"\x89MCAP0\r\n": "mcap_messages",
+    b"SQLite format 3\0": "db3_messages",
 }
 
 
@@ -173,10 +173,9 @@ def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
         found = next((x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None)
         if found is None:
             raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
-        module, function = found
         try:
-            batches_of = getattr(import_module(f"vftcli.readers.bags.{module}"), function)
-            for batch in batches_of(file, ingest):
+            messages_of = getattr(import_module("vftcli.readers.bags.records"), found)
+            for batch in batched(messages_of(file, ingest), ingest):
                 yield batch
                 file.release()
         except LogError:
