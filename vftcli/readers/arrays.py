@@ -24,7 +24,7 @@ from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpac
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, from_table, read_layout
+from vftcli.readers.tables import UR, ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark, fact
 
@@ -41,9 +41,11 @@ NOT_A_BUNDLE = (
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
-    """Read an .npy, .npz or .mat file, or states that libfranka printed one a line."""
+    """Read NumPy's, MATLAB's or UR's binary file, or states that libfranka printed one a line."""
     if layout.name == "mat":
         return _read_matlab(file, request)
+    if layout.name == "ur-binary":
+        return read_layout(binary_table(file), UR, request)
     if layout.name == "npz":
         return _read_arrays(file, request, _npz_arrays(file))
     if layout.name == "npy":
@@ -190,6 +192,38 @@ def _npy_array(path: Path, head: bytes, content: bytes | memoryview) -> Column:
         )
     with naming_damage(path, "not a readable array", NOT_AN_ARRAY, ". Save it with np.save."):
         return np.asarray(np.lib.format.read_array(BytesIO(content), allow_pickle=False))
+
+
+#: Type words of the second line of a binary file by UR's official client.
+BINARY_TYPES = {
+    b"DOUBLE": ">f8", b"UINT64": ">u8", b"INT32": ">i4",
+    b"UINT32": ">u4", b"UINT8": "u1", b"BOOL": "u1",
+}  # fmt: skip
+
+
+def binary_table(file: LogFile) -> ArrayTable:
+    """A binary file by UR's official client: two lines of text, then big-endian records."""
+    first, end, rest = bytes(file.content[: 1 << 20]).partition(b"\n")
+    second, end_too, _ = rest.partition(b"\n")
+    names, types = first.decode("ascii", errors="replace").split(), second.split()
+    if not end or not end_too or len(names) != len(types) or not names:
+        raise LogError(
+            f"{file.path}: the header names {len(names)} columns and {len(types)} types; a binary "
+            "RTDE file has one type a column. It is damaged or cut."
+        )
+    if unknown := [word for word in types if word not in BINARY_TYPES]:
+        raise LogError(f"{file.path}: unknown column type {unknown[0]!r} in the second line.")
+    fields = [(str(k), BINARY_TYPES[word]) for k, word in enumerate(types)]
+    body, record, remarks = file.content[len(first) + len(second) + 2 :], np.dtype(fields), []
+    # Some clients write the id of the recipe before every record.
+    if len(body) % record.itemsize and len(body) % (record.itemsize + 1) == 0:
+        record = np.dtype([("id", "u1"), *fields])
+        remarks.append(fact("recipe-byte-skipped"))
+    if left := len(body) % record.itemsize:
+        remarks.append(fact("record-cut", rest_bytes=left))
+    records = np.frombuffer(body, dtype=record, count=len(body) // record.itemsize)
+    columns = {name: records[str(names.index(name))] for name in names}
+    return ArrayTable(path=file.path, columns=columns, remarks=tuple(remarks))
 
 
 V73 = b"MATLAB 7.3 MAT-file"  #: How a file of HDF5 begins.

@@ -1,8 +1,10 @@
 """Text tables: comma, semicolon, tab or space separated, with every line end met in the wild."""
 
+import ast
 import csv
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
@@ -287,3 +289,61 @@ def _numbers(series: Series, path: Path) -> Column:
         series = series.cast(pl.Float64)
     values: Column = series.to_numpy()
     return values if series.dtype != pl.Float64 or not series.null_count() else np.array(values)
+
+
+STAMP = 3  #: Columns before the names that ros2 topic echo --csv prints: sec, nanosec, frame_id.
+
+
+class EchoTable(TextTable):
+    """A table by ``ros2 topic echo --csv``: a message's fields in their order, without a header.
+
+    Names, positions, velocities and efforts, as many of each or none, follow the header's stamp and
+    frame.
+    """
+
+    is_headed = False
+
+    def __init__(self, file: LogFile) -> None:
+        super().__init__(file)
+        fields = ("name", "position", "velocity", "effort")
+        count, more = self.joints, range(self.width - STAMP)
+        each = (
+            f"{fields[k // count]}{k % count}" if k < 4 * count else f"_{k - 4 * count}"
+            for k in more
+        )
+        self.names = ("sec", "nanosec", "frame_id", *each)
+
+    @cached_property
+    def joints(self) -> int:
+        """Number of names in the first row; 0 where it is no such row."""
+        cells = split_cells(self.sample[0], ",")
+        words = [k for k, cell in enumerate(cells) if k >= STAMP and not is_number(cell)]
+        count = len(words)
+        values = len(cells) - STAMP - count
+        stamped = len(cells) > STAMP and all(cell.isdigit() for cell in cells[:2])
+        if not stamped or is_number(cells[2]) or words != list(range(STAMP, STAMP + count)):
+            return 0
+        return count if count and values >= count and values % count == 0 else 0
+
+
+def joint_names(table: TextTable) -> tuple[str, ...]:
+    """The joints' names that the rows hold, in the order of the columns."""
+    each = enumerate(table.names)
+    columns = [k for k, name in each if name.removeprefix("field.")[:4] == "name"]
+    found = [table.words(column) for column in columns]
+    for words in found:
+        if len(words) > 1:
+            raise LogError(
+                f"{table.path}: the rows name different joints ({words[0][:60]} and "
+                f"{words[1][:60]}), as where two controllers publish on one topic. Keep the rows "
+                "of the arm."
+            )
+    names = tuple(words[0] for words in found)
+    if len(names) != 1 or not names[0].startswith(("[", "(")):
+        return names
+    listed: object = None
+    with suppress(ValueError, SyntaxError, RecursionError, MemoryError):
+        listed = ast.literal_eval(names[0])  # a list as Python prints it
+    if not isinstance(listed, list | tuple) or not all(isinstance(name, str) for name in listed):
+        raise LogError(f"{table.path}: the column name holds no list of joints: {names[0][:60]!r}")
+    return tuple(listed)

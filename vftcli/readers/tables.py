@@ -10,12 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.readers.aliases import RESIDUAL_TURNED, picks_by_alias, robot_of, table_clock
+from vftcli.readers.aliases import (
+    RESIDUAL_TURNED,
+    laid_along,
+    picks_by_alias,
+    robot_of,
+    table_clock,
+)
 from vftcli.readers.columns import ColumnSpec, guessed, parse_columns, tick_of
-from vftcli.readers.delimited import TextTable
+from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.reading import LogFormat
+from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
     Cell,
     Column,
@@ -30,7 +36,12 @@ from vftcli.readers.table import (
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.wrench import WrenchFrame
 
+UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange, whoever wrote them.
+#: Cycle of a CB3 controller, which its time stamps count; an e-Series has 2 ms. [s]
+CB3_CYCLE = 8e-3
+E_SERIES_FIELD = "ft_raw_wrench_0"  #: What only a controller with a sensor on the flange sends.
 RawField = Any  #: A further field of a RawLog.
 BLOCK_ROWS = 1 << 16  #: Rows of arrays that are taken at a time.
 WIDEST = 200  #: Columns beyond which a table without a header is not looked through.
@@ -81,7 +92,10 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     payload = layout.payload.split()
     constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
     picks = replace(picks, signals=tuple(signals), constants=constants)
-    return picked(table, picks, request, clock_name=layout.clock)
+    raw = picked(table, picks, request, clock_name=layout.clock)
+    if layout is not UR:
+        return raw
+    return replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
 
 
 def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
@@ -172,15 +186,32 @@ class ArrayTable(Table):
             yield loaded
 
 
+def force_frame(names: Sequence[str], stamps: Array) -> WrenchFrame:
+    """Frame of actual_TCP_force: base axes, about the TCP on CB3; on e-Series by its sensor.
+
+    The sensor in an e-Series' flange gives the moment about the flange: on three logs about the
+    TCP it misses the joints' torque by four times as much. A sensor that a URCap brings gives it
+    about the TCP. No field says which of the two is mounted. An e-Series log that has no
+    `ft_raw_wrench`, with stamps (T,) [s] that all are multiples of 8 ms, reads as a CB3's.
+    """
+    steps = stamps[np.isfinite(stamps)] / CB3_CYCLE
+    # Half a millisecond: stamps may be written with three decimals.
+    cb3 = bool(np.all(np.abs(steps - np.round(steps)) < 5e-4 / CB3_CYCLE))
+    return WrenchFrame("base", "tool" if cb3 and E_SERIES_FIELD not in names else "controller")
+
+
 def recognises(file: LogFile, layout: LogFormat) -> bool:
-    """Whether a text is a table without a header, or a line of names above mostly numbers."""
+    """Whether a text is of a format: a printed JointState, a table with a header or without."""
     if not file.lines:
         return False
+    if layout.name == "ros2-echo":
+        return EchoTable(file).joints > 0
     table = TextTable(file)
     if layout.name == "headerless" or not table.names:
         return layout.name == "headerless" and not table.names
     if len(table.sample) < 2:
         return table.width > 1
+    # A line of names above mostly numbers.
     cells = table.cells(table.sample[1])
     numbers = sum(map(table.is_number, cells))
     return len(cells) > 1 and numbers * 2 >= len(cells)
@@ -188,8 +219,11 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     """Read a table of text by its layout, --columns or aliases."""
-    if layout.columns:
-        return read_layout(TextTable(file), layout, request)
+    if layout.name in {"bagpy", "rostopic", "ros2-echo"}:
+        printed = (EchoTable if layout.name == "ros2-echo" else TextTable)(file)
+        return laid_along(from_table(printed, request), joint_names(printed), request)
+    if layout.columns or layout.name == "ur-rtde":
+        return read_layout(TextTable(file), layout if layout.columns else UR, request)
     return from_table(TextTable(file), request)
 
 
