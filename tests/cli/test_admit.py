@@ -160,6 +160,7 @@ RELEASE = ("--release", "x=0.3", "--robot", "ur5")
             "admittance.force=x is neither sensor nor file:PATH",
         ),
         (("ur5-drag", "--zero", "start"), 1, "give it as --zero A:B"),
+        (("ur5-drag", "--observer", "gmo"), 1, "the closed loop runs kfo-fe or kfo-zoh"),
         (("ur5-dragg",), 1, "ur5-drag"),
     ],
 )

@@ -132,3 +132,8 @@ def test_a_log_that_is_nearly_all_gap_is_refused(repeated: Make) -> None:
     late = np.arange(log.samples) > log.samples // 2
     with pytest.raises(ReferenceTorqueError, match=r"is a gap, .* leave the gap out"):
         find_period(replace(log, t=log.t + 1e6 * late))
+
+
+def test_a_stated_period_between_valleys_is_refined_to_the_true_one(repeated: Make) -> None:
+    """3.7 s is just beyond the 3 % around 3.58 s: the deepest place of these is its slope."""
+    assert find_period(repeated(), 3.58).seconds == pytest.approx(3.7, abs=1e-4)

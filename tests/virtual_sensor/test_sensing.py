@@ -9,8 +9,10 @@ import pytest
 from vftcli.analysis import Analysis
 from vftcli.observers.choice import ObserverChoice
 from vftcli.pipeline import AnalysisChoice, analyse_log
+from vftcli.readers import read
 from vftcli.readers.reader import ReadChoice
 from vftcli.robots import load_robot
+from vftcli.robots.chain import link_poses
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.recording import Recording
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice
@@ -149,3 +151,16 @@ def test_masked_samples_are_counted() -> None:
     assert remark.values["share"] == pytest.approx(100 / len(wrench.t))
     assert remark.values["sigma_min_m"] == pytest.approx(np.min(wrench.sigma_min))
     assert mask_remark(np.zeros(len(wrench.t), dtype=bool), wrench.sigma_min) == ()
+
+
+@pytest.mark.slow
+def test_a_smoothed_wrench_turns_with_the_flange() -> None:
+    """Force and moment about the flange point in its own axes are those in base axes, turned."""
+    base, flange = (
+        reading("ur5_circle.csv", "best", frame=f).wrenches[0] for f in ("base", "flange")
+    )
+    log = read(FIXTURES / "ur5_circle.csv")
+    turn = link_poses(load_robot("ur5").chain, log.q).rotation[:, -1]
+    for part in (slice(0, 3), slice(3, 6)):
+        expected = np.einsum("tji,tj->ti", turn, base.values[:, part])
+        np.testing.assert_allclose(flange.values[:, part], expected, atol=1e-9)  # rounding of 100 N
