@@ -34,12 +34,12 @@ def test_the_expected_errors_are_shares_of_the_robot_s_own_numbers():
     np.testing.assert_allclose(found.rotor, 0.2 * chain.rotor_inertia)
     np.testing.assert_allclose(found.drive, 0.02)
     friction = usual_friction(robot)
-    np.testing.assert_allclose(found.friction[0], 0.2 * friction.dry + 0.05)
-    np.testing.assert_allclose(found.friction[1], 0.7 * friction.dry + 0.05)
+    np.testing.assert_allclose(found.friction[0], 0.2 * friction[0] + 0.05)
+    np.testing.assert_allclose(found.friction[1], 0.7 * friction[0] + 0.05)
     np.testing.assert_allclose(found.friction[2], 0.03)
-    np.testing.assert_allclose(found.friction[3], 0.4 * friction.viscous + 0.1)
-    np.testing.assert_allclose(found.friction[4], 0.4 * np.abs(friction.quadratic) + 0.05)
-    np.testing.assert_allclose(found.offset, 0.15 * friction.dry + 0.02)
+    np.testing.assert_allclose(found.friction[3], 0.4 * friction[1] + 0.1)
+    np.testing.assert_allclose(found.friction[4], 0.4 * np.abs(friction[2]) + 0.05)
+    np.testing.assert_allclose(found.offset, 0.15 * friction[0] + 0.02)
 
 
 def test_an_arm_that_measures_behind_its_gears_has_no_rotors():
@@ -62,20 +62,20 @@ def test_the_usual_friction_is_what_the_keys_say():
     np.testing.assert_allclose([x[0] for x in usual_friction(bent)], [0.35, 0.0, 0.0])
     for none in ((), (JointFriction(),) * 6):
         found = usual_friction(replace(robot, friction=none))
-        assert not np.any(np.concatenate(found))
+        assert not np.any(found)
 
 
 def test_a_logarithm_s_slope_is_that_of_a_curve_through_it():
     robot = ur10e()
     found = usual_friction(robot)
     joint = robot.friction[0]
-    assert found.dry[0] == joint.parameters["coulomb"]
+    assert found[0][0] == joint.parameters["coulomb"]
     speed = np.linspace(0.05, 1.0, 40) * robot.limits.qd_max[0]
     parameters = joint.parameters
     rise = parameters["logarithmic"] * np.log1p(speed / parameters["logarithmic_velocity"])
     fit = np.polyfit(speed, parameters["coulomb"] + rise, 2)
     # tanh(.1/.01) at the slowest speed is 1 to 4e-9
-    np.testing.assert_allclose([found.viscous[0], found.quadratic[0]], fit[1::-1], rtol=1e-6)
+    np.testing.assert_allclose([found[1][0], found[2][0]], fit[1::-1], rtol=1e-6)
 
 
 def test_values_and_columns_are_in_one_order():

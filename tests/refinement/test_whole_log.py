@@ -159,7 +159,7 @@ def by_friction(robot, seconds, external=None):
     """A log of an arm that slides by a fifth of its dry friction more than its model knows."""
     error = drawn_error(robot, size=0.0)
     friction = np.array(error.friction)
-    friction[0] = 0.2 * usual_friction(robot).dry
+    friction[0] = 0.2 * usual_friction(robot)[0]
     return wrong_run(robot, replace(error, friction=friction), external, seconds, noise=0.3)
 
 
@@ -171,7 +171,7 @@ def test_a_short_log_loses_friction_alone():
     assert [r.code for r in found.remarks][:2] == ["whole-log-friction-alone", "whole-log-applied"]
     for unfitted in ("inertial", "rotor", "drive", "offset"):
         assert not getattr(found.error, unfitted).any()
-    truth = 0.2 * usual_friction(robot).dry * np.tanh(run.recording.dq / 0.003)
+    truth = 0.2 * usual_friction(robot)[0] * np.tanh(run.recording.dq / 0.003)
     left = rms(found.bias - truth)[found.applied]
     # the fit's prior and 6 Hz filter at friction's turns leave a part
     assert found.applied.any()

@@ -236,15 +236,21 @@ def filtered_odds(
     state = ImmState(both, nought, both, nought, variance[0].copy(), first)
     odds = np.empty((blocks, count))
     for k in range(blocks):
-        mixed = imm_mix(state, begins[k], ends[k], variance[k])
-        predicted = imm_predict(mixed, decay[k], added[k], kept[k], variance[k])
-        state = imm_update(predicted, d[k], white[k], (often[0][k], often[1][k]))
+        moves = decay[k], added[k], kept[k]
+        state = imm_predict(state, begins[k], ends[k], moves, variance[k])
+        state = imm_update(state, d[k], white[k], (often[0][k], often[1][k]))
         odds[k] = state.odds
     return odds
 
 
-def imm_mix(state: ImmState, begins: Array, ends: Array, variance: Array) -> ImmState:
-    """The states with which each mode begins the next block, moments matched."""
+def imm_predict(
+    state: ImmState, begins: Array, ends: Array, moves: tuple[Array, Array, Array], variance: Array
+) -> ImmState:
+    """The states of each mode a block later, moments matched.
+
+    B keeps the share f and gains variance; x keeps the share g and wanders within its variance.
+    """
+    f, added, g = moves
     p1 = 1.0 / (1.0 + np.exp(-state.odds))
     p0 = 1.0 - p1
     ahead0, ahead1 = p0 * (1.0 - begins) + p1 * ends, p0 * begins + p1 * (1.0 - ends)
@@ -255,22 +261,11 @@ def imm_mix(state: ImmState, begins: Array, ends: Array, variance: Array) -> Imm
     spread = w * (1.0 - w)
     bb = (1.0 - w) * state.bb[0] + w * state.bb[1] + spread * apart * apart
     w1, s1 = w[1], spread[1]
-    x = w1 * state.x
     xx = w1 * state.xx + (1.0 - w1) * variance + s1 * state.x * state.x
     bx = w1 * state.bx + s1 * apart * state.x
-    return ImmState(b, x, bb, bx, xx, np.log(ahead1 / ahead0))
-
-
-def imm_predict(state: ImmState, f: Array, added: Array, g: Array, variance: Array) -> ImmState:
-    """The states a block later; x keeps the share g and wanders within its variance."""
-    return ImmState(
-        f * state.b,
-        g * state.x,
-        f * f * state.bb + added,
-        f * g * state.bx,
-        g * g * state.xx + variance * (1.0 - g * g),
-        state.odds,
-    )
+    xx = g * g * xx + variance * (1.0 - g * g)
+    odds = np.log(ahead1 / ahead0)
+    return ImmState(f * b, g * w1 * state.x, f * f * bb + added, f * g * bx, xx, odds)
 
 
 def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Array]) -> ImmState:

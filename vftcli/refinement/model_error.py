@@ -87,18 +87,11 @@ def friction_shapes(run: Run, gravity: Array) -> list[Array]:
     return [sign, play(q, PLAY).state - sign, np.abs(gravity) * sign, dq, dq * np.abs(dq)]
 
 
-class UsualFriction(NamedTuple):
-    """The friction that a robot's model states, by which its error is judged."""
+def usual_friction(robot: Robot) -> Array:
+    """Dry, viscous and quadratic friction by which a model's error is judged. (3, n)
 
-    dry: Array  #: Torque of steady sliding at low speed. (n,) [N·m]
-    viscous: Array  #: Growth with the speed. (n,) [N·m·s/rad]
-    quadratic: Array  #: Signed growth with its square. (n,) [N·m·s²/rad²]
-
-
-def usual_friction(robot: Robot) -> UsualFriction:
-    """Dry, viscous and quadratic friction of a robot; other curves are fitted.
-
-    A sigmoid has neither slope nor bend of its own: seven tenths of its amplitude count as dry.
+    Other curves are fitted. A sigmoid has neither slope nor bend of its own: seven tenths of its
+    amplitude count as dry. [N·m], [N·m·s/rad], [N·m·s²/rad²]
     """
     found = np.zeros((robot.joints, 3))
     dry = dry_friction(robot.friction, robot.joints)
@@ -112,7 +105,7 @@ def usual_friction(robot: Robot) -> UsualFriction:
             A = np.column_stack([speed**0, speed, speed**2])
             found[j] = np.linalg.lstsq(A, steady_torque(joint, speed), rcond=None)[0]
             found[j, 0] = abs(dry[j] or found[j, 0])
-    return UsualFriction(*found.T)
+    return found.T
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -169,7 +162,7 @@ def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
 
 def expected_error(robot: Robot) -> ModelError:
     """Standard deviation of the model's error in every column, from the robot's own numbers."""
-    chain, friction = robot.loaded_chain, usual_friction(robot)
+    chain, (dry, viscous, quadratic) = robot.loaded_chain, usual_friction(robot)
     inertial = np.empty((chain.joints, LINK))
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):
         reach = float(np.dot(c, c))
@@ -183,14 +176,14 @@ def expected_error(robot: Robot) -> ModelError:
         drive=0.02 * ones,
         friction=np.array(
             [
-                0.2 * friction.dry + 0.05,
-                0.7 * friction.dry + 0.05,
+                0.2 * dry + 0.05,
+                0.7 * dry + 0.05,
                 0.03 * ones,
-                0.4 * np.abs(friction.viscous) + 0.1,
-                0.4 * np.abs(friction.quadratic) + 0.05,
+                0.4 * np.abs(viscous) + 0.1,
+                0.4 * np.abs(quadratic) + 0.05,
             ]
         ),
-        offset=0.15 * friction.dry + 0.02,
+        offset=0.15 * dry + 0.02,
     )
 
 

@@ -119,7 +119,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             loads = slow_loads(run.robot.loaded_chain, t[::stride], motion.q[::stride])
             columns = error_columns(run, motion, expected, stride)
             rows = Rows(columns=columns, loads=loads, d=d[::stride])
-            fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot).dry)
+            fit = fit_robustly(rows, stride * median_step(t), usual_friction(run.robot)[0])
             tried = guarded(fit, motion.dq[::stride])
             if span < LEAST_MOTION:
                 tried = tried._replace(weight=weight_of_friction(fit, tried))
