@@ -19,7 +19,7 @@ from vftcli.signals.errors import MissingSignalError, ParameterError
 from vftcli.signals.pose import IDENTITY, Pose, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.wrench import WrenchFrame
-from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base, logged_wrench, placement
+from vftcli.virtual_sensor.frames import FRAMES, Mounting, from_base, logged_wrench
 
 FIXTURES = Path(__file__).parents[2] / "fixtures"
 UR5 = load_robot("ur5")
@@ -155,7 +155,7 @@ def test_one_contact_in_every_frame_is_one_joint_torque() -> None:
 
 def codes(frame: WrenchFrame | None, mounting: Mounting) -> list[str]:
     """The codes of what had to be assumed."""
-    return [remark.code for remark in placement(frame, mounting).remarks]
+    return [remark.code for remark in logged_wrench(log(frame), UR5.chain, mounting).remarks]
 
 
 def test_what_is_not_stated_is_assumed_aloud() -> None:
@@ -184,7 +184,7 @@ def test_the_flange_stands_for_a_tool_that_is_not_known() -> None:
 )
 def test_a_frame_that_is_not_known_is_refused(frame: WrenchFrame) -> None:
     with pytest.raises(ParameterError, match=r"no frame known here.*flange, base, tool, sensor"):
-        placement(frame, MOUNTED)
+        logged_wrench(log(frame), UR5.chain, MOUNTED)
 
 
 def test_a_wrench_of_zeros_is_no_reference() -> None:

@@ -142,39 +142,6 @@ PIECE = 1.0
 SURE = 4.5
 
 
-class Placement(NamedTuple):
-    """Where a log's wrench is measured."""
-
-    frame: WrenchFrame  #: Its axes, point and sign.
-    #: Orientation of its axes in the flange frame, None for the base's axes. (3, 3)
-    axes: Array | None
-    #: The point of its moment in the flange frame, None for the base's origin. (3,) [m]
-    point: Array | None
-    remarks: tuple[Remark, ...]  #: What had to be assumed.
-
-
-def placement(frame: WrenchFrame | None, mounting: Mounting) -> Placement:
-    """Where a log's wrench is measured; the flange stands for a tool or sensor of unknown pose."""
-    remarks = [caution("wrench-frame-unstated")] if frame is None else []
-    frame = frame or UNSTATED
-    tool, sensor = mounting.tool or IDENTITY, mounting.sensor or IDENTITY
-    poses = {"flange": IDENTITY, "tool": tool, "sensor": sensor}
-    points = (*poses, "base")
-    if frame.axes not in FRAMES or frame.point not in points:
-        raise ParameterError(
-            f"the log's wrench is in {frame}, which is no frame known here; say which with "
-            f"--columns wrench[AXES@POINT], of the axes {', '.join(FRAMES)} and the points "
-            f"{', '.join(points)}, as in wrench[base@tool]"
-        )
-    if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
-        remarks.append(caution("sensor-pose-unstated"))
-    if mounting.tool is None and "tool" in (frame.axes, frame.point):
-        remarks.append(caution("tool-pose-unstated", frame=str(frame)))
-    axes = None if frame.axes == "base" else np.asarray(poses[frame.axes].rotation)
-    point = None if frame.point == "base" else np.asarray(poses[frame.point].translation)
-    return Placement(frame, axes, point, tuple(remarks))
-
-
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
     """The log's own wrench as force on the robot, in base axes about the flange point."""
     if not np.any(recording.require("wrench")):
@@ -186,28 +153,45 @@ def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wre
 
 def in_base_axes(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
     """A recording's wrench as force on the robot, in base axes about the flange point."""
-    values = recording.require("wrench")
-    frame, why = recording.wrench_frame, tuple[Remark, ...]()
-    if frame is not None and frame.point == "controller":
+    values, stated = recording.require("wrench"), recording.wrench_frame
+    frame = stated or UNSTATED
+    remarks = [caution("wrench-frame-unstated")] if stated is None else []
+    if frame.point == "controller":
         tool = None if mounting.tool is None else np.asarray(mounting.tool.translation)
         point, why = controller_point(recording, chain, tool)
-        frame = replace(frame, point=point)
-    where = placement(frame, mounting)
-    poses = link_poses(chain, recording.q)
-    flange = poses.rotation[:, -1]
-    force, moment = where.frame.factor * values[:, :3], where.frame.factor * values[:, 3:]
-    if where.axes is not None:
-        turn = flange @ where.axes
+        frame, remarks = replace(frame, point=point), [*why]
+    # The flange stands for a tool or sensor of unknown pose; base axes need none.
+    fixed = {name: pose or IDENTITY for name, pose in mounting._asdict().items()}
+    poses = {"flange": IDENTITY, **fixed}
+    points = (*poses, "base")
+    if frame.axes not in FRAMES or frame.point not in points:
+        raise ParameterError(
+            f"the log's wrench is in {frame}, which is no frame known here; say which with "
+            f"--columns wrench[AXES@POINT], of the axes {', '.join(FRAMES)} and the points "
+            f"{', '.join(points)}, as in wrench[base@tool]"
+        )
+    if mounting.sensor is None and "sensor" in (frame.axes, frame.point):
+        remarks.append(caution("sensor-pose-unstated"))
+    if mounting.tool is None and "tool" in (frame.axes, frame.point):
+        remarks.append(caution("tool-pose-unstated", frame=str(frame)))
+    axes, point_pose = poses.get(frame.axes), poses.get(frame.point)
+    placed = link_poses(chain, recording.q)
+    flange = placed.rotation[:, -1]
+    force, moment = frame.factor * values[:, :3], frame.factor * values[:, 3:]
+    if axes is not None:
+        turn = flange @ axes.rotation
         force, moment = (np.einsum("tij,tj->ti", turn, part) for part in (force, moment))
     # The force acts at the point, so about the flange it has the moment of its lever besides.
-    lever = -poses.translation[:, -1] if where.point is None else flange @ where.point
+    lever = -placed.translation[:, -1]
+    if point_pose is not None:
+        lever = flange @ point_pose.translation
     moment = moment + np.cross(lever, force)
     return Wrench(
         name="log",
         t=recording.t,
         values=np.concatenate([force, moment], axis=1),
         frame="base",
-        remarks=(*why, *where.remarks),
+        remarks=tuple(remarks),
     )
 
 
