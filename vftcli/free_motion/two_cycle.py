@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import permutations
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,15 +31,6 @@ from vftcli.signals.rest import REST, faster
 BLOCK = 1.0  #: Length of pieces: their scatter separates chance from change. [s]
 #: Standard errors from which on a change is believed: contacts alone rarely look like one.
 SURE = 3.0
-
-
-class Partners(NamedTuple):
-    """A log's free motion, paired with it."""
-
-    #: "found" and, where a period is stated, "commanded" → one pairing a free run.
-    clocks: Mapping[str, Sequence[Pairing]]
-    remarks: tuple[Remark, ...]  #: How they were found.
-    free: Mask  #: Whether a sample is itself free, so that its difference is all error. (T,)
 
 
 def two_cycle_difference(
@@ -75,7 +66,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
     or other logs of the motion.
     """
     log, choice = motion.log, motion.choice
-    partners = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
+    clocks, remarks = partners_in_logs(motion) if motion.runs else partners_in_log(motion)
     rungs = tuple(RUNGS) if choice.alignment == AUTOMATIC else (choice.alignment,)
     low_pass, nyquist = choice.low_pass, 0.5 / log.step
     if isinstance(low_pass, float | int) and not low_pass < nyquist:
@@ -84,8 +75,8 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
             "none or auto"
         )
     cutoffs = (None, min(LOW_PASS, 0.4 * nyquist)) if isinstance(low_pass, str) else (low_pass,)
-    chosen, floors = most_certain(differences(log, partners.clocks, rungs, cutoffs))
-    measured = measured_scale(partners, chosen)
+    chosen, floors = most_certain(differences(log, clocks, rungs, cutoffs))
+    measured = measured_scale(motion, clocks["found"], chosen)
     scale = np.ones(log.robot.joints) if measured is None else measured
     moving = np.isfinite(chosen.tau) & ~chosen.error.standing
     # Cycles of one log lie too close in time for friction to change between them.
@@ -101,7 +92,7 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
         floor=rms(sd, np.isfinite(sd)),
         moving=moving,
         remarks=(
-            *partners.remarks,
+            *remarks,
             *floors,
             chosen.remark(
                 "alignment-chosen" if len(floors) > 1 else "alignment-asked",
@@ -110,6 +101,10 @@ def two_cycle_reference(motion: FreeMotion) -> ExternalTorque:
             *floor_remarks(chosen, measured, change),
         ),
     )
+
+
+#: "found" and, where a period is stated, "commanded" → one pairing a free run; and how found.
+Partners = tuple[Mapping[str, Sequence[Pairing]], list[Remark]]
 
 
 def partners_in_log(motion: FreeMotion) -> Partners:
@@ -131,12 +126,11 @@ def partners_in_log(motion: FreeMotion) -> Partners:
     remarks += free.remarks(cycles.whole)
     if len(free.numbers) == 1:
         remarks.append(fact("free-cycle-without-reference"))
-    inside = np.isin(cycles.number(motion.log.t), free.numbers)
     pairings = {
         clock: [pair_with_cycle(motion.log, cycles, number, seconds) for number in free.drawn]
         for clock, seconds in clocks.items()
     }
-    return Partners(pairings, tuple(remarks), inside)
+    return pairings, remarks
 
 
 def partners_in_logs(motion: FreeMotion) -> Partners:
@@ -158,17 +152,19 @@ def partners_in_logs(motion: FreeMotion) -> Partners:
         if abs(found.rate - 1.0) > 1e-4:
             code, values["rate"] = "free-run-on-another-clock", found.rate
         remarks.append(fact(code, Where(about=run.recording.name), **values))
-    pairings = [run.pairing for run in motion.runs]
-    return Partners({"found": pairings}, tuple(remarks), np.zeros(recording.samples, dtype=bool))
+    return {"found": [run.pairing for run in motion.runs]}, remarks
 
 
-def measured_scale(partners: Partners, chosen: Difference) -> Array | None:
+def measured_scale(
+    motion: FreeMotion, pairings: Sequence[Pairing], chosen: Difference
+) -> Array | None:
     """Measured over expected error of two free runs, None without two. (n,)"""
-    pairings = partners.clocks["found"]
     if len(pairings) < 2:
         return None
-    if np.any(partners.free):
-        return error_ratio(chosen, partners.free & chosen.error.known)
+    if not motion.runs:
+        # A sample of a free cycle is itself free, so that its difference is all error.
+        free = np.isin(motion.cycles.number(motion.log.t), motion.free_cycles.numbers)
+        return error_ratio(chosen, free & chosen.error.known)
     ratios = []
     # Every pair both ways round: which run is named first must not decide the floor.
     for first, second in permutations(pairings, 2):
