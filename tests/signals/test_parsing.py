@@ -10,17 +10,13 @@ from hypothesis import strategies as st
 from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, vector
 from vftcli.signals.arrays import spread
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.option import assignment, interval, interval_text, numbers, set_value
 from vftcli.signals.parsing import (
-    assignment,
     check_kind,
     check_known,
     did_you_mean,
-    interval,
-    interval_text,
-    numbers,
     printable,
     printable_lines,
-    set_value,
     toml_tables,
     whole,
 )

@@ -19,7 +19,6 @@ from vftcli.signals.series import (
     near,
     resample_columns,
     runs_of,
-    white_noise,
 )
 
 
@@ -84,14 +83,6 @@ def test_bridging_then_resampling_reads_the_line_between_known_samples(seed: int
         np.testing.assert_allclose(
             resample_columns(at, t, bridge_unknown(t, x))[:, k], direct, atol=1e-12
         )
-
-
-def test_white_noise_of_a_ramp_is_that_of_its_second_differences() -> None:
-    rng = np.random.default_rng(2)
-    x = 3.0 * np.arange(20_000)[:, None] + 0.7 * rng.standard_normal((20_000, 1))
-    # A standard deviation of 20 000 samples, to 1/√(2·20 000), three times that for what overlaps.
-    assert white_noise(x)[0] == pytest.approx(0.7, rel=0.02)
-    assert np.isnan(white_noise(x[:2])[0])
 
 
 T = 0.1 * np.arange(8)

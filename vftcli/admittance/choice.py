@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.robots import PROFILES
 from vftcli.robots.choice import RobotChoice
-from vftcli.signals import parsing
 from vftcli.signals.errors import ParameterError, RobotError
-from vftcli.signals.option import NUMBERS, Choice, Option, names_at, setting
+from vftcli.signals.option import NUMBERS, Choice, Option, names_at, numbers, setting
 
 if TYPE_CHECKING:
     from vftcli.admittance.law import Controller
@@ -21,10 +20,10 @@ FILE = "file:"  #: Head of a force with a path in its name.
 
 def listed(text: str, option: str) -> tuple[float, ...]:
     """The numbers of ``A,B,C``."""
-    numbers = parsing.numbers(text)
-    if numbers is None:
+    found = numbers(text)
+    if found is None:
         raise ParameterError(f"{option} {text!r} is not a list of numbers")
-    return numbers
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)

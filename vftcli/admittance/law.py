@@ -18,7 +18,8 @@ import numpy as np
 from vftcli.robots.robot_file import NUMBER
 from vftcli.signals.arrays import Array, frozen, seal, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, set_value
+from vftcli.signals.option import assignment, set_value
+from vftcli.signals.parsing import check_known
 from vftcli.signals.remarks import Remark, Where, warning
 
 #: The six axes: translation of the flange point along the base axes, rotation about them.

@@ -36,7 +36,7 @@ from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.filters import refuse_mostly_gap
-from vftcli.signals.parsing import assignment, numbers
+from vftcli.signals.option import assignment, numbers
 from vftcli.signals.pose import log_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning

@@ -19,8 +19,8 @@ from typer.core import TyperOption
 from vftcli.cli.commands import COMMANDS, now_of
 from vftcli.cli.progress import echo
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, settings_by_name, text_of
-from vftcli.signals.parsing import did_you_mean, interval, printable, shown, toml_tables
+from vftcli.signals.option import Choice, interval, settings_by_name, text_of
+from vftcli.signals.parsing import did_you_mean, printable, shown, toml_tables
 
 NAME = "vftcli.toml"  #: The file that is read unasked where it is in the working folder.
 NONE = "none"  #: Value of ``--config`` with which no file is read.

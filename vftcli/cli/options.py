@@ -35,11 +35,11 @@ from vftcli.signals.option import (
     WRITE,
     Choice,
     Option,
+    assignment,
     settings_as_typed,
     settings_by_name,
 )
 from vftcli.signals.packages import check_installed
-from vftcli.signals.parsing import assignment
 
 if TYPE_CHECKING:
     from vftcli.readers.reader import ReadChoice

@@ -13,7 +13,7 @@ from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
-from vftcli.signals.parsing import interval_text
+from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, caution, fact
 from vftcli.signals.wrench import AXES, Wrench
 from vftcli.virtual_sensor.choice import WrenchChoice, ZeroChoice

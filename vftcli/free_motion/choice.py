@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Annotated, Any, Self
 
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
-from vftcli.signals.option import LOG, Choice, Option, setting
-from vftcli.signals.parsing import interval
+from vftcli.signals.option import LOG, Choice, Option, interval, setting
 
 AUTOMATIC = "auto"  #: The word for what is chosen by the log at hand.
 #: Rungs of the alignment ladder, from the lowest; `vftcli.free_motion.difference.RUNGS` makes them.

@@ -34,7 +34,7 @@ from vftcli.robots.terms import gain_sd
 from vftcli.signals.arrays import Array, Indices, Mask, handed_over, seal
 from vftcli.signals.errors import ClockError, ParameterError, ReferenceTorqueError
 from vftcli.signals.filters import derivative, zero_phase
-from vftcli.signals.parsing import interval_text
+from vftcli.signals.option import interval_text
 from vftcli.signals.recording import Recording, refuse_repeated_runs
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import median_step

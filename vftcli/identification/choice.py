@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import Choice, Option, is_yes, setting
-from vftcli.signals.parsing import check_known, interval
+from vftcli.signals.option import Choice, Option, interval, is_yes, setting
+from vftcli.signals.parsing import check_known
 
 #: What ``--method`` takes; the gains of observers are `vftcli.observers.tuning`'s.
 METHODS = ("friction", "base", "targets", "payload", "gains")

@@ -106,12 +106,8 @@ def printed_hold_steps(
 ) -> tuple[Array, Array, KalmanState]:
     """τ̂ and √P₂₂ with the noise of (44) as printed, sample by sample. (T, n) each
 
-    Args:
-        d: The filter's input. (T, n) [N·m·s]
-        model: The models of all samples. (T, n) each
-        densities: The parameters, one a joint.
-        state: What the filter is before the block; where the log begins, its prior.
-        begins: Whether the log begins here.
+    d (T, n) [N·m·s] is the input, each entry of the model (T, n), and the state that before the
+    block; where the log begins, its prior.
     """
     tau, sd = np.zeros((2, *d.shape))
     (error, torque), P = state

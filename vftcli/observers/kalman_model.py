@@ -231,12 +231,10 @@ def error_filter(gains: Gains, model: Discrete) -> tuple[Array, Array]:
 
 
 def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
-    """Gains of one piece, everything in blocks. (length, n, blocks) each
+    """Gains of one piece, it and its models in blocks. (length, n, blocks) each
 
-    Args:
-        model: The models of its samples. (length, n, blocks) each
-        entering: Covariance after the sample before the piece. (n,)
-        guess: Where blocks start before they know better. (n,)
+    `entering` is the covariance after the sample before the piece, `guess` where blocks start
+    before they know better. (n,)
     """
     blocks = model.r.shape[2]
     starts = np.repeat(np.stack(guess)[..., None], blocks, axis=2)
@@ -290,16 +288,10 @@ def kalman_steps(
     *,
     begins: bool,
 ) -> tuple[Array, Array, KalmanState]:
-    """τ̂ and √P₂₂ of a block, gains by each step's sample time. (T, n) each
+    """τ̂ and √P₂₂ of a block with the input d [N·m·s], gains by each step's sample time. (T, n)
 
-    Args:
-        terms: The block.
-        d: The filter's input. (T, n) [N·m·s]
-        model_of: The discrete model at some sample times [s] of some joints.
-        densities: The parameters, one a joint.
-        guess: The stationary posterior. (n,)
-        state: What the filter is before the block; at a log's begin after its first sample.
-        begins: Whether the log begins here.
+    `model_of` makes the discrete model of sample times [s] and joints, `guess` is the stationary
+    posterior (n,), and `state` that before the block; where the log begins, after its first sample.
     """
     samples, n = d.shape
     tau, sd = empty_series(samples, n), empty_series(samples, n)

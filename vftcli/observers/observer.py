@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vftcli.signals.arrays import Array, frozen, handed_over, number_array, seal
 from vftcli.signals.errors import ShapeError
-from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque, HasTerms
+from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.parsing import check_kind
 from vftcli.signals.shown import Shown
 
@@ -64,10 +64,9 @@ class BlockObserver(Shown):
     def run(self, terms: DynamicsTerms, state: Any = None) -> tuple[ExternalTorque, Any]:  # noqa: ANN401
         """Estimate of a block, and the observer's state after; None at a log's start."""
 
-    def estimate(self, terms: DynamicsTerms | HasTerms) -> ExternalTorque:
-        """The estimate of a whole log, from rest at its first sample, by its run or its terms."""
-        found: Any = getattr(terms, "terms", terms)
-        return self.run(found)[0]
+    def estimate(self, terms: Any) -> ExternalTorque:  # noqa: ANN401 - DynamicsTerms, or a Run
+        """The estimate of a whole log, from rest at its first sample, by its terms or its run."""
+        return self.run(getattr(terms, "terms", terms))[0]
 
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
         """An estimate (T, n) [N·m] under the observer's name, its array for good."""

@@ -110,12 +110,9 @@ def from_the_end(F: Array, g: Array, d: Array, weights: Array) -> Array:
 
 
 def gain_sequence(model: Discrete, prior: Covariance, guess: Covariance) -> Gains:
-    """The gains and covariances of a whole log. (T, n) each
+    """The gains and covariances of a whole log by its samples' models. (T, n) each
 
-    Args:
-        model: The models of all samples; that of sample 0 only has its noise used. (T, n) each
-        prior: Covariance before the first sample's update. (n,)
-        guess: Where blocks start before they know better, the stationary posterior. (n,)
+    `prior` is the covariance before the first sample's update, `guess` the stationary one. (n,)
     """
     first = update(prior, model.r[0])
     rows = [np.array(first)[:, None]]

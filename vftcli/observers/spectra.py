@@ -204,10 +204,8 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
     Where a joint rests, or moves, in fewer than `ENOUGH` of them, all of them speak for it: a
     moving joint then adds `UNSEEN` of its dry friction, because friction in motion was not seen.
 
-    Args:
-        read: What the estimator reads in them, NaN where it does not know. (S, n) [N·m]
-        resting: Whether a joint rests in them. (S, n)
-        dry_friction: Of each joint, 0 where nothing is known of it. (n,) [N·m]
+    `read` is the estimate in them, NaN where unknown (S, n) [N·m], `resting` whether a joint rests
+    (S, n), and dry friction is 0 where nothing is known of it. (n,) [N·m]
     """
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])
@@ -227,11 +225,8 @@ def error_band(
 ) -> Array:
     """Deviation of an estimate's error, by the module's equation. (T, n) [N·m]
 
-    Args:
-        free: What the estimator reads where nothing touches the arm.
-        missed: What lag and bandwidth leave out, `Spectra.missed`. (n,) [(N·m)²]
-        resting: Where a joint rests. (T, n)
-        correction_sd: Standard deviation of a correction of the model. (T, n) [N·m]
+    `missed` is `Spectra.missed` (n,) [(N·m)²], `resting` where a joint rests (T, n), and
+    `correction_sd` the standard deviation of a correction of the model. (T, n) [N·m]
     """
     variance: Array = np.where(resting, free.resting + missed, free.moving + missed)
     if correction_sd is not None:

@@ -12,7 +12,8 @@ from vftcli.robots.profile import checked_gains
 from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile
 from vftcli.signals.arrays import Array, spread
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, set_value, shown
+from vftcli.signals.option import assignment, set_value
+from vftcli.signals.parsing import check_known, shown
 from vftcli.signals.remarks import Remark, Where, caution, fact
 
 if TYPE_CHECKING:

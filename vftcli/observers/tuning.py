@@ -21,7 +21,7 @@ from vftcli.observers.spectra import Spectra
 from vftcli.signals.arrays import Array, Mask, frozen
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
-from vftcli.signals.parsing import numbers
+from vftcli.signals.option import numbers
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.shown import Shown
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from vftcli.signals import parsing
 from vftcli.signals.errors import LogError, ParameterError
 from vftcli.signals.option import LOG, Choice, Option, setting
+from vftcli.signals.option import interval as read_interval
+from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.readers.columns import ColumnSpec
@@ -88,7 +89,7 @@ class ReadChoice(Choice):
     #: The span that is used, from the first sample, None for all of it. [s]
     interval: Annotated[
         tuple[float, float] | None,
-        Option("--interval", "A:B", "Use only seconds A to B of the log.", parsing.interval),
+        Option("--interval", "A:B", "Use only seconds A to B of the log.", read_interval),
     ] = None
     #: What the log's effort is, a key of `EFFORT`; "auto" leaves that to who knows the robot; None
     #: to take what it is called.
@@ -137,7 +138,7 @@ class ReadChoice(Choice):
         for name, there in known.items():
             if (word := getattr(self, name)) is not None:
                 option = next(o for field, _, o in self.options().values() if field == name)
-                parsing.check_known(word, there, f"{option.typed} {word!r}")
+                check_known(word, there, f"{option.typed} {word!r}")
 
     @classmethod
     def parsed(cls, *, episode: str | None = None, **words: Any) -> Self:  # noqa: ANN401

@@ -25,7 +25,7 @@ from vftcli.readers.table import (
 from vftcli.readers.tables import picked
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
-from vftcli.signals.parsing import interval_text
+from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 

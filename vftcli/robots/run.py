@@ -21,7 +21,7 @@ from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import Where, fact
 from vftcli.signals.repairs import without_isolated
 from vftcli.signals.rest import duration, resting, standing
-from vftcli.signals.series import median_step, white_noise
+from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown
 
 #: RunSamples from which on a recording's series do not stay in memory beside its results.
@@ -196,6 +196,14 @@ def band(step: float, cutoff: float | None) -> tuple[float, float]:
 
 
 NUMBER = re.compile(r"(.*?)(\d{1,4})(\D*)")
+
+
+def white_noise(x: Array) -> Array:
+    """Standard deviation of each column's white part. (n,)"""
+    if len(x) < 3:
+        return np.full(x.shape[1], np.nan)
+    curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
+    return np.asarray(np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature]))
 
 
 def paired(recording: Recording, robot: Robot) -> Recording:

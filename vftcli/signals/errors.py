@@ -40,15 +40,11 @@ class RobotError(VftError):
 
 
 class UnsettledRobotError(RobotError):
-    """No robot is named, and the log does not settle it.
-
-    Attributes:
-        recording: The log, of which a command prints what it holds.
-    """
+    """No robot is named, and the log does not settle it."""
 
     def __init__(self, message: str, recording: object) -> None:
         super().__init__(message)
-        self.recording: Any = recording
+        self.recording: Any = recording  #: The log, of which a command prints what it holds.
 
 
 class ParameterError(VftError):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import InitVar, dataclass, field
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -95,15 +95,6 @@ class DynamicsTerms(Shown):
     def samples(self) -> int:
         """Number of samples T."""
         return len(self.t)
-
-
-class HasTerms(Protocol):
-    """Whatever has dynamics terms of its own, as a run."""
-
-    @property
-    def terms(self) -> DynamicsTerms:
-        """P and μ."""
-        ...
 
 
 def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:

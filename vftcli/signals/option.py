@@ -223,3 +223,47 @@ def settings_as_typed(
                 f"{near}"
             )
     return {name: text_of(value, name) for name, value in given.items()}
+
+
+def interval(text: str) -> tuple[float, float]:
+    """First and last time of ``A:B``, infinite where an end is left out. [s]"""
+    left, colon, right = text.partition(":")
+    try:
+        start = float(left) if left.strip() else float("-inf")
+        stop = float(right) if right.strip() else float("inf")
+    except ValueError:
+        colon = ""
+    if not colon or not start < stop:
+        raise ParameterError(
+            f"interval {text!r} is not A:B with A < B, in seconds from the log's first sample"
+        )
+    return start, stop
+
+
+def interval_text(start: float, stop: float) -> str:
+    """The ``A:B`` that `interval` reads as these times, an infinite end left out. [s]"""
+    return ":".join("" if abs(end) == float("inf") else f"{end:g}" for end in (start, stop))
+
+
+def numbers(text: str) -> tuple[float, ...] | None:
+    """The numbers of ``A,B,C``, None where a part is no number."""
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        return None
+
+
+def assignment(text: str, option: str, form: str) -> tuple[str, str]:
+    """Key and value of ``KEY=VALUE``, without the blanks around them."""
+    key, _, value = text.partition("=")
+    if not key.strip() or not value.strip():
+        raise ParameterError(f"{option} {text!r} is not {form}")
+    return key.strip(), value.strip()
+
+
+def set_value(text: str, whole: str) -> float | list[float]:
+    """One number or several of an assignment of ``--set``."""
+    values = numbers(text)
+    if values is None:
+        raise ParameterError(f"--set {whole!r}: {text!r} is not a number or a list")
+    return values[0] if len(values) == 1 else list(values)

@@ -25,7 +25,7 @@ from vftcli.signals.errors import (
     ReferenceTorqueError,
     ShapeError,
 )
-from vftcli.signals.parsing import interval_text
+from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, fact
 from vftcli.signals.series import median_step
 from vftcli.signals.shown import Shown, TimeSeries, per_joint

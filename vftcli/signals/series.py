@@ -67,14 +67,6 @@ def bridge_unknown(t: Array, x: Array) -> Array:
     return np.column_stack(columns)
 
 
-def white_noise(x: Array) -> Array:
-    """Standard deviation of each column's white part. (n,)"""
-    if len(x) < 3:
-        return np.full(x.shape[1], np.nan)
-    curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
-    return np.asarray(np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature]))
-
-
 def runs_of(mask: Mask) -> list[tuple[int, int]]:
     """First sample of each run of true ones, and the one behind its last."""
     # With a false sample at either end every run has both its edges.

@@ -33,17 +33,11 @@ LENGTH = 36
 def filtered(
     F: Array, g: Array, d: Array, start: Array, wanted: Sequence[Array]
 ) -> tuple[list[Array], Array]:
-    """Run s_t = F_t s_{t−1} + g_t d_t with coefficients that are one a log or one a sample.
+    """Each wanted·s_t (T, n) of s_t = F_t s_{t−1} + g_t d_t, and the last state (m, n).
 
-    Args:
-        F: Transition. (m, m, n) or (m, m, T, n)
-        g: What the input adds to the state. (m, n) or (m, T, n)
-        d: Input. (T, n)
-        start: State before the first sample. (m, n)
-        wanted: Weights of the state's entries. (m, n), (m, 1) or (m, T, n) each
-
-    Returns:
-        Each combination wanted·s_t (T, n), and the state after the last sample (m, n).
+    F is (m, m, n) and g (m, n) of the whole log, or (m, m, T, n) and (m, T, n) of every sample; the
+    input d (T, n), the state `start` before the first sample (m, n), weights (m, n), (m, 1) or
+    (m, T, n).
     """
     if F.ndim == 3:
         each = [steady_filter(F, g, d, start, weights) for weights in wanted]
@@ -160,15 +154,10 @@ def spans(samples: int, *, begins: bool) -> list[slice]:
 
 
 def recursion(F: Array, x: Array, start: Array) -> Array:
-    """y_t = F_t y_{t−1} + x_t from y_{−1} = `start`, in pieces with a state.
+    """States y_t = F_t y_{t−1} + x_t from y_{−1} = `start` (m, n). (m, T, n)
 
-    Args:
-        F: Transitions of an m-state filter for each of n joints. (m, m, T, n)
-        x: Input. (m, T, n)
-        start: State before the first sample. (m, n)
-
-    Returns:
-        The states y. (m, T, n)
+    F (m, m, T, n) holds the transitions of an m-state filter for each of n joints, x (m, T, n) its
+    input.
     """
     y = np.empty((len(x), x.shape[2], x.shape[1])).swapaxes(1, 2)
     for span in spans(x.shape[1], begins=False):
@@ -179,13 +168,10 @@ def recursion(F: Array, x: Array, start: Array) -> Array:
 
 
 def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(None)) -> Array:
-    """One piece of `recursion`, everything in blocks.
+    """One piece of `recursion`, everything in blocks: the states are written over the input y.
 
-    Args:
-        F: Transitions of each kind of joint. (m, m, length, kinds, blocks)
-        y: The input x, over which the states are written. (m, length, n, blocks)
-        start: State before the first sample. (m, n)
-        kind: Which of the kinds each joint is. (n,)
+    F is (m, m, length, kinds, blocks), y (m, length, n, blocks), the state before the first sample
+    (m, n); `kind` tells which of the kinds each joint is. (n,)
     """
     steps, samples = np.moveaxis(F, 2, 0), np.moveaxis(y, 1, 0)
     columns = steps[0].swapaxes(0, 1).copy()  # of the whole block's transition, Φ

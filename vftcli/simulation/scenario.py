@@ -18,7 +18,8 @@ from vftcli.robots.robot_file import (
     lines_of,
 )
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.parsing import assignment, check_known, toml_tables
+from vftcli.signals.option import assignment
+from vftcli.signals.parsing import check_known, toml_tables
 from vftcli.simulation.trajectories import HoldSpec, TrajectorySpec
 
 FOLDER = Path(__file__).parent / "scenarios"

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Annotated
 
 from vftcli.signals.errors import ParameterError
-from vftcli.signals.option import WRENCH, Choice, Option, names_at, setting
-from vftcli.signals.parsing import check_known, interval
+from vftcli.signals.option import WRENCH, Choice, Option, interval, names_at, setting
+from vftcli.signals.parsing import check_known
 
 if TYPE_CHECKING:
     from vftcli.robots.robot import Robot

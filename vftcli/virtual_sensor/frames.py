@@ -22,7 +22,7 @@ from vftcli.robots.chain import Chain, flange_jacobian, link_poses
 from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import MissingSignalError, ParameterError
-from vftcli.signals.parsing import numbers
+from vftcli.signals.option import numbers
 from vftcli.signals.pose import IDENTITY, Pose, adjoint, inverse, rpy_matrix
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact

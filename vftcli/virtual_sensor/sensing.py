@@ -25,7 +25,7 @@ from vftcli.robots.terms import disturbance_impulse
 from vftcli.signals.arrays import Array, Mask, handed_over
 from vftcli.signals.errors import ParameterError, ReferenceTorqueError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
-from vftcli.signals.parsing import numbers
+from vftcli.signals.option import numbers
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, Where, caution, fact
 from vftcli.signals.series import resample_columns

@@ -9,7 +9,7 @@ from vftcli.signals.arrays import Array, Mask, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.lag import time_offset
 from vftcli.signals.least_squares import robust_sd
-from vftcli.signals.parsing import interval_text
+from vftcli.signals.option import interval_text
 from vftcli.signals.remarks import Remark, Where, caution, fact, warning
 from vftcli.signals.series import covered, runs_of
 from vftcli.signals.shown import Shown
