@@ -1,5 +1,6 @@
 """Where the numbers of an identified robot come from, as its file says."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -100,11 +101,15 @@ def test_a_load_says_how_it_was_found_and_in_which_log():
     assert table["residual_Nm"] == [1.0] * 6
 
 
-def test_residuals_are_one_table_a_log_even_of_one_name():
-    robot = with_provenance(found(), "", [log("a.csv")], [log("a.csv")], None)
+def test_residuals_are_one_table_a_log_even_of_one_name(prepared):
+    t, left = np.arange(0, 1, 0.01), np.tile([1.123456, 1.246912], (100, 1))
+    roles = enumerate(("train", "held-out"))
+    traces = [Trace(prepared(t, tau=left), role, left + k, 0 * left, left[0]) for k, role in roles]
+    scored = replace(found(), traces=tuple(traces))
+    robot = with_provenance(scored, "", [log("a.csv")], [log("a.csv")], None)
     assert robot.document["identification"]["residuals"] == [
-        {"log": "log.csv", "role": "train", "rms_Nm": [1.1235, 1.2469]},
-        {"log": "log.csv", "role": "held-out", "rms_Nm": [2.1235, 2.2469]},
+        {"log": "recording", "role": "train", "rms_Nm": [1.1235, 1.2469]},
+        {"log": "recording", "role": "held-out", "rms_Nm": [2.1235, 2.2469]},
     ]
 
 

@@ -311,21 +311,20 @@ def with_provenance(
             if key in table:
                 changed = (j, key) in determined or (links and key == "rotor_inertia")
                 table[f"{key}_source"] = new if changed else old
-    identified = found.residuals.filter(pl.col("model") == "identified")
+    digests = [log.source.sha256 or "unknown" for log in logs]
     account: dict[str, Any] = {
         "method": found.method,
         "profile": profile.name,
         "logs": [log.name for log in logs],
-        "sha256": [log.source.sha256 or "unknown" for log in logs],
+        "sha256": digests,
         "processing": dict(found.processing),
-        # By index, not by name: two files called log.csv are two logs.
         "residuals": [
             {
-                "log": rows["log"][0],
-                "role": rows["role"][0],
-                "rms_Nm": [round(v, 4) for v in rows["rms_Nm"]],
+                "log": trace.motion.recording.name,
+                "role": trace.role,
+                "rms_Nm": [round(v, 4) for v in trace.rms.tolist()],
             }
-            for _, rows in identified.group_by("log_index", maintain_order=True)
+            for trace in found.traces
         ],
     }
     if load is not None:
@@ -343,9 +342,9 @@ def with_provenance(
             "id": f"log-{k}",
             "what": "what `identification` and the joints' confidence name",
             "ref": f"{log.name}, {log.samples} samples, {log.duration:.3f} s",
-            "sha256": log.source.sha256 or "unknown",
+            "sha256": digest,
         }
-        for k, log in enumerate(logs, start=1)
+        for k, (log, digest) in enumerate(zip(logs, digests, strict=True), start=1)
     ]
     tables = {"sources": [*document.get("sources", ()), *sources], "identification": account}
     return replace(named, document={**document, **tables})
