@@ -45,17 +45,17 @@ def replayed(
     """A replay without trouble, but for what is given."""
     zero = np.zeros((ROWS - 1, 6))
     energies = np.zeros((ROWS, 2, 6))
-    given = {"start": zero[0], "wrench": zero, **others}
-    return Replay(
+    given = {"start": zero[0], "wrench": zero, "drags": (), **others}
+    found = Replay(
         robot=load_robot("ur5"),
         controllers=controllers(parameters),
         phases=Phases(zero > 0.0, zero),
         motion=made or motion(),
-        path=way or path(),
-        lyapunov=Lyapunov(corrected=energies, printed=energies, rises=rises),
-        rows=(),
         **given,
     )
+    lyapunov = Lyapunov(corrected=energies, printed=energies, rises=rises)
+    vars(found).update(path=way or path(), lyapunov=lyapunov)
+    return found
 
 
 def test_nothing_is_said_of_a_replay_without_trouble() -> None:
@@ -105,11 +105,11 @@ def test_the_axis_nearest_to_its_threshold_is_named() -> None:
     wrench = np.zeros((10, 6))
     wrench[4, 0], wrench[5, 4] = -10.0, 0.75 * PARAMETERS.threshold[4]
     wrench[6] = np.nan
-    (remark,) = drag_remarks(replayed(wrench=wrench), [], wrench)
+    (remark,) = drag_remarks(replayed(wrench=wrench, logged=wrench))
     assert remark.values["axis"] == "ry"
     assert remark.values["share"] == pytest.approx(0.75)
-    assert not [*drag_remarks(replayed(wrench=wrench), [drag(4, 5)], wrench)]
-    assert not [*drag_remarks(replayed(wrench=wrench[:0]), [], wrench)]
+    assert not [*drag_remarks(replayed(wrench=wrench, logged=wrench, drags=[drag(4, 5)]))]
+    assert not [*drag_remarks(replayed(wrench=wrench[:0], logged=wrench))]
 
 
 def drag(begin: int, release: int, axis: int = 2) -> Drag:
@@ -119,7 +119,7 @@ def drag(begin: int, release: int, axis: int = 2) -> Drag:
 def test_a_long_drag_of_an_arm_at_rest_is_told_once_an_axis() -> None:
     logged = np.zeros((100, 6))
     drags = [drag(0, 30), drag(40, 90), drag(10, 25, axis=0)]
-    found = drag_remarks(replayed(parameters=SLOW), drags, logged)
+    found = drag_remarks(replayed(parameters=SLOW, drags=drags, logged=logged))
     assert [(r.values["axis"], r.values["duration_s"]) for r in found] == [
         ("z", pytest.approx(5.0))
     ]
@@ -129,10 +129,10 @@ def test_a_moving_arm_is_dragged_as_it_should_be() -> None:
     t = np.arange(100) * 0.1
     there = np.zeros((100, 6))
     there[:, 0] = 0.3 * np.sin(2 * np.pi * t / 2.0)  # back where it was after every 2 s
-    still = replayed(parameters=SLOW)
-    assert len([*drag_remarks(still, [drag(0, 90)], there)]) == 1  # each sample meets itself
+    still = replayed(parameters=SLOW, drags=[drag(0, 90)], logged=there)
+    assert len([*drag_remarks(still)]) == 1  # each sample meets itself
     there[:, 0] = 0.1 * t
-    assert not [*drag_remarks(still, [drag(0, 90)], there)]
+    assert not [*drag_remarks(still)]
 
 
 def test_unknown_samples_are_counted() -> None:

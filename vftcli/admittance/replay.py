@@ -5,6 +5,7 @@ The wrench that drives it is an observer's, the log's own sensor's, or a truth f
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -80,17 +81,48 @@ class Replay:
     wrench: Array
     phases: Phases  #: Algorithm 1's phases, the same for all controllers.
     motion: AxisMotion  #: Deviations and velocities, row 0 before the first force.
-    path: JointPath  #: Joint positions.
+    drags: tuple[Drag, ...]  #: The drags of every axis.
     #: Flange deviation of the log's own arm from X_d, None for a release. (T, 6) [m, rad]
     logged: Array | None = None
-    lyapunov: Lyapunov  #: Energies along the run.
-    rows: tuple[dict[str, Any], ...]  #: The comparison, one row a controller, axis and drag.
-    remarks: tuple[Remark, ...] = ()  #: What a reader should know.
+    force_remarks: tuple[Remark, ...] = ()  #: Remarks on the force and on stability.
 
     @property
     def parameters(self) -> Admittance:
         """The admittance parameters, those of all controllers."""
         return self.controllers[0].parameters
+
+    @cached_property
+    def path(self) -> JointPath:
+        """Joint positions along the motion."""
+        return follow(FlangeSolver(self.robot), self.start, self.motion.x, self.parameters.period)
+
+    @cached_property
+    def rows(self) -> tuple[dict[str, Any], ...]:
+        """The comparison, one row a controller, axis and drag."""
+        force = np.nan_to_num(self.wrench)
+        return tuple(rows_of(self.controllers, self.motion, self.drags, force))
+
+    @cached_property
+    def lyapunov(self) -> Lyapunov:
+        """Energies along the run, and where the corrected one rises while no force enters."""
+        split, motion, each = self.phases, self.motion, list(enumerate(self.controllers))
+        # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
+        before = np.concatenate([split.dragged[:1], split.dragged])
+        dragged = before[: len(motion.t), None] if len(before) else np.zeros((1, 1, 6), bool)
+        with np.errstate(over="ignore", invalid="ignore"):
+            corrected, printed = (
+                np.stack([of(one, motion.x[:, n], motion.v[:, n]) for n, one in each], 1)
+                for of in (energy, printed_energy)
+            )
+        left_alone = ~split.dragged & (split.force == 0.0)
+        rises = np.array([count_rises(W, left_alone) for W in corrected.swapaxes(0, 1)])
+        corrected, printed = (np.where(dragged, np.nan, W) for W in (corrected, printed))
+        return Lyapunov(corrected=corrected, printed=printed, rises=rises)
+
+    @property
+    def remarks(self) -> tuple[Remark, ...]:
+        """What a reader should know."""
+        return (*self.force_remarks, *drag_remarks(self), *trouble(self))
 
 
 def replay(
@@ -115,14 +147,20 @@ def replay(
     start = solver.check_start(q[0])
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
-    motion = replace(motion, t=motion.t + clock[0])
-    drags, logged = drags_of(split, parameters.period), deviation_of(solver, start, q)
-    found = judge_motion(solver, start, controllers, motion, split, drags, force)
-    found = replace(found, source=source, logged=logged)
     unknown = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
     missing = (caution("force-unknown", samples=unknown),) if unknown else ()
-    said = (*missing, *complaints, *drag_remarks(found, drags, logged), *trouble(found))
-    return replace(found, remarks=said)
+    return Replay(
+        robot=robot,
+        controllers=tuple(controllers),
+        source=source,
+        start=start,
+        wrench=force,
+        phases=split,
+        motion=replace(motion, t=motion.t + clock[0]),
+        drags=drags_of(split, parameters.period),
+        logged=deviation_of(solver, start, q),
+        force_remarks=(*missing, *complaints),
+    )
 
 
 def replay_release(
@@ -143,39 +181,17 @@ def replay_release(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
         )
     complaints = check_stable(controllers, anyway=anyway, release=x)
-    solver = FlangeSolver(robot)
-    q = solver.check_start(start)
     motion = release(controllers, x, duration or settling(controllers, x))
     force = np.zeros((len(motion.t) - 1, 6))
-    still = Phases(np.zeros_like(force, dtype=bool), force)
-    drags = releases_of(x, len(motion.t))
-    found = judge_motion(solver, q, controllers, motion, still, drags, force)
-    return replace(found, remarks=(*complaints, *trouble(found)))
-
-
-def judge_motion(
-    solver: FlangeSolver,
-    start: Array,
-    controllers: Sequence[Controller],
-    motion: AxisMotion,
-    split: Phases,
-    drags: Sequence[Drag],
-    force: Array,
-) -> Replay:
-    """Joints along a motion from a pose (n,) [rad], its energies and its figures.
-
-    The force (T, 6) [N, N·m] is NaN where it is unknown.
-    """
     return Replay(
-        robot=solver.robot,
+        robot=robot,
         controllers=tuple(controllers),
-        start=start,
+        start=FlangeSolver(robot).check_start(start),
         wrench=force,
-        phases=split,
+        phases=Phases(np.zeros_like(force, dtype=bool), force),
         motion=motion,
-        path=follow(solver, start, motion.x, controllers[0].parameters.period),
-        lyapunov=lyapunov_along(controllers, motion, split),
-        rows=tuple(rows_of(controllers, motion, drags, np.nan_to_num(force))),
+        drags=releases_of(x, len(motion.t)),
+        force_remarks=complaints,
     )
 
 
@@ -225,24 +241,6 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
     return np.concatenate([poses.translation[:, -1] - translation, turned], axis=1)
 
 
-def lyapunov_along(
-    controllers: Sequence[Controller], motion: AxisMotion, split: Phases
-) -> Lyapunov:
-    """Energies along a run, and where the corrected one rises while no force enters."""
-    # Row k + 1 is in the phase of the force before it, row 0 in that of the first.
-    before = np.concatenate([split.dragged[:1], split.dragged])
-    dragged = before[: len(motion.t), None] if len(before) else np.zeros((1, 1, 6), bool)
-    with np.errstate(over="ignore", invalid="ignore"):
-        corrected, printed = (
-            np.stack([of(c, motion.x[:, n], motion.v[:, n]) for n, c in enumerate(controllers)], 1)
-            for of in (energy, printed_energy)
-        )
-    left_alone = ~split.dragged & (split.force == 0.0)
-    rises = np.array([count_rises(W, left_alone) for W in corrected.swapaxes(0, 1)])
-    corrected, printed = (np.where(dragged, np.nan, W) for W in (corrected, printed))
-    return Lyapunov(corrected=corrected, printed=printed, rises=rises)
-
-
 def count_rises(W: Array, recovering: Mask) -> int:
     """Steps in which W (T+1, 6) rises while its axes recover through the whole step (T, 6)."""
     together = np.all(recovering[:, 3:], axis=1, keepdims=True)
@@ -256,9 +254,11 @@ def count_rises(W: Array, recovering: Mask) -> int:
     return rises
 
 
-def drag_remarks(found: Replay, drags: Sequence[Drag], logged: Array) -> Iterator[Remark]:
+def drag_remarks(found: Replay) -> Iterator[Remark]:
     """The axis nearest to its threshold where none was dragged; drags in which the log rests."""
-    if not drags and len(found.wrench):
+    if (logged := found.logged) is None:
+        return
+    if not found.drags and len(found.wrench):
         largest = np.max(np.abs(np.nan_to_num(found.wrench)), axis=0)
         threshold = found.parameters.threshold
         share = largest / np.maximum(threshold, 1e-12)
@@ -267,7 +267,7 @@ def drag_remarks(found: Replay, drags: Sequence[Drag], logged: Array) -> Iterato
         yield caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=least)
     longest: dict[str, int] = {}
     long, near = round(RESTING[0] / found.parameters.period), RESTING[1]
-    for drag in drags:
+    for drag in found.drags:
         part = logged[drag.begin : drag.release, :3]
         if len(part) <= long:
             continue

@@ -8,7 +8,7 @@ import numpy as np
 from vftcli.admittance.choice import ControlChoice
 from vftcli.admittance.closed_loop import UNLOADED, ClosedLoop, Latency, latencies, run_closed_loop
 from vftcli.admittance.law import AXES, UnstableError
-from vftcli.admittance.motion import drags_of, release, releases_of, rows_of
+from vftcli.admittance.motion import release, releases_of, rows_of
 from vftcli.admittance.motion import run as follow_force
 from vftcli.admittance.replay import Replay, replay, settling
 from vftcli.observers import KalmanObserver
@@ -87,10 +87,7 @@ def ungated(found: Replay) -> Replay:
     alone = follow_force(found.controllers[:1], force, found.phases.dragged)
     x, v = motion.x.copy(), motion.v.copy()
     x[:, :1], v[:, :1] = alone.x, alone.v
-    motion = replace(motion, x=x, v=v)
-    drags = drags_of(found.phases, found.parameters.period)
-    rows = rows_of(found.controllers, motion, drags, force)
-    return replace(found, motion=motion, rows=tuple(rows))
+    return replace(found, motion=replace(motion, x=x, v=v))
 
 
 def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | None]:

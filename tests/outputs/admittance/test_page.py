@@ -53,7 +53,7 @@ def test_charts_have_the_unit_of_their_axis(push: Replay) -> None:
 def test_without_a_drag_the_page_says_so(release: Replay) -> None:
     from dataclasses import replace
 
-    still = replace(release, rows=())
+    still = replace(release, drags=())
     page = render_admittance(still, admittance_record(still, None, None, ""), "r")
     assert "No axis was dragged." in page
 
