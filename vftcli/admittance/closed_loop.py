@@ -161,7 +161,7 @@ class Loop:
         self.sensor.sample(self.q_measured, arm.v + dq, arm.mean_torque(self.span) + torque)
 
     def act(self, zero: tuple[float, float] | None) -> dict[str, Any]:
-        """What happens in a control period: Algorithm 1, or rest until the zero's span is over."""
+        """One control period, as a row: Algorithm 1, or rest in the zero's span."""
         t, wrench = self.arm.t, self.sensor.wrench(self.q_measured)
         # A controller that followed its own drift would never find the zero of a still arm.
         first, last = zero or (np.inf, -np.inf)
@@ -269,7 +269,7 @@ def still_arm(scenario: Scenario, period: float, seed: int | None) -> Arm:
 
 
 def steps_in(interval: float, step: float, what: str) -> int:
-    """How many inner steps an interval is."""
+    """Number of inner steps of an interval."""
     count = round(interval / step)
     if count < 1 or abs(interval / step - count) > 1e-6:
         raise ParameterError(

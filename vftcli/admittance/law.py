@@ -60,7 +60,7 @@ UNITS = ("m", "m", "m", "rad", "rad", "rad")
 
 @dataclass(frozen=True, kw_only=True)
 class Admittance:
-    """What the variable-parameter law (45)–(51) and Algorithm 1 are run with.
+    """Parameters of the variable-parameter law (45)–(51) and of Algorithm 1.
 
     Translational axes are in kg, N·s/m, N/m, N, m/s; rotational ones in kg·m², N·m·s/rad, N·m/rad,
     N·m, rad/s. Every array is (6,), in the order of `AXES`; one number is that of all axes.

@@ -58,7 +58,7 @@ def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Arra
 
 @dataclass(frozen=True, kw_only=True)
 class AxisMotion:
-    """How the flange would move: one row a control period, one column a controller.
+    """Motion of the flange: one row a control period, one column a controller.
 
     Row k + 1 follows from row k and the force of row k. All components are in base axes; the
     rotation is the vector log(R R_dᵀ).

@@ -70,7 +70,7 @@ class Lyapunov:
 
 @dataclass(frozen=True, kw_only=True)
 class Replay:
-    """What every controller would have made of one force record."""
+    """Motions of all controllers under one force record, or one release."""
 
     robot: Robot  #: The arm.
     controllers: tuple[Controller, ...]  #: The controllers.
@@ -121,7 +121,7 @@ class Replay:
 
     @property
     def remarks(self) -> tuple[Remark, ...]:
-        """What a reader should know."""
+        """Remarks for the reader."""
         return (*self.force_remarks, *drag_remarks(self), *trouble(self))
 
 
@@ -282,7 +282,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
 
 
 def trouble(found: Replay) -> Iterator[Remark]:
-    """What went wrong or was limited, controller by controller; travel that no arm could make.
+    """Remarks on errors and limits, controller by controller, and impossible travel.
 
     Where every pose is reached the travel is plausible, however long.
     """
@@ -322,7 +322,7 @@ class DrivingForce(NamedTuple):
 
 
 def observed_force(reading: SensorReading) -> DrivingForce:
-    """What the virtual sensor makes of the one observer that ran."""
+    """The virtual sensor's wrench of the one observer that ran."""
     wrench = reading.wrenches[0]
     code = "force-smoothed" if wrench.name in reading.smoothed else "force-of-observer"
     return DrivingForce(wrench, fact(code, observer=wrench.name), reading.remarks)
@@ -331,7 +331,7 @@ def observed_force(reading: SensorReading) -> DrivingForce:
 def stored_force(
     recording: Recording, robot: Robot, choice: WrenchChoice, observer: str
 ) -> DrivingForce:
-    """What the virtual sensor makes of an observer's torque that a file of estimates holds."""
+    """The virtual sensor's wrench of an observer's torque in a file of estimates."""
     if choice.solver == SMOOTHER:
         raise ParameterError(
             "virtual-sensor.solver=smoother needs the log itself, not a file of estimates; "

@@ -49,7 +49,7 @@ class Examination(Shown):
 
     @property
     def remarks(self) -> Remarks:
-        """What the log's reader found, then the findings."""
+        """Remarks of the log's reader, then the findings."""
         return Remarks((*self.recording.source.remarks, *self.findings))
 
     def refusals(self, *, fitting: bool = True) -> tuple[Remark, ...]:

@@ -300,7 +300,7 @@ def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
 
 
 def vendor_sign(case: Case) -> Iterator[Remark]:
-    """That the vendor's torque fits the arm's only with its sign turned.
+    """A finding if the vendor's torque fits the arm's only with its sign turned.
 
     Moving the arm takes the effort plus the torque ON the robot.
     """

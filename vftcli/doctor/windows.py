@@ -59,7 +59,7 @@ class RobustFit(NamedTuple):
 
     @property
     def by_joint(self) -> Array:
-        """That of each joint. (n,) [N·m]"""
+        """Root mean square of each joint's rest. (n,) [N·m]"""
         return np.asarray(np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0)))
 
 

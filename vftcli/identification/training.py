@@ -85,7 +85,7 @@ class PreparedLog:
         return len(self.t)
 
     def with_robot(self, robot: Robot) -> "PreparedLog":
-        """The same log with another arm's model."""
+        """This log with another arm's model."""
         return replace(self, robot=robot, columns={})
 
     def filtered(self, signals: Array) -> Array:

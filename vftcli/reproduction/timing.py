@@ -95,7 +95,7 @@ def circle(robot: Robot, samples: int, rate: float = 125.0) -> Recording:
 
 
 def jittering(motion: Recording) -> Recording:
-    """The same motion on a clock that jitters by 5 %, seed 1."""
+    """A motion on a clock that jitters by 5 %, seed 1."""
     strayed = np.random.default_rng(1).uniform(-JITTER, JITTER, motion.samples) * motion.median_step
     return replace(motion, t=motion.t + 0.5 * strayed)
 

@@ -98,7 +98,7 @@ class TrueArm:
 
 @dataclass(frozen=True, kw_only=True)
 class JointSignals:
-    """What the joints truly did, one row an instant."""
+    """True signals of the joints, one row an instant."""
 
     q: Array  #: Positions, velocities, accelerations. (N, n) [rad, rad/s, rad/s²]
     v: Array
@@ -112,7 +112,7 @@ class JointSignals:
 
 @dataclass(frozen=True, kw_only=True)
 class History(JointSignals):
-    """What happened, one row an inner step; row k covers the time from k·step to (k+1)·step.
+    """Course of a run, one row an inner step; row k covers k·step to (k+1)·step.
 
     State and reference are those at the start of a step, all else holds over it.
     """

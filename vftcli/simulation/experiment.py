@@ -41,7 +41,7 @@ def flat(name: str, values: Array, axes: Sequence[str] = ()) -> dict[str, Array]
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What really happened at each sample, on the log's clock."""
+    """True torques and wrenches at each sample, on the log's clock."""
 
     t: Array  #: Time since the log's first sample, on its clock without jitter. (M,) [s]
     tau_ext: Array  #: External torque on the robot, Σ Jᵢᵀ wᵢ over the contacts. (M, n) [N·m]
@@ -69,7 +69,7 @@ class Simulation:
     robot: Robot  #: The profile.
     nominal: Robot  #: The controller's robot: the profile with the payload it knows.
     samples: Samples  #: True signals at the sampling instants.
-    measured: Measured  #: What the controller logs.
+    measured: Measured  #: The controller's log.
     truth: Truth  #: What really happened.
 
     @cached_property

@@ -303,7 +303,7 @@ def slide_or_stick(
 
 
 def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Array, Array, Array]:
-    """The same step by projected Gauss–Seidel, which always converges."""
+    """A step by projected Gauss–Seidel, which always converges."""
     A = np.linalg.inv(M)
     free = v + A @ impulse
     friction = np.zeros_like(v)

@@ -52,7 +52,7 @@ class ServoSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class FrictionSpec:
-    """How the true friction differs in kind from the profile's smoothed curve."""
+    """Differences in kind of the true friction from the profile's smoothed curve."""
 
     enabled: bool = True  #: False for a frictionless arm.
     #: Dry friction of an arm whose robot file has no friction. (n,) [N·m]
@@ -75,7 +75,7 @@ class FrictionSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class MismatchSpec:
-    """How far the arm's own parameters lie from the profile: one standard deviation, relative.
+    """Deviations of the arm from its profile: one standard deviation, relative.
 
     Each parameter is drawn from the seed, a normal deviate cut at two standard deviations. Zeros
     make the profile exact.
@@ -125,7 +125,7 @@ class ForceSensorSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class SensingSpec:
-    """What the log sees of the arm. Zeros and ones switch each imperfection off."""
+    """Imperfections of the log. Zeros and ones switch each of them off."""
 
     rate: float = 0.0  #: Samples per second; 0 takes the vendor's own. [Hz]
     torque: str = "average"  #: "average" over the sampling interval, or "instant".

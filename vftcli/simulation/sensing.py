@@ -1,4 +1,4 @@
-"""What a robot's controller would log of a run: sampled, averaged, quantised, noisy, lossy.
+"""A controller's log of a run: sampled, averaged, quantised, noisy, lossy.
 
 Its estimate of contact: measured torque less the nominal model's, low-passed.
 """
@@ -34,7 +34,7 @@ class Samples(JointSignals):
 
 
 class Measured(NamedTuple):
-    """What the controller logs at each sample."""
+    """A controller's log, one row a sample."""
 
     stamp: Array  #: Time stamps, jittering. (M,) [s]
     #: Which sample each row of the log holds; lost ones are missing, repeated ones doubled.
@@ -109,7 +109,7 @@ def drive_constants(robot: Robot) -> Array | None:
 
 
 def measure_run(arm: Arm, samples: Samples, wrench: Array) -> Measured:
-    """What the controller logs of the true signals and wrench (M, 6), noise from the seed."""
+    """A controller's log of true signals and wrench (M, 6), noise from the seed."""
     spec, K = arm.scenario.sensing, drive_constants(arm.robot)
     rng = np.random.default_rng(arm.seeds["sensing"])
     sizes, shape = noise_sizes(arm), samples.q.shape
