@@ -306,13 +306,12 @@ def sense(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
 
 def gate_of(analysis: "Analysis", asked: "WrenchChoice | None") -> "Gate | None":
     """The contacts, outside of which nothing touches; None where the whole log may be one."""
-    from vftcli.contacts.rows import with_wider_force
     from vftcli.virtual_sensor.sensing import Gate
 
     found = analysis.contacts
     if found is None or not found.tells_untouched or (asked is not None and asked.looks_back):
         return None
-    prior = found.model.prior and with_wider_force(found.model.prior)
+    prior = found.model.prior and found.model.prior.looser
     return Gate([(contact.start, contact.stop) for contact in found.contacts], prior)
 
 

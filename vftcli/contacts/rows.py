@@ -36,9 +36,6 @@ from vftcli.virtual_sensor.smoother import BENT, BlockLog, WrenchPrior, hidden_b
 #: friction is not Gaussian. Chosen on simulated seeds together, for all logs.
 WIDENED = np.repeat([1.3, 2.0], 3)
 BESIDE = 0.1  #: A cut this near to a row may have removed a part of it. [s]
-#: What the force's own standard deviation is multiplied by to measure its size: peaks are larger
-#: than the mean that it was learned from, and would be drawn to zero.
-LOOSER = 1.5
 #: Share of its bend that the peak of a contact may hide that is short beside the others.
 BENT_SHORT = 0.4
 NORMAL = 1.96  #: Half width of a 95 % band in standard deviations.
@@ -134,7 +131,7 @@ class ContactMeasurement:
     @cached_property
     def priors(self) -> list[WrenchPrior]:
         """How the wrench of every contact may move: one that is short moves faster."""
-        own = with_wider_force(self.prior)
+        own = self.prior.looser
         lasts = (OWN_TIME * seconds for seconds in self.found.lasts)
         return [own._replace(time=min(own.time, seconds)) for seconds in lasts]
 
@@ -267,11 +264,6 @@ class ContactMeasurement:
         where: ArmPart = fitting[0] if len(fitting) == 1 else "cannot tell"
         named = where if where in best else max(best, key=lambda part: best[part])
         return where, named, best[named] - max(v for part, v in best.items() if part != named)
-
-
-def with_wider_force(prior: WrenchPrior) -> WrenchPrior:
-    """The prior under which the size of a contact is measured."""
-    return prior._replace(force=LOOSER * prior.force)
 
 
 def quiet_error(d: Array, process: ErrorProcess, hidden: Mask) -> tuple[Array, Array]:

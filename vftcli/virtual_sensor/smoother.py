@@ -46,6 +46,9 @@ BENT = 0.25
 #: Outside of the listed contacts the band is that of a contact which lasts so long, as long as
 #: those that the list makes up in free motion to find the smallest force it can see. [s]
 UNLISTED = 0.6
+#: What the force's own standard deviation is multiplied by to measure a size: peaks are larger than
+#: the mean that it was learned from, and would be drawn to zero.
+LOOSER = 1.5
 LEVER = 0.1  #: Standard deviation of a moment over that of the force. [m]
 TIMES = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)  #: Correlation times of a wrench that are tried. [s]
 FORCES = (10.0, 30.0, 60.0)  #: Standard deviations of a force that are tried. [N]
@@ -67,6 +70,11 @@ class WrenchPrior(NamedTuple):
         # What the force changes by in a second, where that is short against τ_w.
         change = self.force * np.sqrt(2.0 / self.time)
         return bool(self.time >= STEADY and change <= LOAD_CHANGE)
+
+    @property
+    def looser(self) -> "WrenchPrior":
+        """The prior under which the size of a contact is measured."""
+        return self._replace(force=LOOSER * self.force)
 
     @property
     def variance(self) -> Array:
