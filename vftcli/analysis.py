@@ -48,7 +48,7 @@ class Analysis(Shown):
     reference: ExternalTorque | None = None  #: What the estimates are judged by, or None.
     #: The tidy error table (`vftcli.evaluation.SCHEMA`), or None without a reference.
     errors: "pl.DataFrame | None" = None
-    #: What touched the arm, or None where it is not asked or cannot be told.
+    #: What touched the arm, or None where it is not asked or not known.
     contacts: "ContactList | None" = None
     #: A printed table beside these errors, or None where none was asked for.
     published: "Comparison | None" = None
@@ -63,10 +63,10 @@ class Analysis(Shown):
 
     def _headline(self) -> str:
         names = ", ".join(estimate.name for estimate in self.estimates) or "no observer"
-        told = "no list of contacts"
+        listed = "no list of contacts"
         if self.contacts is not None:
-            told = f"{len(self.contacts)} contact{'s' * (len(self.contacts) != 1)}"
-        return f"of {self.recording.name} on {self.robot.name}: {names}; {told}"
+            listed = f"{len(self.contacts)} contact{'s' * (len(self.contacts) != 1)}"
+        return f"of {self.recording.name} on {self.robot.name}: {names}; {listed}"
 
     def _rows(self) -> Iterator[Sequence[object]]:
         yield "what", "of it"

@@ -89,7 +89,7 @@ class AnalysisChoice:
 
 #: What is done with each log of a command.
 Analyser = Callable[[Recording, Robot, AnalysisChoice, Runs], "Analysis"]
-Failed = Callable[[Any, VftError], None]  #: Who is told which log could not be analysed, and why.
+Failed = Callable[[Any, VftError], None]  #: Who hears which log could not be analysed, and why.
 
 
 def raise_error(_log: object, error: VftError) -> None:
@@ -106,7 +106,7 @@ def analyse_logs(
     """Analyses of the logs of a command one after the other; what they share is made once.
 
     The work on each is `analyse` if not given. A log that cannot be analysed is left out where
-    somebody is told of it, else it raises a VftError, as two logs of the same run do.
+    somebody hears of it, else it raises a VftError, as two logs of the same run do.
     """
     models, work, tell = Runs(), work or analyse, failed or raise_error
     recordings: list[tuple[Path | Recording, Recording]] = []
@@ -340,9 +340,9 @@ def judge(analysis: "Analysis", choice: AnalysisChoice) -> "Analysis":
     from vftcli.evaluation import references
 
     sensed = analysis.virtual_sensor if choice.wrench is not None else None
-    told = known_contacts(analysis, choice) if choice.reference.contacts else None
+    known = known_contacts(analysis, choice) if choice.reference.contacts else None
     reference, errors, sensed = references.judge(
-        analysis.motion, analysis.estimates, sensed, choice.reference, told
+        analysis.motion, analysis.estimates, sensed, choice.reference, known
     )
     analysis = replace(analysis, reference=reference, errors=errors)
     if sensed is not None:

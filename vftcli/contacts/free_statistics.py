@@ -33,7 +33,7 @@ from vftcli.virtual_sensor.smoother import BlockLog, Lane, WrenchPrior
 
 #: Length of a block [s]; on a clock with steps that differ by this share it holds so many samples.
 BLOCK, UNEVEN, SAMPLES = 0.024, 0.1, 5
-GAIN = 30.0  #: Gain of the momentum observer that a threshold is laid on. [1/s]
+GAIN = 30.0  #: Gain of the momentum observer that has a threshold. [1/s]
 SETTLED = 0.3  #: Start of a log that the observer is left. [s]
 LEVEL = 4.0  #: Standard deviations of a joint's torque beyond which it is touched.
 #: How long it must stay there, and the pause up to which two such stretches are one. [s]

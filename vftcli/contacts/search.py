@@ -51,7 +51,7 @@ LASTING = 1.0
 PUSH = np.repeat([30.0, 3.0], 3)
 #: Correlation time of a contact's torque and how long a contact lasts: for taps, for leans. [s]
 SEARCHES = (0.3, 0.5), (2.0, 3.0)
-#: Stretches in which a long log is searched, and what of the log before each is taken along. [s]
+#: Stretches in which a long log is searched, and how much of the log before each. [s]
 WARM_UP, STRETCH = 5.0, 10.0
 BETWEEN = 30.0  #: Mean time from one contact to the next. [s]
 AT_FIRST = 0.1  #: Probability that a log begins in contact.

@@ -116,7 +116,7 @@ def tail_of(maxima: Array) -> Tail | None:
 
 #: A log that holds this many false alarms, at their rate, shows it; a shorter one extrapolates.
 DUE = 3.0
-LEAST = 1e-9  #: What stands for a threshold of zero, so that a level can be told. [N·m, N]
+LEAST = 1e-9  #: In place of a threshold of zero, so that there is a level. [N·m, N]
 #: A log of this length has enough readings to tell its own tail. [s]
 LONG_ENOUGH = SETTLING + 5 * ENOUGH * BLOCK
 SELDOM = 0.5  #: A wrench that is known in less than this share of the samples is said to be.

@@ -6,7 +6,7 @@ learned from the quiet blocks on both sides of a contact, and the contact is mea
 What other contacts load says nothing of it. The prior of the wrench is learned from the contacts.
 
 Evidence is how much better a contact explains a stretch of log than nothing does, place by place:
-around every candidate the likelihood of the disturbance is taken under "nothing", under a wrench at
+around every candidate the likelihood of the disturbance is found under "nothing", under a wrench at
 the flange and under a force and moment on each link, the forward pass of the smoother with the
 Jacobian of the place. It is the best place's less that of nothing, in nats; the lead of a part of
 the arm is how far its best place is ahead of the best of every other part.

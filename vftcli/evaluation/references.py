@@ -223,7 +223,7 @@ def judge(
     estimates: Sequence[ExternalTorque],
     sensed: SensorReading | None,
     choice: ReferenceChoice,
-    told: KnownContacts | None = None,
+    known: KnownContacts | None = None,
 ) -> tuple[ExternalTorque, pl.DataFrame, SensorReading | None]:
     """The chosen reference, and errors of estimates and of their wrenches, if any, beside it.
 
@@ -244,7 +244,7 @@ def judge(
         errors = pl.concat([errors, rows], how="diagonal")
     if choice.contacts:
         try:
-            scores = judge_contacts(estimates, sensed, reference, told)
+            scores = judge_contacts(estimates, sensed, reference, known)
             errors = with_contacts(errors, recording.name, reference.name, scores)
         except VftError as error:
             reason = caution("contacts-not-judged", reason=str(error))

@@ -41,7 +41,7 @@ COMPLETE = 0.97  #: Share of a cycle that must be in the log for it to count as 
 
 #: A cycle is free too if its difference from the freest is within this many expected errors.
 ALIKE = 1.5
-MOST_LAID = 8  #: Free cycles that are laid under the others, at most.
+MOST_PAIRED = 8  #: Free cycles that are paired with the others, at most.
 SETTLES = 2.0  #: Time around a cycle in which filters settle. [s]
 
 
@@ -284,14 +284,14 @@ class FreeCycles(NamedTuple):
 
     @property
     def drawn(self) -> tuple[int, ...]:
-        """Those that are laid under the others: all, or `MOST_LAID` from the first to the last."""
-        if len(self.numbers) <= MOST_LAID:
+        """Those paired with the others: all, or `MOST_PAIRED` from the first to the last."""
+        if len(self.numbers) <= MOST_PAIRED:
             return self.numbers
-        at = np.linspace(0, len(self.numbers) - 1, MOST_LAID).round().astype(int)
+        at = np.linspace(0, len(self.numbers) - 1, MOST_PAIRED).round().astype(int)
         return tuple(self.numbers[k] for k in at)
 
     def remarks(self, whole: int) -> list[Remark]:
-        """Their numbers among so many whole cycles, and which are laid under the others if few."""
+        """Their numbers among so many whole cycles, and which are paired with the others if few."""
         count = len(self.numbers)
         code = "free-cycle" if count == 1 else "free-cycles"
         named, drawn = ([k + 1 for k in numbers] for numbers in (self.numbers, self.drawn))
@@ -300,10 +300,10 @@ class FreeCycles(NamedTuple):
         else:
             residuals = self.residuals[np.isfinite(self.residuals)].tolist()
             found = fact(f"{code}-found", cycles=named, whole=whole, residuals=residuals)
-        if count <= MOST_LAID:
+        if count <= MOST_PAIRED:
             return [found]
         # The mean of k cycles with independent noise adds 1/k of one cycle's to the square.
-        wider = float(np.sqrt((1.0 + 1.0 / MOST_LAID) / (1.0 + 1.0 / count)) - 1.0)
+        wider = float(np.sqrt((1.0 + 1.0 / MOST_PAIRED) / (1.0 + 1.0 / count)) - 1.0)
         return [found, fact("free-cycles-drawn", cycles=drawn, free=count, wider=wider)]
 
 
@@ -336,7 +336,7 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
                 continue
         also.append(cycle)
     if len(also) == cycles.whole > 1:
-        # Something must be left that the free cycles can be laid under.
+        # Something must be left that the free cycles can be paired with.
         also.pop()
     return FreeCycles(tuple(also), residual)
 

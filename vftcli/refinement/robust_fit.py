@@ -148,7 +148,7 @@ class Rows:
         return np.asarray(np.sqrt(np.maximum(np.column_stack(variance), 0.0)))
 
     def sums(
-        self, weight: Array, taken: Mask | None = None, parts: Sequence[Mask] = ()
+        self, weight: Array, chosen: Mask | None = None, parts: Sequence[Mask] = ()
     ) -> list[NormalEquations]:
         """Sums of all columns, model's and loads', over some samples, then over parts of them.
 
@@ -157,7 +157,7 @@ class Rows:
         size = self.unknowns + self.loads.numbers.size + 1
         totals = np.zeros((1 + len(parts), size, size))
         # Blocks of samples between two knots and in one set of parts.
-        where = np.arange(len(self.d)) if taken is None else np.flatnonzero(taken)
+        where = np.arange(len(self.d)) if chosen is None else np.flatnonzero(chosen)
         kind = np.column_stack([self.loads.knot, *parts])[where]
         edges = np.flatnonzero(np.any(np.diff(kind, axis=0) != 0, axis=1)) + 1
         for block in np.split(where, edges) if len(where) else []:

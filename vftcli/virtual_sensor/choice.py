@@ -21,11 +21,11 @@ SMOOTHED = ("best",)  #: Observers whose wrench is the smoother's where no other
 
 @dataclass(frozen=True, kw_only=True)
 class ZeroChoice:
-    """What is taken as the zero of a wrench; nothing where all is left at its default."""
+    """The zero of a wrench; nothing where all is left at its default."""
 
     #: Unloaded spans of the log: the first is the zero, further ones show its drift. [s]
     spans: tuple[tuple[float, float], ...] = ()
-    start: bool = False  #: Whether the unloaded start is to be found and taken.
+    start: bool = False  #: Whether it is the unloaded start, to be found.
 
     def __post_init__(self) -> None:
         if self.spans and self.start:
@@ -93,7 +93,7 @@ class WrenchChoice(Choice):
             "Force/torque sensor on the flange, written alike; fit: estimated from the log.",
         ),
     ] = None
-    #: What is taken as the zero.
+    #: The zero.
     zero: Annotated[
         ZeroChoice,
         Option(
