@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 
 from vftcli.signals.arrays import (
     check_clock,
-    check_series,
     check_shape,
     frozen,
     handed_over,
@@ -118,9 +117,9 @@ def test_what_is_no_array_of_numbers_is_refused(value: object, told: str) -> Non
 
 
 def test_a_series_has_a_column_a_joint() -> None:
-    check_series(np.zeros((3, 6)), None, "q", "x")
-    check_series([[0.0] * 6], 6, "q", "x")
+    check_shape(np.zeros((3, 6)), ("T", "n"), "q", "x")
+    check_shape([[0.0] * 6], ("T", 6), "q", "x")
     with pytest.raises(ShapeError, match=r"^q of x has shape \(3, 6\); expected \(T, 7\)$"):
-        check_series(np.zeros((3, 6)), 7, "q", "x")
+        check_shape(np.zeros((3, 6)), ("T", 7), "q", "x")
     with pytest.raises(ShapeError, match=r"expected \(T, n\)$"):
-        check_series(np.zeros(3), None, "q", "x")
+        check_shape(np.zeros(3), ("T", "n"), "q", "x")

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, vector
-from vftcli.signals.arrays import spread
+from vftcli.robots.robot_file import NUMBER, PER_JOINT, SWITCH, TEXT, WHOLE, spread, vector
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, interval, interval_text, numbers, set_value
 from vftcli.signals.parsing import (

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vftcli.signals.errors import ClockError
+from vftcli.signals.lag import bridge_unknown
 from vftcli.signals.series import (
-    bridge_unknown,
     clock_of,
     covered,
     gaps_of,

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from vftcli.robots.robot_file import NUMBER
-from vftcli.signals.arrays import Array, frozen, seal, spread
+from vftcli.robots.robot_file import NUMBER, spread
+from vftcli.signals.arrays import Array, frozen, seal
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known

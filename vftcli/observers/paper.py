@@ -150,8 +150,6 @@ class FilteredDynamicsObserver(FirstOrderObserver):
     With k₃ + ω = ω/(1+a) and k₃ − k₁ω = −ω/(1+a) they are the momentum observer with K = ω,
     at every sample time. The printed k₃ and start are errata: `as_printed`.
 
-    Past a gap with a > 1 the filter starts afresh, with a remark.
-
     Raises:
         ParameterError: If the cutoff is not positive.
     """
@@ -190,8 +188,6 @@ class MomentumObserver(FirstOrderObserver):
         rᵗ = [(1−a)rᵗ⁻¹ + K(pᵗ − pᵗ⁻¹) − a(μᵗ + μᵗ⁻¹)]/(1+a) = [(1−a)rᵗ⁻¹ + K dᵗ]/(1+a),  r⁰ = 0
 
     (35) as printed feeds back a sample late, unstable from K·Ts = 2: `as_printed`.
-
-    Past a gap with a > 1 the filter starts afresh, with a remark.
 
     Raises:
         ParameterError: If a gain is not positive.

@@ -9,8 +9,8 @@ import numpy as np
 from vftcli.observers.observer import Observer, per_joint
 from vftcli.observers.paper import FilteredDynamicsObserver, KalmanObserver, MomentumObserver
 from vftcli.robots.profile import checked_gains
-from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile
-from vftcli.signals.arrays import Array, spread
+from vftcli.robots.robot_file import PER_JOINT, TEXT, RobotFile, spread
+from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import assignment, set_value
 from vftcli.signals.parsing import check_known, shown

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, check_series, seal
+from vftcli.signals.arrays import Array, check_shape, seal
 from vftcli.signals.errors import RobotError
 from vftcli.signals.packages import needed
 from vftcli.signals.parsing import check_kind
@@ -248,7 +248,7 @@ class LinkPoses(NamedTuple):
 def link_poses(chain: Chain, q: Array) -> LinkPoses:
     """Poses of joints and flange in the base frame for q (T, n). [rad]"""
     check_kind(chain, Chain, "the chain", "robot.chain")
-    check_series(q, chain.joints, "q", "the poses")
+    check_shape(q, ("T", chain.joints), "q", "the poses")
     samples, n = np.shape(q)
     # Time is the last axis: every entry of a matrix is one row of the memory.
     rotation, translation = np.empty((n + 1, 3, 3, samples)), np.empty((n + 1, 3, samples))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vftcli.signals.errors import ClockError, ParameterError, ShapeError
+from vftcli.signals.errors import ClockError, ShapeError
 
 #: A float64 array; shapes and units stand in the docstrings, as ``(T, n) [N·m]``.
 Array = NDArray[np.float64]
@@ -118,18 +118,13 @@ def check_clock(t: Array, what: str) -> None:
     )
 
 
-def check_shape(value: NDArray[Any], shape: tuple[int, ...], name: str, owner: str) -> None:
-    """Raise a ShapeError unless `value` has `shape`."""
-    if np.shape(value) != shape:
-        raise ShapeError(f"{name} of {owner} has shape {np.shape(value)}; expected {shape}")
-
-
-def check_series(value: ArrayLike, joints: int | None, name: str, owner: str) -> None:
-    """Raise a ShapeError unless `value` is (T, n)."""
-    shape = np.shape(value)
-    if len(shape) != 2 or joints not in {None, shape[1]}:
-        wanted = "n" if joints is None else joints
-        raise ShapeError(f"{name} of {owner} has shape {shape}; expected (T, {wanted})")
+def check_shape(value: ArrayLike, shape: tuple[int | str, ...], name: str, owner: str) -> None:
+    """Raise a ShapeError unless `value` has `shape`, in which a letter is any length."""
+    found = np.shape(value)
+    alike = (own in {there, str(own)} for own, there in zip(shape, found, strict=False))
+    if len(found) != len(shape) or not all(alike):
+        wanted = str(shape).replace("'", "")
+        raise ShapeError(f"{name} of {owner} has shape {found}; expected {wanted}")
 
 
 def median(values: Array) -> float:
@@ -157,13 +152,3 @@ def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
         return True  # wherever between them the median is
     usual = median(steps)
     return bool(max(most - usual, usual - least) <= tolerance * usual)
-
-
-def spread(value: Any, count: int, each: str, what: str) -> Array:  # noqa: ANN401 - TOML's
-    """One number each from one number or a list with one for each. (count,)"""
-    array = np.atleast_1d(np.asarray(value, dtype=np.float64))
-    if array.shape not in {(1,), (count,)}:
-        raise ParameterError(
-            f"{what} has {array.size} values; give one, or one for each of {count} {each}"
-        )
-    return np.array(np.broadcast_to(array, (count,)))

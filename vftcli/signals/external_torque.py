@@ -11,7 +11,6 @@ from vftcli.signals.arrays import (
     Array,
     Mask,
     check_clock,
-    check_series,
     check_shape,
     empty_series,
     handed_over,
@@ -52,7 +51,7 @@ class DynamicsTerms(Shown):
 
     def __post_init__(self, room: Array | None) -> None:
         seal(self, "t", "p", "mu")
-        check_series(self.p, None, "p", called := "the dynamics terms")
+        check_shape(self.p, ("T", "n"), "p", called := "the dynamics terms")
         check_clock(self.t, called)
         seal(self, "p", "mu", shape=(self.samples, self.joints), called=called)
         change = empty_series(*self.p.shape) if room is None else room
@@ -127,7 +126,7 @@ class ExternalTorque(TimeSeries):
     def __post_init__(self) -> None:
         seal(self, "t", "tau", "floor")
         seal_mask(self, "moving")
-        check_series(self.tau, None, "tau", self.name)
+        check_shape(self.tau, ("T", "n"), "tau", self.name)
         check_clock(self.t, self.name)
         shape = len(self.t), self.joints
         seal(self, "tau", "sd", "error_sd", shape=shape, called=self.name)

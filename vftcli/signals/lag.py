@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vftcli.signals.arrays import Array, Indices, Mask, is_uniform
-from vftcli.signals.series import bridge_unknown, median_step, resample_columns
+from vftcli.signals.series import median_step, resample_columns
 
 LONGEST = 1.0  #: Longest delay looked for. [s]
 LEAD = 0.2  #: Longest lead looked for: a two-sided estimate may come early. [s]
@@ -102,6 +102,18 @@ def parabola(before: float, here: float, after: float) -> float:
     """Peak of the parabola through three neighbours, from the middle one."""
     bend = before - 2.0 * here + after
     return 0.5 * (before - after) / bend if bend < 0 else 0.0
+
+
+def bridge_unknown(t: Array, x: Array) -> Array:
+    """Columns with a straight line across unknown samples. (T, n)
+
+    At the ends the nearest known value is held; a column without any becomes zero.
+    """
+    columns = []
+    for column in x.T:
+        known = np.isfinite(column)
+        columns.append(np.interp(t, t[known], column[known]) if known.any() else np.zeros(len(t)))
+    return np.column_stack(columns)
 
 
 class Offset(NamedTuple):

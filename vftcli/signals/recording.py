@@ -13,7 +13,6 @@ from vftcli.signals.arrays import (
     Indices,
     Mask,
     check_clock,
-    check_series,
     check_shape,
     release,
     seal,
@@ -180,7 +179,7 @@ class Recording(TimeSeries):
 
     def __post_init__(self) -> None:
         seal(self, "t", "q")
-        check_series(self.q, None, "q", "the recording")
+        check_shape(self.q, ("T", "n"), "q", "the recording")
         if np.size(self.t) == 0:
             raise ClockError(f"{self.name}: no samples")
         check_clock(self.t, self.name)
@@ -191,7 +190,7 @@ class Recording(TimeSeries):
             told = f"{len(self.joint_names)} joint names for {self.joints} joints"
             raise ShapeError(f"{self.name}: {told}; expected one a joint, or none")
         if self.payload_com is not None:
-            check_shape(np.asarray(self.payload_com), (3,), "payload_com", self.name)
+            check_shape(self.payload_com, (3,), "payload_com", self.name)
 
     def _headline(self) -> str:
         there = f"{self.samples} samples of {self.joints} joints over {self.duration:.4g} s"

@@ -55,18 +55,6 @@ def resample_columns(at: Array, t: Array, x: Array, outside: float | None = None
     return out
 
 
-def bridge_unknown(t: Array, x: Array) -> Array:
-    """Columns with a straight line across unknown samples. (T, n)
-
-    At the ends the nearest known value is held; a column without any becomes zero.
-    """
-    columns = []
-    for column in x.T:
-        known = np.isfinite(column)
-        columns.append(np.interp(t, t[known], column[known]) if known.any() else np.zeros(len(t)))
-    return np.column_stack(columns)
-
-
 def runs_of(mask: Mask) -> list[tuple[int, int]]:
     """First sample of each run of true ones, and the one behind its last."""
     # With a false sample at either end every run has both its edges.

@@ -10,11 +10,11 @@ from vftcli.robots.robot import Robot
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
-from vftcli.signals.lag import time_offset
+from vftcli.signals.lag import bridge_unknown, time_offset
 from vftcli.signals.pose import Pose, rpy_angles, skew
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, caution, fact
-from vftcli.signals.series import bridge_unknown, resample_columns
+from vftcli.signals.series import resample_columns
 from vftcli.signals.wrench import Wrench
 from vftcli.virtual_sensor.choice import FIT, WrenchChoice
 from vftcli.virtual_sensor.frames import UNSTATED, Mounting
