@@ -15,7 +15,6 @@ from vftcli.signals.parsing import (
     check_known,
     did_you_mean,
     printable,
-    printable_lines,
     toml_tables,
     whole,
 )
@@ -112,11 +111,6 @@ def test_every_text_is_printable_and_fits_utf_8(text: str) -> None:
     assert len(shown.splitlines()) <= 1
     assert printable(shown) == shown
     assert json.loads(json.dumps(whole(text), ensure_ascii=False).encode()) == whole(text)
-
-
-@given(ANY_TEXT)
-def test_lines_stay_lines(text: str) -> None:
-    assert printable_lines(text).count("\n") == text.count("\n")
 
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)

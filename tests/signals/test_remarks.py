@@ -6,7 +6,7 @@ import string
 import pytest
 
 from vftcli.signals import remarks
-from vftcli.signals.remarks import Remark, Where, as_record, explanation, sentence, words
+from vftcli.signals.remarks import Remark, Where, as_record, sentence, words
 
 
 @pytest.fixture
@@ -29,13 +29,13 @@ def test_words_are_made_of_values_and_place() -> None:
         Where("gmo", (1, 3), (0.5, 2.0)),
     )
     assert sentence(remark) == "gmo: J1, J3 rests in 50% of the samples"
-    assert explanation(remark) == "gmo: J1, J3 rests from 0.5 to 2 s: 1.2 2.0 N·m"
+    assert sentence(remark, "long") == "gmo: J1, J3 rests from 0.5 to 2 s: 1.2 2.0 N·m"
 
 
 @pytest.mark.usefixtures("catalogue")
 def test_long_words_fall_back_to_the_short_ones_and_lists_are_separated_by_commas() -> None:
     remark = Remark("left-out", values={"topics": ["/a", "/b"]})
-    assert explanation(remark) == str(remark) == "left out /a, /b"
+    assert sentence(remark, "long") == str(remark) == "left out /a, /b"
 
 
 @pytest.mark.usefixtures("catalogue")

@@ -16,7 +16,7 @@ from vftcli.cli.config import effective, typed
 from vftcli.cli.progress import STAGES, echo, echo_data, is_terminal, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
-from vftcli.signals.parsing import printable, printable_lines
+from vftcli.signals.parsing import printable
 
 if TYPE_CHECKING:
     from vftcli.analysis import Analysis
@@ -59,7 +59,7 @@ def command_line() -> str:
 def say(text: str) -> None:
     """Print words to stderr, unless --quiet; results go to stdout."""
     if _level.get() > QUIET:
-        echo(printable_lines(text), err=True)
+        echo("\n".join(map(printable, text.split("\n"))), err=True)
 
 
 def say_left_out(names: Iterable[Path | str]) -> None:

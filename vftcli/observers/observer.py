@@ -66,7 +66,9 @@ class BlockObserver(Shown):
 
     def estimate(self, terms: Any) -> ExternalTorque:  # noqa: ANN401 - DynamicsTerms, or a Run
         """The estimate of a whole log, from rest at its first sample, by its terms or its run."""
-        return self.run(getattr(terms, "terms", terms))[0]
+        found = getattr(terms, "terms", terms)
+        check_kind(found, DynamicsTerms, "run", "Run(recording=…, robot=…)")
+        return self.run(found)[0]
 
     def estimated(self, terms: DynamicsTerms, tau: Array, **more: Any) -> ExternalTorque:  # noqa: ANN401
         """An estimate (T, n) [N·m] under the observer's name, its array for good."""
@@ -95,8 +97,3 @@ def angular(frequency: Array) -> Array:
     """ω of frequencies [Hz], at 0 Hz so near that quotients have their limit. (F, 1) [rad/s]"""
     omega = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64)[:, None]
     return np.where(omega == 0.0, 1e-9, omega)
-
-
-def check_terms(terms: DynamicsTerms) -> None:
-    """Raise a ParameterError unless what an observer runs over are dynamics terms."""
-    check_kind(terms, DynamicsTerms, "run", "Run(recording=…, robot=…)")

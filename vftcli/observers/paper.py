@@ -49,7 +49,6 @@ from vftcli.observers.observer import (
     Complex,
     Tuning,
     angular,
-    check_terms,
     numbers_of,
     per_joint,
 )
@@ -172,7 +171,6 @@ class FilteredDynamicsObserver(FirstOrderObserver):
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """A block's estimate after the last block's state; None at the log's start."""
-        check_terms(terms)
         if not self.as_printed:
             return self.run_corrected(terms, state, terms.d)
         d = printed_dynamics_input(terms, self.omega, begins=state is None)
@@ -211,7 +209,6 @@ class MomentumObserver(FirstOrderObserver):
         self, terms: DynamicsTerms, state: FirstOrderState | None = None
     ) -> tuple[ExternalTorque, FirstOrderState]:
         """A block's estimate after the last block's state; None at the log's start."""
-        check_terms(terms)
         if not self.as_printed:
             return self.run_corrected(terms, state, terms.d)
         gain = self.rates(terms.joints)
@@ -246,8 +243,7 @@ class KalmanObserver(BlockObserver):
     #: a in A_τ = −a, of either sign. (n,) [1/s]
     decay: Array | float = 0.0
     noise_convention: str = "density"  #: A key of `NOISE_CONVENTIONS`.
-    #: P⁻ of the first sample as (P₁₁, P₁₂, P₂₂) per joint, or None: stationary. (3,
-    #: n)
+    #: P⁻ of the first sample: P₁₁, P₁₂, P₂₂ of each joint; None for the stationary one. (3, n)
     initial_covariance: Array | None = None
     #: Use μᵗ alone (40), the literal noise convention, (44)'s printed block.
     as_printed: bool = False
@@ -277,7 +273,6 @@ class KalmanObserver(BlockObserver):
         self, terms: DynamicsTerms, state: KalmanState | None = None
     ) -> tuple[ExternalTorque, KalmanState]:
         """A block's estimate after the last block's state; None at the log's start."""
-        check_terms(terms)
         n, step, begins, d = terms.joints, terms.clock.step, state is None, self.unexplained(terms)
         zero, densities, settled = np.zeros((2, n)), self.densities(n), self.steady(step, n)
         if self.is_steady(terms.clock):

@@ -136,14 +136,11 @@ def median(values: Array) -> float:
     return 0.5 * float(lower + upper)
 
 
-EVEN = 1e-6  #: How far the steps of an even clock are from their median at most, relative to it.
+EVEN = 1e-6  #: Largest share by which steps of an even clock, stamps of nine digits, differ.
 
 
 def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
-    """Whether all steps of a clock are equal to within `tolerance` of their median.
-
-    That covers the rounding of stamps of nine digits.
-    """
+    """Whether all steps of a clock are equal to within `tolerance` of their median."""
     steps = np.diff(t)
     if steps.size == 0:
         return True

@@ -40,10 +40,8 @@ class DynamicsTerms(Shown):
     t: Array  #: Time. (T,) [s]
     p: Array  #: Generalised momentum M q̇. (T, n) [kg·m²/s]
     mu: Array  #: μ = τ + Cᵀq̇ − g − F_f, the torque that changes p without contact. (T, n) [N·m]
-    #: The whole log's clock where these are a block of it; None for a whole log.
-    log_clock: Clock | None = None
-    #: The sample before the first, where these are a later block of a log.
-    before: Instant | None = None
+    log_clock: Clock | None = None  #: The whole log's clock where these are a block of it.
+    before: Instant | None = None  #: The sample before the first of a later block of a log.
     room: InitVar[Array | None] = None  #: Memory for `d`, if it is there already. (T, n)
     #: dᵗ = pᵗ − pᵗ⁻¹ − ½Tsᵗ(μᵗ + μᵗ⁻¹), the change of momentum over a sample that the model leaves
     #: unexplained: the one input of every observer. Zero at a log's first sample. (T, n) [N·m·s]
@@ -107,8 +105,7 @@ def one_sample_earlier(terms: DynamicsTerms, name: str) -> Array:
 class ExternalTorque(TimeSeries):
     """Torque the environment exerts on the robot, positive along each joint axis."""
 
-    #: Short name of the observer or of the reference, as used in tables and column names.
-    name: str
+    name: str  #: Short name of the observer or the reference, as in tables and columns.
     t: Array  #: Time on the recording's clock. (T,) [s]
     tau: Array  #: External torque; NaN where it is not known. (T, n) [N·m]
     #: One standard deviation of `tau` by the estimator's own account. (T, n) [N·m]

@@ -39,11 +39,6 @@ def printable(text: str) -> str:
     )
 
 
-def printable_lines(text: str) -> str:
-    """The same for a text of several lines, which stay."""
-    return "\n".join(map(printable, text.split("\n")))
-
-
 #: Share of two words' letters that must agree in order: one slip in four letters, two in eight.
 LIKE = 0.74
 

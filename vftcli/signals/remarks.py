@@ -115,20 +115,10 @@ def warning(code: str, where: Where = Where(), **values: object) -> Remark:  # n
     return Remark(code, "warning", values, where)
 
 
-def sentence(remark: Remark) -> str:
-    """A remark's short words, headed by what it is about."""
-    return heading(remark) + filled(words(remark.code)["short"], remark)
-
-
-def explanation(remark: Remark) -> str:
-    """A remark's long words, its short ones where the catalogue has no others."""
-    entry = words(remark.code)
-    return heading(remark) + filled(entry.get("long", entry["short"]), remark)
-
-
-def heading(remark: Remark) -> str:
-    """What a remark is about, as its first words, or ""."""
-    return f"{remark.where.about}: " if remark.where.about else ""
+def sentence(remark: Remark, length: str = "short") -> str:
+    """A remark's short words, or its long ones if it has any, headed by what it is about."""
+    entry, about = words(remark.code), remark.where.about
+    return (f"{about}: " if about else "") + filled(entry.get(length, entry["short"]), remark)
 
 
 def filled(template: str, remark: Remark) -> str:

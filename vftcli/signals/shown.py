@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     import polars as pl
 
 LONGEST = 160  #: Letters of a line at most.
-#: An array of so many numbers, one a joint of most arms, is shown; of a larger one its shape.
-FEW = 7
+FEW = 7  #: An array of so many numbers, one a joint, is shown; of a larger one its shape.
 UNKNOWN = "–"  #: What stands for a number that is not known.
 
 

@@ -21,13 +21,10 @@ from vftcli.signals.arrays import Array, Indices, empty_series
 #: Samples handled at a time, so that memory does not grow with the log; blocks of a log that begin
 #: at multiples of it give the numbers of the whole log to the last bit.
 PIECE = 1 << 14
-#: What is left of a state that counts as nothing: far below the last digit of anything.
-FORGOTTEN = 1e-20
+FORGOTTEN = 1e-20  #: Share of a state that counts as nothing: far below its last digit.
 #: Samples in a block, a power of two: the work grows with it, the number of blocks shrinks.
 BLOCK = 32
-#: Samples in a block of `recursion` at most, the length of its Python loops; from 32 to 64 all take
-#: as long.
-LENGTH = 36
+LENGTH = 36  #: Most samples in a block of `recursion`, the length of its Python loops.
 
 
 def filtered(

@@ -15,7 +15,7 @@ from vftcli.outputs.page.pages import eyebrow, render
 from vftcli.outputs.page.shell import HERE, script_json
 from vftcli.outputs.run_record import run_record
 from vftcli.signals.recording import Recording
-from vftcli.signals.remarks import caution, explanation
+from vftcli.signals.remarks import caution, sentence
 
 HOSTILE = "</script><script>alert(1)</script>\u2028"
 
@@ -145,7 +145,7 @@ def test_nothing_is_said_twice(pushed: Analysis) -> None:
     # The grounds above name the few that an answer rests on.
     text = Page(render(made)).text.partition("Details")[2]
     for remark in made.run["remarks"]:
-        assert text.count(explanation(remark)) == 1, remark.code
+        assert text.count(sentence(remark, "long")) == 1, remark.code
 
 
 def test_values_at_the_floor_are_marked(analysis: Analysis) -> None:

@@ -21,7 +21,7 @@ from vftcli.outputs.examination import overridden_lines, warnings_of
 from vftcli.outputs.quantity import at_least_shown, counted, minus, ranged
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import printable
-from vftcli.signals.remarks import Remark, explanation
+from vftcli.signals.remarks import Remark, sentence
 from vftcli.signals.series import runs_of
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ def templates() -> "Environment":
 
     def worst_first(remarks: Iterable[Remark]) -> list[str]:
         """The words of every remark once, the most serious first."""
-        texts = {explanation(remark): LEVELS.index(remark.level) for remark in remarks}
+        texts = {sentence(remark, "long"): LEVELS.index(remark.level) for remark in remarks}
         return sorted(texts, key=lambda text: texts[text])
 
     made = Environment(
@@ -77,7 +77,7 @@ def templates() -> "Environment":
     made.filters |= {
         "f1": "{:.1f}".format,
         "known": np.isfinite,
-        "said": lambda line: explanation(line) if isinstance(line, Remark) else line,
+        "said": lambda line: sentence(line, "long") if isinstance(line, Remark) else line,
     }
     return made
 
