@@ -222,20 +222,21 @@ def residual_grid(found: Identification) -> Grid:
     rows: Rows = []
     for (_, *names), part in found.residuals.group_by(*keys, maintain_order=True):
         values = part["rms_Nm"].to_list()
-        rows.append((", ".join(map(str, names)), *values, sum(values) / len(values)))
-    first = Column("residual rms [N·m]", words=True, width=44)
-    joints = joint_columns(found.robot.joints, form=".3f", width=6)
-    return Grid((first, *joints, Column("mean", form=".3f", width=6)), rows)
+        label = ", ".join(str(name) for name in names if name != "train")
+        rows.append((label, *values, sum(values) / len(values)))
+    first = Column("residual rms [N·m]", words=True)
+    joints = joint_columns(found.robot.joints, form=".3f")
+    return Grid((first, *joints, Column("mean", form=".3f")), rows)
 
 
 def parameter_grid(found: Identification) -> Grid:
     """The identified numbers with their spread, and what the profile had."""
     columns = {
-        "parameter": Column("number", words=True, width=19),
-        "joint": Column("joint", width=4),
-        "value": Column("value", form=known_form(".5g"), width=10),
-        "sd": Column("sd", form=known_form(".2g"), width=8),
-        "profile": Column("profile", form=known_form(".5g"), width=10),
+        "parameter": Column("number", words=True),
+        "joint": Column("joint"),
+        "value": Column("value", form=known_form(".5g")),
+        "sd": Column("sd", form=known_form(".2g")),
+        "profile": Column("profile", form=known_form(".5g")),
         "unit": Column("unit", words=True),
     }
     rows = (
