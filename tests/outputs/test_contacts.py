@@ -2,17 +2,30 @@
 
 import csv
 import io
+import json
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+import pytest
 from contact_rows import contact, contact_list
 
+from vftcli.contacts.contact_list import CarriedLoad, Unexplained
 from vftcli.outputs.contacts import (
     answer,
     contact_grid,
     contacts_csv,
     contacts_record,
+    direction,
     hardest_rows,
+    hardest_words,
+    place_words,
+    reason,
+    stored_list,
+    stored_record,
 )
-from vftcli.outputs.run_record import jsonable
+from vftcli.outputs.run_record import jsonable, to_json
+from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import caution
 
 KEYS = {"recording", "frame", "sign", "free_part", "smallest_force_N", "contacts", "candidates"}
@@ -72,3 +85,112 @@ def test_the_hardest_rows_are_in_the_order_of_time() -> None:
     assert [row.number for row in hardest_rows(many, 3)] == [1, 2, 3]
     wide = contact(number=2, peak_force=88.0, peak_band=170.0)
     assert [row.number for row in hardest_rows([wide, contact()], 1)] == [1]
+
+
+def test_the_answer_is_a_sentence() -> None:
+    found = contact_list(contact())
+    assert answer(found) == "1 contact. The hardest, at 4.7 s: 65 ± 7 N on the wrist."
+    assert answer(contact_list()) == "Nothing touched the arm, as far as this log shows."
+    load = contact(is_load=True, mean_force=np.array([0.0, 0.0, -27.0]), peak_force=27.0)
+    assert answer(contact_list(load)) == (
+        "A load, or a wrong payload, or a wrong model: 27 ± 7 N on average, down."
+    )
+
+
+def test_a_log_without_free_motion_is_never_called_untouched() -> None:
+    empty = contact_list(basis="whole log")
+    assert answer(empty) == "No contact stands out."
+    likely = replace(empty, candidates=(contact(peak_force=33.0, peak_band=7.0, peak=12.9),))
+    assert answer(likely).startswith(
+        "No contact stands out. Up to 40 N near 12.9 s this model cannot explain: name free motion "
+    )
+    nothing = contact_list(basis="none", unexplained=Unexplained(22.1, 4, 3.2))
+    assert answer(nothing).startswith(
+        "Largest unexplained torque: 22 N·m on J4 at 3.2 s: a contact or a model error."
+    )
+
+
+def test_a_load_that_the_model_lacks_is_in_the_headline() -> None:
+    load = CarriedLoad(2.88, 0.09, "ur10e", None, (4.7, 50.5))
+    assert answer(contact_list(basis="whole log", load=load)) == (
+        "The arm carries 2.88 ± 0.09 kg that ur10e does not know of (4.7–50.5 s). "
+        "No contact stands out."
+    )
+    hand = answer(contact_list(load=load._replace(payload="franka_hand")))
+    assert "(4.7–50.5 s): franka_hand? Add --payload franka_hand." in hand
+
+
+def test_places_that_cannot_be_told_apart_are_named() -> None:
+    def told(*links: int) -> str:
+        return place_words(contact(where="cannot tell", places=links))
+
+    assert told(2, 3, 6) == "link 2 … link 6"
+    assert told(0, 3, 6) == "link 3 … flange"
+    assert told(2) == "link 2"
+    assert place_words(contact()) == "wrist"
+
+
+@pytest.mark.parametrize(
+    ("force", "words"),
+    [
+        ((0.4, 51.9, -38.8), "+y, down"),
+        ((3.0, -4.0, 3.0), "−y, +x, up"),
+        ((0.0, 0.0, 2.0), "up"),
+        ((0.0, 0.0, -5.0), "down"),
+        ((1.0, 9.0, 0.0), "+y"),
+        ((-9.0, 1.0, 0.0), "−x"),
+        ((0.0, 0.0, 0.0), "–"),
+    ],
+)
+def test_a_direction_names_every_axis_that_holds_much(
+    force: tuple[float, float, float], words: str
+) -> None:
+    """More than .35 of the force: 0.35² is an eighth of its square."""
+    assert direction(np.array(force)) == words
+
+
+def test_the_answer_is_no_force_within_its_band() -> None:
+    wide = contact(number=2, peak_force=88.0, peak_band=170.0)
+    assert answer(contact_list(contact(), wide)) == (
+        "2 contacts. The hardest of known size, at 4.7 s: 65 ± 7 N on the wrist."
+    )
+    assert answer(contact_list(wide)) == ("1 contact. How hard is unknown: below 258 N.")
+    assert hardest_words(contact_list(wide)) == "unknown (88 ± 170 N at 4.7 s)"
+    load = contact(peak_force=3.0, peak_band=5.0, is_load=True)
+    assert answer(contact_list(load)).endswith("or a wrong model: below 8 N on average.")
+    weak = contact(peak_band=30.0, where="cannot tell")
+    assert answer(contact_list(weak)) == "1 contact. The hardest, at 4.7 s: 65 ± 30 N (weak)."
+
+
+def test_trust_says_why() -> None:
+    sure = contact(
+        evidence=400.0, remarks=(), anywhere=(45.0, 60.0), peak_force=50.0, peak_band=5.0
+    )
+    assert reason(sure) == "the band is 10% of the force"
+    assert "the place" in reason(replace(sure, anywhere=(20.0, 90.0)))
+    assert "friction" in reason(replace(sure, evidence=14.0))
+    assert "stopped" in reason(replace(sure, remarks=(caution("arm-stopped-abruptly", at_s=3.0),)))
+    assert "few joints" in reason(replace(sure, peak_force=None, peak_band=None))
+    assert reason(replace(sure, is_load=True)) == "lasts for most of the log"
+
+
+def test_a_list_survives_its_record() -> None:
+    bare = contact(number=2, peak_force=None, peak_band=None, wrench=None, wrench_sd=None,
+                   mean_force=None, impulse=None, anywhere=None, is_load=True)  # fmt: skip
+    record = json.loads(to_json(contacts_record(contact_list(contact(), bare, free=()))))
+    assert json.loads(to_json(contacts_record(stored_list(record)))) == record
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "no run.json of theirs is beside it; give the log"),
+        ("{}", "no run.json of theirs is beside it"),
+        ('{"contacts": null, "input": {"path": "a.csv", "sha256": ""}}', "log, a.csv"),
+    ],
+)
+def test_without_a_list_the_log_is_asked_for(text: str | None, words: str, tmp_path: Path) -> None:
+    if text is not None:
+        (tmp_path / "run.json").write_text(text, encoding="utf-8")
+    with pytest.raises(LogError, match=words):
+        stored_record(tmp_path / "estimates.parquet")

@@ -1,13 +1,21 @@
 """Conversion: what is written reads back, equal to the format's own precision."""
 
+import json
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
 
-from vftcli.outputs.conversion import WRITERS, convert
+from vftcli.analysis import Analysis
+from vftcli.outputs import conversion
+from vftcli.outputs.contacts import contacts_record
+from vftcli.outputs.conversion import WRITERS, convert, ros_name, stamps_of, write_mcap
+from vftcli.outputs.run_record import jsonable
 from vftcli.readers import read
+from vftcli.robots.terms import drive_torque
 from vftcli.signals.errors import OutputError
 from vftcli.signals.recording import JOINT_SIGNALS, Recording, Source
 from vftcli.signals.wrench import WrenchFrame
@@ -97,3 +105,138 @@ def test_columns_say_what_they_hold(tmp_path: Path) -> None:
     assert schema.field("current/1").metadata[b"unit"] == b"A"
     assert schema.field("wrench/fx").metadata[b"sign"] == b"by-robot"
     assert b"base axes" in schema.field("wrench/fx").metadata[b"frame"]
+
+
+@pytest.fixture(scope="module")
+def path(touched: Analysis, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A file of three blocks of samples, with two contacts."""
+    path = tmp_path_factory.mktemp("mcap") / "estimates.mcap"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(conversion, "BLOCK", 256)
+        write_mcap(path, touched)
+    return path
+
+
+@pytest.fixture(scope="module")
+def messages(path: Path) -> dict[str, list]:
+    """Topic → (stamp in the file, message), read by rosbags."""
+    found: dict[str, list] = {}
+    with AnyReader([path]) as reader:
+        for connection, stamp, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            found.setdefault(connection.topic, []).append((stamp, message))
+    return found
+
+
+def test_every_topic_has_every_sample(messages: dict[str, list]) -> None:
+    observers = ("best", "fdo", "gmo", "kfo_fe", "kfo_zoh", "reference")
+    topics = ["/joint_states", *(f"/vftcli/external/{name}" for name in observers)]
+    topics.append("/vftcli/wrench/best")
+    assert {topic: len(messages[topic]) for topic in topics} == dict.fromkeys(topics, 600)
+    few = {"/vftcli/contacts": 1, "/vftcli/contacts/log": 4}
+    assert {topic: len(messages[topic]) for topic in few} == few
+    assert set(messages) == {*topics, *few}
+
+
+def test_mcap_reads_what_rosbags_reads(path: Path, messages: dict[str, list]) -> None:
+    """Every message of the file by the format's own reader, in the order of time as written."""
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        assert reader.get_header().profile == "ros2"
+        found = list(reader.iter_messages(log_time_order=False))
+        late = {c.topic for c in reader.get_summary().channels.values() if c.metadata}
+    assert len(found) == sum(map(len, messages.values()))
+    stamps = [message.log_time for _, _, message in found]
+    assert stamps == sorted(stamps)
+    assert {schema.encoding for schema, _, _ in found} == {"ros2msg"}
+    assert late == {"/vftcli/contacts"}
+
+
+def test_the_list_of_contacts_is_kept_for_who_comes_late(path: Path) -> None:
+    with AnyReader([path]) as reader:
+        for connection in reader.connections:
+            latched = connection.topic == "/vftcli/contacts"
+            profiles = connection.ext.offered_qos_profiles
+            assert bool(profiles) == latched
+            if latched:
+                assert profiles[0].durability.name == "TRANSIENT_LOCAL"
+                assert profiles[0].depth == 1
+
+
+def test_the_wrench_of_best_stands_in_the_flange(
+    messages: dict[str, list], touched: Analysis
+) -> None:
+    found = [message for _, message in messages["/vftcli/wrench/best"]]
+    assert {message.header.frame_id for message in found} == {"flange"}
+    force = [[m.wrench.force.x, m.wrench.force.y, m.wrench.force.z] for m in found]
+    moment = [[m.wrench.torque.x, m.wrench.torque.y, m.wrench.torque.z] for m in found]
+    np.testing.assert_array_equal(np.hstack([force, moment]), touched.wrenches[0].known)
+
+
+def test_wrenches_in_base_axes_say_about_which_point(with_wrench: Analysis) -> None:
+    """The flange is where their moment refers to: the frame of base would be another."""
+    topics = conversion.estimated_topics(with_wrench)
+    frames = {topic.values.get("header.frame_id") for topic in topics}
+    assert frames == {None, "base@flange"}
+
+
+def test_contacts_are_logged_and_listed(messages: dict[str, list], touched: Analysis) -> None:
+    logged = [(stamp, message) for stamp, message in messages["/vftcli/contacts/log"]]
+    start = messages["/joint_states"][0][0]
+    seconds = [(stamp - start) / 1e9 for stamp, _ in logged]
+    assert seconds == pytest.approx([1.0, 1.5, 2.2, 2.6])
+    texts = [message.message for _, message in logged]
+    assert texts[0].startswith("1.00 s: contact 1 begins, for 0.50 s: 65 ± 7 N")
+    assert texts[1] == "contact 1 ends"
+    first = logged[0][1].timestamp
+    assert first.sec * 10**9 + first.nanosec == logged[0][0]
+    ((_, listed),) = messages["/vftcli/contacts"]
+    assert touched.contacts is not None
+    assert json.loads(listed.data) == json.loads(
+        json.dumps(jsonable(contacts_record(touched.contacts)))
+    )
+
+
+def test_joint_states_are_the_log(messages: dict[str, list], analysis: Analysis) -> None:
+    states = [message for _, message in messages["/joint_states"]]
+    recording = analysis.recording
+    torque = drive_torque(recording, analysis.robot)
+    np.testing.assert_array_equal([m.position for m in states], recording.q)
+    np.testing.assert_array_equal([m.velocity for m in states], recording.dq)
+    np.testing.assert_array_equal([m.effort for m in states], torque)
+    assert {tuple(m.name) for m in states} == {analysis.robot.chain.names}
+
+
+def test_estimates_are_efforts(messages: dict[str, list], analysis: Analysis) -> None:
+    found = [message.effort for _, message in messages["/vftcli/external/kfo_fe"]]
+    np.testing.assert_array_equal(found, analysis.estimates[3].tau)
+    assert len(messages["/vftcli/external/kfo_fe"][0][1].position) == 0
+
+
+def test_stamps_are_the_logs_own(messages: dict[str, list], analysis: Analysis) -> None:
+    """The log's first stamp is 100.25 s."""
+    expected = np.round(analysis.t * 1e9).astype(int) + 100_250_000_000
+    for stamp, message in messages["/joint_states"][:1] + messages["/joint_states"][-1:]:
+        inside = message.header.stamp.sec * 10**9 + message.header.stamp.nanosec
+        assert stamp == inside
+    assert [stamp for stamp, _ in messages["/joint_states"]] == expected.tolist()
+
+
+@pytest.mark.parametrize(
+    ("name", "shown"), [("kfo-fe", "kfo_fe"), ("größe", "gr__e"), ("rts auto 2", "rts_auto_2")]
+)
+def test_names_as_ros_allows_them(name: str, shown: str) -> None:
+    assert ros_name(name) == shown
+
+
+def test_stamps_that_ros_cannot_count_begin_at_zero() -> None:
+    t = np.array([0.0, 0.5])
+
+    def stamps(t0: float) -> list[int]:
+        return stamps_of(Recording(t=t, q=np.zeros((2, 1)), source=Source(t0=t0))).tolist()
+
+    assert stamps(100.25) == [100_250_000_000, 100_750_000_000]
+    assert stamps(-1.0) == [0, 500_000_000]
+    last = 2.0**31 - 1  # seconds that a signed word of 32 bits can hold
+    assert stamps(last)[0] == (2**31 - 1) * 10**9
+    assert stamps(last + 0.75) == [0, 500_000_000]

@@ -1,21 +1,34 @@
+import csv
+import io
+import json
+from collections.abc import Callable
+
 import numpy as np
 import polars as pl
 import pytest
 
-from vftcli.evaluation import SCHEMA
+from vftcli.analysis import Analysis
+from vftcli.evaluation import SCHEMA, WRENCH_SCHEMA
+from vftcli.outputs import error_tables as tables
 from vftcli.outputs.error_tables import (
+    axis_grids,
     blocks,
     detail_grids,
     details,
     logs_of,
     marks_in_words,
+    nothing_to_compare,
+    paper_bounds,
     rmse_grid,
 )
 from vftcli.outputs.grid import GridCell, latex, markdown, terminal
+from vftcli.outputs.grids import contact_grids, drift_grid, pairs_text
 from vftcli.outputs.page.shell import part
+from vftcli.signals.wrench import AXES
+from vftcli.virtual_sensor.sensor_reading import Drift
 
 
-def errors(*changed: dict[str, object]) -> pl.DataFrame:
+def errors_of(*changed: dict[str, object]) -> pl.DataFrame:
     """Two observers on two joints, rows changed one by one."""
     base = [("fdo", 1, 0.6), ("fdo", 2, 2.0), ("gmo", 1, 0.5999), ("gmo", 2, 1.0)]
     rows = []
@@ -34,26 +47,26 @@ def errors(*changed: dict[str, object]) -> pl.DataFrame:
 
 
 def test_values_that_print_alike_are_both_the_best() -> None:
-    (block,) = blocks(errors(*[{"reference_floor_Nm": 0.1}] * 4))
+    (block,) = blocks(errors_of(*[{"reference_floor_Nm": 0.1}] * 4))
     assert block.best.tolist() == [[True, False], [True, True]]
 
 
 def test_bold_is_only_where_the_reference_can_tell() -> None:
     """J1: both at the floor of .5; J2: it rests most of the time."""
-    (block,) = blocks(errors({}, {"reference_trusted": False}, {}, {"reference_trusted": False}))
+    (block,) = blocks(errors_of({}, {"reference_trusted": False}, {}, {"reference_trusted": False}))
     assert not block.best.any()
 
 
 def test_an_observer_that_fails_is_named_with_the_share() -> None:
-    (block,) = blocks(errors({"missing": 0.12}, {"missing": 0.03}))
+    (block,) = blocks(errors_of({"missing": 0.12}, {"missing": 0.03}))
     assert "fdo: no answer in up to 12 %" in marks_in_words([block])
-    assert "no answer" not in marks_in_words(blocks(errors()))
+    assert "no answer" not in marks_in_words(blocks(errors_of()))
 
 
 def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
     """J2's reference is not to be trusted: terminal, Markdown, LaTeX and page show J1's error."""
     rests = {"reference_trusted": False}
-    (block,) = blocks(errors({}, rests, {"rmse_Nm": 0.9}, rests))
+    (block,) = blocks(errors_of({}, rests, {"rmse_Nm": 0.9}, rests))
     grid = rmse_grid(block)
     assert block.means.errors == {"fdo": 0.6, "gmo": 0.9}
     for text in (terminal(grid), markdown(grid), latex(grid), part("parts/table", grid)):
@@ -65,7 +78,7 @@ def test_every_output_has_one_mean_and_says_what_it_leaves_out() -> None:
 
 def test_at_the_floor_is_within_a_fifth_of_it() -> None:
     """Joint 1: .6 is 1.2 × .5; joint 2: 1 is twice the floor."""
-    (block,) = blocks(errors())
+    (block,) = blocks(errors_of())
     assert block.at_floor.tolist() == [[True, False], [True, False]]
     assert block.title == "run.csv against two-cycle, 100 to 103 samples"
     grid = rmse_grid(block)
@@ -78,32 +91,32 @@ def test_at_the_floor_is_within_a_fifth_of_it() -> None:
 
 
 def test_a_floor_of_one_joint_is_a_floor() -> None:
-    (block,) = blocks(errors({"reference_floor_Nm": None}, {}, {"reference_floor_Nm": None}))
+    (block,) = blocks(errors_of({"reference_floor_Nm": None}, {}, {"reference_floor_Nm": None}))
     assert block.has_floor
     assert np.isnan(block.floor[0])
-    (without,) = blocks(errors(*[{"reference_floor_Nm": None}] * 4))
+    (without,) = blocks(errors_of(*[{"reference_floor_Nm": None}] * 4))
     assert not without.has_floor
     assert rmse_grid(without).summaries == 0
 
 
 def test_a_joint_that_rests_bears_a_dagger() -> None:
-    (block,) = blocks(errors({}, {"reference_trusted": False}))
+    (block,) = blocks(errors_of({}, {"reference_trusted": False}))
     assert block.untrusted == (2,)
     assert block.joint_heads == ["J1", "J2†"]
     assert "do not trust it" in marks_in_words([block])
-    (trusted,) = blocks(errors())
+    (trusted,) = blocks(errors_of())
     assert "†" not in marks_in_words([trusted])
 
 
 def test_an_unknown_error_is_not_the_best_and_does_not_count_in_the_mean() -> None:
-    (block,) = blocks(errors({"rmse_Nm": None}))
+    (block,) = blocks(errors_of({"rmse_Nm": None}))
     assert block.best.tolist() == [[False, False], [True, True]]
     assert block.means.errors["fdo"] == 2.0
     assert "no sample" in marks_in_words([block])
 
 
 def test_logs_of_one_label_stay_apart_also_with_other_joints() -> None:
-    both = pl.concat([errors(), errors().filter(pl.col("joint") == 1)])
+    both = pl.concat([errors_of(), errors_of().filter(pl.col("joint") == 1)])
     assert [len(rows) for rows in logs_of(both, "joint")] == [4, 2]
     assert list(logs_of(both, "axis")) == []
 
@@ -123,8 +136,270 @@ def test_details_as_text(values: tuple[float | None, ...], texts: list[str]) -> 
 
 def test_a_detail_that_nobody_knows_has_no_table() -> None:
     known = [{"p_vs_best": 1.0, "lag_s": 0.01}] * 4
-    titles = [grid.title for grid in detail_grids(errors(*known))]
+    titles = [grid.title for grid in detail_grids(errors_of(*known))]
     assert len(titles) == 2
     assert titles[0].startswith("run.csv: lag")
     assert titles[1].startswith("run.csv: p of being")
-    assert list(detail_grids(errors())) == []
+    assert list(detail_grids(errors_of())) == []
+
+
+def row(observer: str, joint: int, rmse: float | None, **changed: object) -> dict[str, object]:
+    return {
+        "recording": "a_b.csv",
+        "observer": observer,
+        "joint": joint,
+        "rmse_Nm": rmse,
+        "bias_Nm": 0.1,
+        "max_Nm": 1.0,
+        "correlation": None,
+        "reference": "two-cycle",
+        "reference_floor_Nm": 0.5 * joint,
+        "samples": 100,
+    } | changed
+
+
+@pytest.fixture
+def errors() -> pl.DataFrame:
+    return pl.DataFrame(
+        [row("fdo", 1, 0.55), row("fdo", 2, 12.346), row("gmo", 1, 2.0), row("gmo", 2, None)],
+        schema=SCHEMA,
+    )
+
+
+def test_terminal_table(errors: pl.DataFrame) -> None:
+    """0.55 is within 1.2 × 0.5: a star; the mean is over the joints that are known."""
+    assert tables.to_terminal(errors) == (
+        "a_b.csv against two-cycle, 100 samples, RMSE in N·m\n"
+        "observer     J1     J2    mean\n"
+        "fdo       0.550*  12.3    6.45\n"
+        "gmo        2.00      –    2.00\n"
+        "------------------------------\n"
+        "floor     0.500   1.00   0.750\n"
+        "floor: RMSE that the reference itself is known to have\n"
+        "*: within 1.2 × the floor; the reference can tell no more\n"
+        "–: no sample where the reference is known\n"
+    )
+
+
+def test_one_block_a_recording(errors: pl.DataFrame) -> None:
+    other = errors.with_columns(recording=pl.lit("b.csv"))
+    text = tables.to_terminal(pl.concat([errors, other]))
+    assert text.count("observer ") == 2
+    assert text.index("a_b.csv") < text.index("b.csv against")
+
+
+@pytest.mark.parametrize("show", [tables.to_terminal, tables.to_markdown, tables.to_latex])
+def test_two_logs_of_one_label_stay_two_tables(errors: pl.DataFrame, show: Callable) -> None:
+    """The second log's numbers took the place of the first's."""
+    other = errors.with_columns(rmse_Nm=pl.col("rmse_Nm") * 10.0)
+    text = show(pl.concat([errors, other]))
+    assert text.count("12.3") == 1
+    assert text.count("123") == 1
+    assert text.count("a_b.csv against") + text.count(r"a\_b.csv against") == 2
+
+
+def test_pairs_name_the_better_first() -> None:
+    rows = pl.DataFrame(
+        {
+            "recording": ["a.csv"] * 2,
+            "joint": [1, 2],
+            "observer": ["fdo", "fdo"],
+            "other": ["gmo", "gmo"],
+            "difference_Nm": [0.5, -0.25],
+            "low_Nm": [0.1, -0.5],
+            "high_Nm": [0.9, 0.1],
+            "p": [0.01, 0.2],
+        }
+    )
+    lines = pairs_text(rows).splitlines()
+    assert lines[1].split() == [
+        "a.csv",
+        "J1",
+        "gmo",
+        "fdo",
+        "0.500",
+        "0.100",
+        "to",
+        "0.900",
+        "0.010*",
+    ]
+    assert lines[2].split() == [
+        "a.csv",
+        "J2",
+        "fdo",
+        "gmo",
+        "0.250",
+        "-0.100",
+        "to",
+        "0.500",
+        "0.200",
+    ]
+    assert lines[3] == "*: p below 0.05"
+
+
+def test_what_is_for_details_can_be_left_out(errors: pl.DataFrame) -> None:
+    known = errors.with_columns(
+        rmse_low_Nm=pl.lit(0.4), rmse_high_Nm=pl.lit(0.7), p_vs_best=pl.lit(1.0)
+    )
+    assert "95 % interval" in tables.to_terminal(known)
+    assert "95 % interval" not in tables.to_terminal(known, every=False)
+    assert tables.to_terminal(errors, every=False) == tables.to_terminal(errors)
+
+
+def test_no_errors_are_said() -> None:
+    assert "no errors to show" in tables.to_terminal(pl.DataFrame(schema=SCHEMA))
+
+
+def test_a_floor_nobody_knows_is_left_out(errors: pl.DataFrame) -> None:
+    unknown = errors.with_columns(reference_floor_Nm=pl.lit(None, dtype=pl.Float64))
+    assert "floor" not in tables.to_terminal(unknown)
+
+
+def test_json_has_null_for_unknown(errors: pl.DataFrame) -> None:
+    rows = json.loads(tables.FORMS["json"](errors.with_columns(bias_Nm=float("nan"))))
+    assert [r["rmse_Nm"] for r in rows] == [0.55, 12.346, 2.0, None]
+    assert {r["bias_Nm"] for r in rows} == {None}
+    assert set(rows[0]) >= {"recording", "observer", "joint", "reference", "reference_floor_Nm"}
+
+
+def test_csv_reads_back(errors: pl.DataFrame) -> None:
+    rows = list(csv.DictReader(io.StringIO(tables.FORMS["csv"](errors))))
+    assert [r["rmse_Nm"] for r in rows] == ["0.55", "12.346", "2.0", ""]
+
+
+def test_markdown_marks_the_best_and_escapes(errors: pl.DataFrame) -> None:
+    text = tables.to_markdown(errors)
+    assert "| fdo | **0.550** | **12.3** | 6.45 |" in text
+    assert "| gmo | 2.00 | – | 2.00 |" in text
+    assert r"a\_b.csv" in text
+
+
+def test_latex(errors: pl.DataFrame) -> None:
+    text = tables.to_latex(errors.with_columns(observer=pl.col("observer") + "_%&"))
+    assert r"\caption{a\_b.csv against two-cycle, 100 samples, RMSE in N\,m}" in text
+    assert r"\begin{tabular}{lrrr}" in text
+    assert (
+        r"fdo\_\%\& & \textbf{0.550}\rlap{$^{*}$} & \textbf{12.3}\phantom{0} & 6.45\phantom{0} \\"
+    ) in text
+    assert text.index(r"\toprule") < text.index(r"\midrule") < text.index(r"\bottomrule")
+    assert r"floor & 0.500 & 1.00 & 0.750 \\" in text
+    assert text.index("floor: RMSE that") < text.index(r"\end{table}")
+
+
+def test_logs_share_a_latex_table_and_a_dagger_goes_with_its_log(errors: pl.DataFrame) -> None:
+    other = errors.with_columns(recording=pl.lit("b.csv"), reference_trusted=pl.col("joint") != 2)
+    text = tables.to_latex(pl.concat([errors, other]))
+    assert text.count(r"\begin{table}") == 1
+    assert r"\textit{b.csv against two-cycle, 100 samples, J2$\dagger$}" in text
+    assert r"\multicolumn{1}{c}{$J_{2}$}" in text
+    alone = tables.to_latex(other)
+    assert r"\multicolumn{1}{c}{$J_{2}$$^\dagger$}" in alone
+
+
+def test_a_name_is_no_command_of_latex(errors: pl.DataFrame) -> None:
+    text = tables.to_latex(errors.with_columns(recording=pl.lit("a\n\\input{b}")))
+    assert r"\input" not in text
+
+
+@pytest.fixture
+def wrench_errors() -> pl.DataFrame:
+    """gmo against a sensor: 1.5 N on every force axis, .25 N·m on every moment axis."""
+    rows = [
+        {
+            "recording": "run.csv",
+            "observer": "gmo",
+            "reference": "sensor",
+            "axis": axis,
+            "rmse_N": 1.5 if k < 3 else None,
+            "rmse_Nm": None if k < 3 else 0.25,
+            "samples": 90,
+        }
+        for k, axis in enumerate(AXES)
+    ]
+    return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
+
+
+def test_forces_in_newtons_beside_moments_in_newton_metres(wrench_errors: pl.DataFrame) -> None:
+    (grid,) = axis_grids(wrench_errors)
+    assert terminal(grid).splitlines() == [
+        "run.csv against sensor, wrench, 90 unmasked samples, RMSE",
+        "observer  fx [N]  fy [N]  fz [N]  mx [N·m]  my [N·m]  mz [N·m]",
+        "gmo         1.50    1.50    1.50     0.250     0.250     0.250",
+    ]
+
+
+def test_a_pose_that_hides_every_wrench_is_said_in_one_line(wrench_errors: pl.DataFrame) -> None:
+    """It was a table of dashes over "0 unmasked samples"."""
+    none = wrench_errors.with_columns(
+        samples=pl.lit(0, pl.Int64),
+        rmse_N=pl.lit(None, pl.Float64),
+        rmse_Nm=pl.lit(None, pl.Float64),
+    )
+    assert list(axis_grids(none)) == []
+    (line,) = nothing_to_compare(none)
+    assert line.startswith("run.csv against sensor, wrench: nothing to compare: ")
+    assert "below 0.05" in line
+    assert list(nothing_to_compare(wrench_errors)) == []
+
+
+def test_the_paper_s_bounds_stand_below_its_own_arm_only(
+    wrench_errors: pl.DataFrame, without_reference: Analysis, as_if: Callable
+) -> None:
+    """They stood below every arm's numbers, a Panda's too."""
+    ur5, panda = (as_if(without_reference, arm=name) for name in ("ur5", "panda"))
+    label = ur5.recording.name
+    named = wrench_errors.with_columns(recording=pl.lit(label))
+    (shown,) = axis_grids(named, paper_bounds([ur5]))
+    assert shown.rows[-1] == ("paper, UR5", "< 6", "< 6", "< 6", "< 0.65", "< 0.65", "< 0.65")
+    assert paper_bounds([panda]) == {}
+    (without,) = axis_grids(named, paper_bounds([panda]))
+    assert len(without.rows) == 1
+    (other,) = axis_grids(wrench_errors, paper_bounds([ur5]))
+    assert len(other.rows) == 1, "run.csv is not the UR5's log"
+
+
+def test_the_paper_s_bounds_are_of_a_sensor(
+    wrench_errors: pl.DataFrame, without_reference: Analysis
+) -> None:
+    label = without_reference.recording.name
+    truth = wrench_errors.with_columns(recording=pl.lit(label), reference=pl.lit("file:truth"))
+    (grid,) = axis_grids(truth, paper_bounds([without_reference]))
+    assert len(grid.rows) == 1
+
+
+def test_contacts_are_counted_in_whole_numbers() -> None:
+    row = {
+        "recording": "run.csv",
+        "observer": "gmo",
+        "signal": "torque",
+        "contacts": 3,
+        "listed_contacts": 4,
+        "found_contacts": 3,
+        "missed_contacts": 0,
+        "merged_contacts": 0,
+        "split_contacts": 1,
+        "false_alarms": 0,
+        "false_alarms_per_h": 0.0,
+        "detection_delay_s": 0.04,
+        "longest_delay_s": None,
+    }
+    (grid,) = contact_grids(pl.DataFrame([row, row | {"contacts": None}]))
+    assert terminal(grid, width=200).splitlines()[2].split() == [
+        "run.csv", "gmo", "torque", "3", "4", "3", "0", "0", "1", "0", "0", "0.0400", "–",
+    ]  # fmt: skip
+    assert list(contact_grids(pl.DataFrame({"recording": ["a"]}))) == []
+
+
+def test_zero_drift_has_five_decimals_as_the_paper_prints_it() -> None:
+    mean = np.array([-0.43166, -0.53348, 0.83768, -0.16294, 0.13407, 0.09103])
+    drift = Drift(
+        name="kfo-fe", span=(1.0, 4.5), mean=mean, sd=np.zeros(6), samples=9, frame="base"
+    )
+    text = terminal(drift_grid([drift]))
+    assert text.split() == [
+        "observer", *AXES,
+        "kfo-fe", "-0.43166", "-0.53348", "0.83768", "-0.16294", "0.13407", "0.09103",
+    ]  # fmt: skip
+    page = drift_grid([drift], spans=True)
+    assert [column.heading for column in page.columns[:3]] == ["observer", "span [s]", "fx [N]"]
+    assert page.rows[0][1] == "1–4.5"
