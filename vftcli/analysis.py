@@ -141,7 +141,7 @@ class Analysis(Shown):
         """Write page, recording, tables and estimates into a folder, as `vftcli report` does."""
         write = import_module("vftcli.outputs.report").write_report
         command = self.run.get("command", "vftcli.Analysis.save")
-        write(Path(folder), self, command=command, force=force)
+        write(Path(folder), [self], command=command, force=force)
 
     def run_of(self, name: str, run: "Run") -> "Run":
         """The log or one of its free runs, as the observer of this name has it."""

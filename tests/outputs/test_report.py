@@ -15,13 +15,12 @@ from vftcli.outputs.report import (
     FILES,
     SUMMARY_FILES,
     write_report,
-    write_reports,
 )
 from vftcli.signals.errors import OutputError
 
 
 def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
-    text = write_report(tmp_path / "out", analysis, command="vftcli report x")
+    text = write_report(tmp_path / "out", [analysis], command="vftcli report x")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(FILES)
     written = json.loads((tmp_path / "out/run.json").read_text(encoding="utf-8"))
     files = written.pop("files")
@@ -36,7 +35,7 @@ def test_a_report_holds_its_files(analysis: Analysis, tmp_path: Path) -> None:
 def test_without_a_reference_there_are_no_error_tables(
     without_reference: Analysis, tmp_path: Path
 ) -> None:
-    write_report(tmp_path, without_reference, command="")
+    write_report(tmp_path, [without_reference], command="")
     found = {p.name for p in tmp_path.iterdir()}
     assert found == set(FILES) - set(ERROR_TABLES)
 
@@ -44,17 +43,17 @@ def test_without_a_reference_there_are_no_error_tables(
 def test_the_list_of_contacts_is_written_as_it_is_printed(
     touched: Analysis, tmp_path: Path
 ) -> None:
-    write_report(tmp_path / "one", touched, command="")
+    write_report(tmp_path / "one", [touched], command="")
     record = json.loads((tmp_path / "one/contacts.json").read_text(encoding="utf-8"))
     assert [row["number"] for row in record["contacts"]] == [1, 2]
     rows = pl.read_csv(tmp_path / "one/contacts.csv")
     assert rows["start_s"].to_list() == [1.0, 2.2]
-    write_report(tmp_path / "none", replace(touched, contacts=None), command="")
+    write_report(tmp_path / "none", [replace(touched, contacts=None)], command="")
     assert not (tmp_path / "none/contacts.json").exists()
 
 
 def test_a_report_writes_an_mcap_on_request(touched: Analysis, tmp_path: Path) -> None:
-    write_report(tmp_path / "out", touched, command="", choice=OutputChoice(extras=("mcap",)))
+    write_report(tmp_path / "out", [touched], command="", choice=OutputChoice(extras=("mcap",)))
     found = {p.name for p in (tmp_path / "out").iterdir()}
     assert found == {*FILES, "estimates.mcap"}
 
@@ -71,13 +70,13 @@ def labelled(analysis: Analysis, label: str, as_if: Callable) -> Analysis:
 def test_of_several_logs_one_that_is_left_is_written_as_one_of_several(
     touched: Analysis, tmp_path: Path
 ) -> None:
-    write_reports(tmp_path, [touched], command="", failed={"bad.csv": "no log"})
+    write_report(tmp_path, [touched], command="", failed={"bad.csv": "no log"})
     (place,) = (p for p in tmp_path.iterdir() if p.is_dir())
     assert {p.name for p in tmp_path.iterdir() if p.is_file()} <= set(SUMMARY_FILES)
     record, own = ((at / "contacts.json").read_text("utf-8") for at in (tmp_path, place))
     assert record == own
     with pytest.raises(OutputError, match="exists"):
-        write_reports(tmp_path, [touched], command="")
+        write_report(tmp_path, [touched], command="")
 
 
 @pytest.mark.slow
@@ -87,7 +86,7 @@ def test_several_logs_get_a_folder_each_and_an_index(
     """Two logs of one file name: folders are numbered, rows bear the labels."""
     labels = ["a/run.csv", "b/run.csv"]
     analyses = [labelled(analysis, label, as_if) for label in labels]
-    text = write_reports(tmp_path / "out", analyses, command="vftcli report a b")
+    text = write_report(tmp_path / "out", analyses, command="vftcli report a b")
     folders = sorted(p.name for p in (tmp_path / "out").iterdir() if p.is_dir())
     assert folders == ["run", "run-2"]
     for folder in folders:
@@ -109,16 +108,16 @@ def test_a_failing_writer_leaves_nothing(
 
     monkeypatch.setattr(report, "write_estimates", fail)
     with pytest.raises(OutputError, match="no"):
-        write_report(tmp_path / "out", analysis, command="")
+        write_report(tmp_path / "out", [analysis], command="")
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_existing_report_needs_force(without_reference: Analysis, tmp_path: Path) -> None:
-    write_report(tmp_path, without_reference, command="first")
+    write_report(tmp_path, [without_reference], command="first")
     with pytest.raises(OutputError, match="--force"):
-        write_report(tmp_path, without_reference, command="second")
+        write_report(tmp_path, [without_reference], command="second")
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "first"
-    write_report(tmp_path, without_reference, command="second", force=True)
+    write_report(tmp_path, [without_reference], command="second", force=True)
     assert json.loads((tmp_path / "run.json").read_text())["command"] == "second"
 
 
@@ -139,8 +138,8 @@ def test_estimate_writes_its_extras(analysis: Analysis, tmp_path: Path) -> None:
 def test_a_report_without_a_recording_takes_away_the_one_that_was_there(
     without_reference: Analysis, tmp_path: Path
 ) -> None:
-    write_report(tmp_path, without_reference, command="")
+    write_report(tmp_path, [without_reference], command="")
     assert (tmp_path / "recording.rrd").exists()
     none = OutputChoice(detail=NONE)
-    write_report(tmp_path, without_reference, command="", force=True, choice=none)
+    write_report(tmp_path, [without_reference], command="", force=True, choice=none)
     assert not (tmp_path / "recording.rrd").exists()

@@ -98,7 +98,7 @@ def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:
     elif job.do == "report":
         from vftcli.outputs.report import write_report
 
-        write_report(folder, analysis, command=task.command, force=True, choice=job.written)
+        write_report(folder, [analysis], command=task.command, force=True, choice=job.written)
     elif job.do == "contacts":
         from vftcli.outputs.files import OutputFolder
         from vftcli.outputs.report import CONTACTS, put_contacts

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
@@ -53,7 +53,7 @@ def report(
     from vftcli.evaluation.published import check_published, compare_with
     from vftcli.outputs.estimates import extra_files
     from vftcli.outputs.files import OutputFolder
-    from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files
+    from vftcli.outputs.report import FILES, SUMMARY_FILES, report_files, write_report
     from vftcli.pipeline import WRITING, analyse_logs
     from vftcli.readers.library import Library
     from vftcli.readers.table import JacobianError
@@ -84,8 +84,14 @@ def report(
     if not json:  # the answer first: a file that cannot be written does not cost it
         show_answers(analyses, failed, details=analysis.talk.details)
     choice.progress("writing", WRITING, 1.0)
-    record = written_record(
-        output, analyses, failed, command=command_line(), force=force, choice=written, form=figures
+    record = write_report(
+        output,
+        analyses,
+        command=command_line(),
+        force=force,
+        choice=written,
+        form=figures,
+        failed=failed,
     )
     several = len(analyses) + len(failed) > 1
     listed = SUMMARY_FILES if several else (*FILES, *extra_files(written.extras))
@@ -93,20 +99,6 @@ def report(
     if show:
         open_made(output)
     left_out.end(len(analyses))
-
-
-def written_record(
-    output: Path,
-    analyses: "Sequence[Analysis]",
-    failed: Mapping[str, str],
-    **how: Any,  # noqa: ANN401 - of `write_report`
-) -> str:
-    """The text of `run.json` of one log or several, their folder written."""
-    from vftcli.outputs.report import write_report, write_reports
-
-    if len(analyses) + len(failed) == 1:
-        return write_report(output, analyses[0], **how)
-    return write_reports(output, analyses, failed=failed, **how)
 
 
 def show_answers(

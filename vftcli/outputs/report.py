@@ -73,21 +73,6 @@ def report_files(
 
 def write_report(
     path: Path,
-    analysis: Analysis,
-    *,
-    command: str,
-    force: bool = False,
-    choice: OutputChoice = PLAIN,
-    form: str | None = None,
-) -> str:
-    """Write the report of one log, all files or none; return the text of `run.json`."""
-    names = report_files([analysis.recording.name], choice.extras, form)
-    with OutputFolder(path, force, names) as folder:
-        return fill(folder, "", analysis, command, choice, form)
-
-
-def write_reports(
-    path: Path,
     analyses: Sequence[Analysis],
     *,
     command: str,
@@ -96,19 +81,21 @@ def write_reports(
     form: str | None = None,
     failed: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Write one sub-folder a log, and above them an index, all errors in one, and run.json.
+    """Write the report of one log, or a sub-folder a log and above them an index and all errors.
 
-    What comes back is one record as text, with the logs' own in it.
+    All files are written or none. What comes back is the text of `run.json`, of several logs one
+    record with their own in it.
     """
     import polars as pl
 
     from vftcli.outputs.page.pages import render_index
 
-    labels = [a.recording.name for a in analyses]
-    places = places_of(labels)
-    names = report_files(labels, choice.extras, form, several=True)
-    pages = list(zip(places, analyses, strict=True))
+    labels, several = [a.recording.name for a in analyses], len(analyses) + len(failed) > 1
+    pages = list(zip(places_of(labels), analyses, strict=True))
+    names = report_files(labels, choice.extras, form, several=several)
     with OutputFolder(path, force, names) as folder:
+        if not several:
+            return fill(folder, "", analyses[0], command, choice, form)
         records = [
             fill(folder, f"{place}/", analysis, command, choice, form)
             for place, analysis in steps(pages)
