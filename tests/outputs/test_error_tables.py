@@ -18,7 +18,6 @@ from vftcli.outputs.error_tables import (
     logs_of,
     marks_in_words,
     nothing_to_compare,
-    paper_bounds,
     rmse_grid,
 )
 from vftcli.outputs.grid import GridCell, latex, markdown, terminal
@@ -349,12 +348,11 @@ def test_the_paper_s_bounds_stand_below_its_own_arm_only(
     ur5, panda = (as_if(without_reference, arm=name) for name in ("ur5", "panda"))
     label = ur5.recording.name
     named = wrench_errors.with_columns(recording=pl.lit(label))
-    (shown,) = axis_grids(named, paper_bounds([ur5]))
+    (shown,) = axis_grids(named, [ur5])
     assert shown.rows[-1] == ("paper, UR5", "< 6", "< 6", "< 6", "< 0.65", "< 0.65", "< 0.65")
-    assert paper_bounds([panda]) == {}
-    (without,) = axis_grids(named, paper_bounds([panda]))
+    (without,) = axis_grids(named, [panda])
     assert len(without.rows) == 1
-    (other,) = axis_grids(wrench_errors, paper_bounds([ur5]))
+    (other,) = axis_grids(wrench_errors, [ur5])
     assert len(other.rows) == 1, "run.csv is not the UR5's log"
 
 
@@ -363,7 +361,7 @@ def test_the_paper_s_bounds_are_of_a_sensor(
 ) -> None:
     label = without_reference.recording.name
     truth = wrench_errors.with_columns(recording=pl.lit(label), reference=pl.lit("file:truth"))
-    (grid,) = axis_grids(truth, paper_bounds([without_reference]))
+    (grid,) = axis_grids(truth, [without_reference])
     assert len(grid.rows) == 1
 
 

@@ -93,7 +93,6 @@ def compare(
     from vftcli.cli.console import LeftOut, say_analysis, say_json
     from vftcli.evaluation import paired_significance
     from vftcli.outputs import error_tables as tables
-    from vftcli.outputs.error_tables import paper_bounds
     from vftcli.outputs.grids import pairs_text
     from vftcli.outputs.report import jacobian_entry
     from vftcli.outputs.run_record import all_remarks
@@ -110,10 +109,10 @@ def compare(
         analyses.append(made)
     if not (analyses or left_out.judged):
         left_out.end(0)
-    rows, bounds = errors_of(analyses, left_out.judged), paper_bounds(analyses)
+    rows = errors_of(analyses, left_out.judged)
     drawn.write(rows)
     if table.form == "terminal":
-        text = tables.to_terminal(rows, bounds, every=analysis.talk.details)
+        text = tables.to_terminal(rows, analyses, every=analysis.talk.details)
         echo(text if analysis.talk.details else f"{text}{MORE}")
         pairs = [
             paired_significance(a.recording.name, a.estimates, a.reference)
@@ -127,5 +126,5 @@ def compare(
         judged = [jacobian_entry(made.log) for made in left_out.judged]
         say_json([*(a.recording for a in analyses), *judged], every, rows=rows.to_dicts())
     else:
-        echo_data(tables.FORMS[table.form](rows, bounds))
+        echo_data(tables.FORMS[table.form](rows, analyses))
     left_out.end(len(analyses) + len(left_out.judged))

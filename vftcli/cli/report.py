@@ -106,7 +106,7 @@ def show_answers(
 ) -> None:
     """Print the screen; with details every table behind it too."""
     from vftcli.cli.console import canvas, show
-    from vftcli.outputs.error_tables import paper_bounds, to_terminal
+    from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grids import print_text
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
 
@@ -117,7 +117,7 @@ def show_answers(
         show(log_screen(analyses[0], canvas(), most=most, every=details))
     for made in analyses if details else ():
         if made.errors is not None:
-            show(to_terminal(made.errors, paper_bounds([made])))
+            show(to_terminal(made.errors, [made]))
         if made.published is not None:
             show(print_text(made.published))
 

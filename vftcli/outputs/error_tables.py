@@ -250,21 +250,12 @@ def marks_on_page(found: Sequence[Block]) -> str:
     return " ".join([text, *(f"{escape(line)}." for line in without_answer(found))])
 
 
-#: Label of a log → bounds [N, N·m] that the paper gives for the RMSE of this log's arm.
-PaperBounds = Mapping[str, tuple[float, float]]
+def axis_grids(errors: pl.DataFrame, analyses: "Iterable[Analysis]" = ()) -> Iterator[Grid]:
+    """RMSE of the wrenches, one table for each recording and reference that has any.
 
-
-def paper_bounds(analyses: "Iterable[Analysis]") -> PaperBounds:
-    """What the paper reports of the arms of these logs, from the arms' own profiles."""
-    return {
-        a.recording.name: (published["wrench_rmse_N"], published["wrench_rmse_Nm"])
-        for a in analyses
-        if (published := a.robot.published)
-    }
-
-
-def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Iterator[Grid]:
-    """RMSE of the wrenches, one table for each recording and reference that has any."""
+    Below an arm that the paper has are the bounds that it gives.
+    """
+    published = {a.recording.name: a.robot.published for a in analyses}
     for group in logs_of(errors, "axis"):
         samples = compared_samples(group)
         if not samples:
@@ -277,8 +268,8 @@ def axis_grids(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> Itera
             found.setdefault(name, {})[axis] = value
         rows: Rows = [(name, *map(own.get, AXES)) for name, own in found.items()]
         # The paper compares with a sensor; beside a simulated truth its bounds mean nothing.
-        if reference == "sensor" and (limits := (bounds or {}).get(recording)):
-            force, moment = limits
+        if reference == "sensor" and (limits := published.get(recording)):
+            force, moment = limits["wrench_rmse_N"], limits["wrench_rmse_Nm"]
             rows.append(("paper, UR5", *[f"< {force:g}"] * 3, *[f"< {moment:g}"] * 3))
         axes = (Column(a, unit_of(a), symbol=f"${a[0].upper()}_{a[1]}$") for a in AXES)
         title = f"{recording} against {reference}, wrench, {samples} unmasked samples"
@@ -329,7 +320,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
 
 
 def to_terminal(
-    errors: pl.DataFrame, bounds: PaperBounds | None = None, *, every: bool = True
+    errors: pl.DataFrame, analyses: "Sequence[Analysis]" = (), *, every: bool = True
 ) -> str:
     """The tables of the tidy error table as text, with the meaning of their marks."""
     found = blocks(errors)
@@ -341,23 +332,23 @@ def to_terminal(
     )
     joints = "\n".join(terminal(rmse_grid(table)) for table in found) + marks_in_words(found)
     details = detail_grids(errors) if every else ()
-    grids = (*details, *axis_grids(errors, bounds), *contact_grids(errors))
+    grids = (*details, *axis_grids(errors, analyses), *contact_grids(errors))
     return above + "\n".join([joints + below, *map(terminal, grids)])
 
 
-def to_markdown(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
+def to_markdown(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """All tables of the errors as GitHub Markdown, best value of each joint bold."""
     found = blocks(errors)
     lines = [*marks_in_words(found).splitlines(), *nothing_to_compare(errors)]
     marks = [f"{escape_markdown(line)}\n" for line in lines]
-    below = [*detail_grids(errors), *axis_grids(errors, bounds)]
+    below = [*detail_grids(errors), *axis_grids(errors, analyses)]
     doubts = [f"> **{escape_markdown(line)}**\n" for line in doubts_of(errors)]
     return "\n".join(
         [*doubts, *map(markdown, map(rmse_grid, found)), *marks, *map(markdown, below)]
     )
 
 
-def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
+def to_latex(errors: pl.DataFrame, analyses: "Sequence[Analysis]" = ()) -> str:
     """The RMSE as LaTeX tables (needs ``booktabs``), best value of each joint bold.
 
     Logs of arms with as many joints share a table.
@@ -366,7 +357,7 @@ def to_latex(errors: pl.DataFrame, bounds: PaperBounds | None = None) -> str:
     doubts = "".join(f"% {printable(line)}\n" for line in lines)
     arms = groupby(blocks(errors), key=lambda table: table.joints)
     found = [alike(list(map(rmse_grid, tables))) for _, tables in arms]
-    if axes := list(axis_grids(errors, bounds)):
+    if axes := list(axis_grids(errors, analyses)):
         found.append(axes)
     return doubts + "\n".join(latex(*grids) for grids in found)
 
@@ -388,8 +379,8 @@ def alike(grids: Sequence[Grid]) -> Sequence[Grid]:
 
 #: Name of a form → the text of the errors table in it.
 FORMS = {
-    "csv": lambda errors, _bounds=None: csv_rows(errors.to_dicts(), errors.columns),
-    "json": lambda errors, _bounds=None: json_rows(errors.to_dicts()),
+    "csv": lambda errors, _analyses=(): csv_rows(errors.to_dicts(), errors.columns),
+    "json": lambda errors, _analyses=(): json_rows(errors.to_dicts()),
     "markdown": to_markdown,
     "latex": to_latex,
 }

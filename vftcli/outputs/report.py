@@ -15,7 +15,6 @@ from vftcli.evaluation.wrenches import JacobianJudgement
 from vftcli.outputs import NONE, PLAIN, OutputChoice
 from vftcli.outputs import error_tables as tables
 from vftcli.outputs.contacts import contacts_csv, contacts_record
-from vftcli.outputs.error_tables import paper_bounds
 from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, put_text
@@ -175,9 +174,9 @@ def put_errors(
     """Write the error tables, if there are errors."""
     if errors is None:
         return
-    errors, bounds = tables.marked(errors, analyses), paper_bounds(analyses)
+    errors = tables.marked(errors, analyses)
     for name, text_of in zip(ERROR_TABLES, tables.FORMS.values(), strict=True):
-        folder.write(f"{place}{name}", text_of(errors, bounds))
+        folder.write(f"{place}{name}", text_of(errors, analyses))
 
 
 #: Frame of what a log of a Jacobian holds.

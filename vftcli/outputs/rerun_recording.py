@@ -20,7 +20,7 @@ from vftcli.observers.table import BEST
 from vftcli.outputs import FULL, LEVELS
 from vftcli.outputs.charts import COLOURS, GREY, PLACES, REFERENCE, SPARE, Chart, ChartLine
 from vftcli.outputs.contacts import beginning
-from vftcli.outputs.error_tables import DAGGER, paper_bounds, to_markdown
+from vftcli.outputs.error_tables import DAGGER, to_markdown
 from vftcli.outputs.grid import escape_markdown
 from vftcli.outputs.page.log_charts import (
     condition_charts,
@@ -66,7 +66,7 @@ def write_rrd(path: Path, analysis: Analysis, detail: str = LEVELS) -> None:
     arm, errors, found = analysis.robot.chain, analysis.errors, analysis.contacts
     tabs = tabs_of(analysis, detail)
     words, marked, arrow = {"Summary": summary(analysis)}, None, None
-    if errors is not None and (table := to_markdown(errors, paper_bounds([analysis]))):
+    if errors is not None and (table := to_markdown(errors, [analysis])):
         words["Errors"] = table
     if found is not None:
         tabs[0] = tabs[0]._replace(log=contact_log(found))

@@ -17,7 +17,6 @@ from vftcli.outputs.error_tables import (
     detail_grids,
     marks_on_page,
     nothing_to_compare,
-    paper_bounds,
     rmse_grid,
 )
 from vftcli.outputs.examination import rate_of
@@ -127,7 +126,7 @@ def errors_view(analysis: Analysis) -> dict[str, Any]:
         "state": state,
         "first": [rmse_grid(block) for block in found],
         "marks": marks_on_page(found),
-        "axes": axis_grids(table, paper_bounds([analysis])),
+        "axes": axis_grids(table, [analysis]),
         "missing": nothing_to_compare(table),
         "details": detail_grids(table),
         "bias": details.bias_grid(table),
