@@ -10,14 +10,7 @@ from contact_rows import contact, contact_list
 from vftcli.analysis import Analysis
 from vftcli.doctor.examination import in_words
 from vftcli.doctor.fit import RobotMatch
-from vftcli.outputs.believability import (
-    Ground,
-    grounds,
-    headline,
-    health,
-    joint_words,
-    resting,
-)
+from vftcli.outputs.believability import Ground, grounds, headline, health, joint_words, resting
 from vftcli.outputs.contacts import otherwise
 from vftcli.outputs.screen import facts
 from vftcli.robots import load_robot

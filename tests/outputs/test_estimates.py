@@ -8,11 +8,7 @@ import pytest
 
 from vftcli.analysis import Analysis
 from vftcli.outputs import OutputChoice
-from vftcli.outputs.estimates import (
-    estimates_table,
-    write_estimate_folder,
-    write_estimates,
-)
+from vftcli.outputs.estimates import estimates_table, write_estimate_folder, write_estimates
 
 
 def test_parquet_holds_flat_float_columns(analysis: Analysis, tmp_path: Path) -> None:

@@ -10,12 +10,7 @@ from vftcli.analysis import Analysis
 from vftcli.outputs import NONE, OutputChoice, report
 from vftcli.outputs.estimates import write_estimate_folder
 from vftcli.outputs.files import digests
-from vftcli.outputs.report import (
-    ERROR_TABLES,
-    FILES,
-    SUMMARY_FILES,
-    write_report,
-)
+from vftcli.outputs.report import ERROR_TABLES, FILES, SUMMARY_FILES, write_report
 from vftcli.signals.errors import OutputError
 
 

@@ -16,25 +16,11 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
-from vftcli.cli.config import (
-    begin,
-    config_option,
-    forget,
-    is_configured,
-    settle,
-)
+from vftcli.cli.config import begin, config_option, forget, is_configured, settle
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
-from vftcli.signals.option import (
-    GROUPS,
-    LOG,
-    NUMBERS,
-    OUTPUT,
-    Choice,
-    Option,
-    settings_by_name,
-)
+from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, settings_by_name
 from vftcli.signals.parsing import did_you_mean, nearest, printable
 
 OWN = "This command"  #: Heading of the options that only one command has.

@@ -15,8 +15,8 @@ from vftcli.admittance.law import AXES, PER_AXIS, Controller
 from vftcli.admittance.replay import Replay
 from vftcli.doctor.examination import Examination
 from vftcli.outputs.admittance_tables import (
+    COLUMNS,
     TITLE,
-    comparison_csv,
     comparison_grid,
     latency_grid,
     latency_rows,
@@ -26,9 +26,7 @@ from vftcli.outputs.admittance_tables import (
 from vftcli.outputs.charts import DASHES, GREY, SPARE, Chart, ChartLine
 from vftcli.outputs.examination import health_record
 from vftcli.outputs.files import SEAL, OutputFolder, table_file
-from vftcli.outputs.grid import (
-    json_rows,
-)
+from vftcli.outputs.grid import csv_rows, json_rows
 from vftcli.outputs.page.shell import page
 from vftcli.outputs.paper import NARROW, Drawing, figure_files, line_figure, plots_of, write_figures
 from vftcli.outputs.quantity import counted
@@ -83,7 +81,8 @@ def write_admittance(
         title = f"{run.simulation.scenario.name}, closed loop"
     with OutputFolder(path, force, files_of_replay(form)) as folder:
         folder.write("index.html", render_admittance(replay, record, title, run, examinations))
-        folder.write("comparison.csv", comparison_csv(replay.rows))
+        keys = replay.rows[0] if replay.rows else COLUMNS
+        folder.write("comparison.csv", csv_rows(replay.rows, keys))
         folder.write("comparison.json", json_rows(replay.rows))
         with table_file(folder / "motion.parquet") as file:
             motion_table(replay).write_parquet(file, compression="zstd")
@@ -207,7 +206,6 @@ def render_admittance(
         run=run,
         latencies=None if run is None else latency_grid(run),
         comparison=comparison_grid(named, TITLE),
-        drawn=drawn,
         parameters=parameter_grid(replay),
         stability=stability_grid(replay),
         examinations=examinations,

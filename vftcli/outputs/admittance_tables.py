@@ -9,7 +9,7 @@ import numpy as np
 from vftcli.admittance.closed_loop import ClosedLoop, latencies
 from vftcli.admittance.law import AXES
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.grid import Column, Grid, Rows, csv_rows, keyed_grid, latex, terminal, words
+from vftcli.outputs.grid import Column, Grid, Rows, keyed_grid, latex, terminal, words
 from vftcli.outputs.quantity import minus
 
 TITLE = "The same force through every controller"  #: Of the comparison.
@@ -53,11 +53,6 @@ LATENCIES = {
 RETURNS = (
     "t10, t2: from the release until the deviation stays within 10 % and 2 % of its value there",
 )
-
-
-def comparison_csv(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The comparison as CSV; what is not known is empty."""
-    return csv_rows(rows, rows[0] if rows else COLUMNS)
 
 
 def comparison_text(rows: Sequence[Mapping[str, Any]]) -> str:

@@ -19,6 +19,7 @@ from vftcli.outputs.files import OutputFolder, write_text
 from vftcli.outputs.page.log_charts import (
     LOWEST,
     QUIETEST,
+    contact_spans,
     reference_name,
     response_charts,
     spectra_chart,
@@ -136,7 +137,7 @@ def contacts_figure(found: ContactList, t: "Array | Sequence[float]" = ()) -> "F
     """|F| of every contact with its 95 % band, under its number; over the log's clock. (T,) [s]"""
     courses = [c.course for c in found.contacts if c.course is not None]
     lines = [ChartLine("|F|", c.force[:, None], half=c.band[:, None], x=c.t) for c in courses]
-    spans = [(c.start, c.stop) for c in found.contacts if not c.is_load]
+    spans = contact_spans(found)
     clock = [*t] or [0.0, found.duration, *(at for span in spans for at in span)]
     ends = np.array([min(clock), max(clock)])
     chart = Chart.of_one("force", "|F|", "N", ends, lines)._replace(

@@ -140,7 +140,6 @@ def render_identification(
         traces=traces,
         plots=(velocity_plot(traces, j) for j in range(found.robot.joints)),
         grids=grids,
-        drawn=charts,
         shown=shown_trace(found).motion.recording.name if charts else "",
         processing=found.processing,
         remarks=found.remarks,

@@ -19,14 +19,7 @@ from vftcli.outputs.estimates import extra_files, write_estimates, write_extras
 from vftcli.outputs.figures import ERROR_FIGURES, LOG_FIGURES, error_figures, log_figures
 from vftcli.outputs.files import SEAL, OutputFolder, numbered, put_table, put_text
 from vftcli.outputs.paper import figure_files, write_figures
-from vftcli.outputs.run_record import (
-    CONVENTIONS,
-    envelope,
-    log_entry,
-    run_record,
-    seal,
-    to_json,
-)
+from vftcli.outputs.run_record import CONVENTIONS, envelope, log_entry, run_record, seal, to_json
 from vftcli.readers.references import JacobianLog
 from vftcli.signals.arrays import Array
 from vftcli.signals.columns import StatedFrame

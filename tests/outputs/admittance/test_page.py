@@ -6,12 +6,7 @@ import pytest
 
 from vftcli.admittance.law import from_table, variable
 from vftcli.admittance.replay import Replay
-from vftcli.outputs.admittance import (
-    UNITS,
-    admittance_record,
-    charts,
-    render_admittance,
-)
+from vftcli.outputs.admittance import UNITS, admittance_record, charts, render_admittance
 from vftcli.robots import load_robot
 
 

@@ -1,16 +1,16 @@
 import csv
-import io
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from vftcli.admittance.law import controllers
 from vftcli.admittance.replay import Replay
+from vftcli.outputs.admittance import write_admittance
 from vftcli.outputs.admittance_tables import (
     COLUMNS,
-    comparison_csv,
     comparison_grid,
     comparison_text,
     parameter_grid,
@@ -37,12 +37,16 @@ def test_an_overshoot_is_printed_in_per_cent_with_a_true_minus(release: Replay) 
     assert comparison_text([]) == "no axis was dragged"
 
 
-def test_rows_for_machines_are_not_rounded(release: Replay) -> None:
+def test_rows_for_machines_are_not_rounded(release: Replay, tmp_path: Path) -> None:
     rows = json.loads(json_rows(release.rows))
     assert rows == json.loads(json.dumps(list(release.rows)))
-    read = list(csv.DictReader(io.StringIO(comparison_csv(release.rows))))
+    for name, replay in (("full", release), ("empty", replace(release, rows=()))):
+        write_admittance(tmp_path / name, replay, None)
+    with (tmp_path / "full/comparison.csv").open(encoding="utf-8") as file:
+        read = list(csv.DictReader(file))
     assert [float(r["peak"]) for r in read] == [row["peak"] for row in release.rows]
-    assert comparison_csv([]).strip().split(",") == list(COLUMNS)
+    empty = (tmp_path / "empty/comparison.csv").read_text(encoding="utf-8")
+    assert empty.strip().split(",") == list(COLUMNS)
 
 
 @pytest.mark.parametrize(

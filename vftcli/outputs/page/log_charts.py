@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from vftcli.analysis import Analysis
+from vftcli.contacts.contact_list import ContactList
 from vftcli.observers.spectra import Spectra
 from vftcli.observers.table import BEST
 from vftcli.observers.tuning import Curve
@@ -45,7 +46,7 @@ def torque_chart(analysis: Analysis) -> Chart:
         families=families_of(analysis.robot.limits.tau_max),
         band=None if reference is None else reference.floor,
         band_label="± floor of the reference",
-        spans=contact_spans(analysis),
+        spans=contact_spans(analysis.contacts),
     )
 
 
@@ -54,10 +55,10 @@ def observer_styles(analysis: Analysis) -> dict[str, LineStyle]:
     return lines_of_names([estimate.name for estimate in analysis.estimates])
 
 
-def contact_spans(analysis: Analysis) -> tuple[tuple[float, float], ...]:
+def contact_spans(found: ContactList | None) -> tuple[tuple[float, float], ...]:
     """When something touched the arm. [s]"""
-    found = analysis.contacts.contacts if analysis.contacts is not None else ()
-    return tuple((contact.start, contact.stop) for contact in found if not contact.is_load)
+    contacts = found.contacts if found is not None else ()
+    return tuple((contact.start, contact.stop) for contact in contacts if not contact.is_load)
 
 
 def lines_of(
@@ -176,7 +177,7 @@ def wrench_chart(analysis: Analysis) -> Chart | None:
         analysis.t,
         (*below, *lines),
         families=(1, 1, 1, 2, 2, 2),
-        spans=contact_spans(analysis),
+        spans=contact_spans(analysis.contacts),
     )
 
 

@@ -100,7 +100,7 @@ def page(
     """A whole HTML page with its style: self-contained, nothing is loaded from anywhere."""
     data = script_json(packed_charts(charts)) if charts else ""
     frame = {"title": title, "styles": styles or {}, "scripts": scripts, "data": data}
-    return templates().get_template(template).render(**frame, **view) + "\n"
+    return templates().get_template(template).render(**frame, drawn=charts, **view) + "\n"
 
 
 def script_json(data: object) -> str:
