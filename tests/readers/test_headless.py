@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vftcli.readers import read
-from vftcli.readers.columns import Guess, guessed
+from vftcli.readers.columns import Guess, guess_columns
 from vftcli.signals.errors import LogError
 
 T31 = "t,q:6,dq:6,current:6,target_current:6,target_torque:6"
@@ -32,7 +32,7 @@ def table(joints: int = 6, seed: int = 3) -> dict[str, np.ndarray]:
 
 def guess(*names: str, extra: int = 0, joints: int = 6) -> Guess | None:
     signals = table(joints)
-    return guessed(list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T))
+    return guess_columns(list(np.hstack([*(signals[n] for n in names), np.ones((2000, extra))]).T))
 
 
 @pytest.mark.parametrize("order", [(3, 4, 5), (5, 4, 3), (4, 3, 5)])
@@ -82,11 +82,11 @@ def test_a_joint_that_stands_is_counted_and_one_that_moves_without_velocity_is_n
     signals = table()
     columns = np.hstack([signals["t"], signals["q"], signals["dq"]])
     columns[:, [1, 6]], columns[:, [7, 12]] = 0.3, 0.0
-    found = guessed(list(columns.T))
+    found = guess_columns(list(columns.T))
     assert found is not None
     assert found.columns == "t,q:6,dq:6"
     columns[:, 1] = signals["q"][:, 0]
-    assert guessed(list(columns.T)) is None
+    assert guess_columns(list(columns.T)) is None
 
 
 @pytest.mark.parametrize("kind", ["csv", "npy"])

@@ -58,7 +58,7 @@ def test_from_50_hz_on_it_is_done_unasked(rate: float, fast: bool) -> None:
 def test_logged_velocities_give_way_where_that_is_asked_for() -> None:
     """Velocities in deg/s beside positions in rad: what the finding about them advises."""
     log, truth = swinging(100.0)
-    derived = ReadChoice(derive="dq").taken(replace(log, dq=np.rad2deg(truth)))
+    derived = ReadChoice(derive="dq").with_stated_effort(replace(log, dq=np.rad2deg(truth)))
     assert derived.source.derived == ("dq",)
     np.testing.assert_array_equal(derived.require("dq"), with_velocity(log).require("dq"))
 

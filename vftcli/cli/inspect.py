@@ -50,7 +50,7 @@ def inspect_log(
     examinations = []
     for log in logs:
         recording, arm = read_first_recording(log, choice), None
-        recording = choice.within(choice.taken(recording))
+        recording = choice.within(choice.with_stated_effort(recording))
         if chosen.name or choice.effort == "auto":
             arm = examiner.robot(recording, chosen)
             recording = examiner.taken(recording, arm, choice)

@@ -16,11 +16,11 @@ from vftcli.readers.table import (
     Picks,
     Table,
     cells_of,
-    checked,
     listed,
     missing_column,
     named_cells,
     pick_of,
+    require_positions,
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
@@ -224,7 +224,7 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[s
     origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
     picks = Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin)
-    return checked(table, picks), names
+    return require_positions(table, picks), names
 
 
 def _joint_columns(table: Table) -> dict[str, dict[str, Cell]]:

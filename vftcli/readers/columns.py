@@ -226,7 +226,7 @@ class Guess(NamedTuple):
     others: tuple[str, ...] = ()
 
 
-def guessed(columns: Sequence[Array]) -> Guess | None:
+def guess_columns(columns: Sequence[Array]) -> Guess | None:
     """What the columns (T,) of a table without a header are by their values, in file order.
 
     A clock steps evenly, velocities are the derivative of positions, and a controller's target

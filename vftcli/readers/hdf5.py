@@ -30,7 +30,7 @@ from vftcli.readers.opening import (
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import Column, listed
-from vftcli.readers.tables import ArrayTable, described, from_table
+from vftcli.readers.tables import ArrayTable, from_table, read_known_columns
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
 from vftcli.signals.remarks import fact
@@ -182,7 +182,7 @@ DROID_USUAL = (
 TORQUELESS = {"obs/robot0_joint_pos": "robomimic", "qp_arm": "roboset"}
 #: Profiles that the serial number of a robot starts with, as in panda-295341-1325480.
 FRANKA = ("panda", "fr3")
-TOLD_LIMIT = 1 << 20  #: Letters of a description beside the numbers that are parsed.
+DESCRIPTION_BYTES = 1 << 20  #: Letters of a description beside the numbers that are parsed.
 
 TRAJECTORY = "trajectory.h5"
 DEEPEST_FOLDER = 8  #: Folders inside folders; DROID has five: version, lab, success, date, episode.
@@ -217,7 +217,7 @@ def read_aloha(table: Hdf5Table, request: ReadChoice) -> RawLog:
     if DYNAMIXEL in names and not stated:
         remarks = (*remarks, fact("effort-of-dynamixel"))
     clock = f"none: {ALOHA_RATE:g} Hz, ALOHA's convention" if not request.spec.item("t") else ""
-    raw = described(table, usual, request, remarks=remarks, clock_name=clock)
+    raw = read_known_columns(table, usual, request, remarks=remarks, clock_name=clock)
     return replace(raw, part="" if stated else f"{arm} arm")
 
 
@@ -228,12 +228,12 @@ def read_droid(table: Hdf5Table, request: ReadChoice) -> RawLog:
     computed = DROID_STATE + DROID_COMPUTED in table.names
     remarks = (fact("computed-torque-left-out"),) if computed else ()
     clock = "column robot_timestamp [ns]" if request.spec.item("t") is None else ""
-    raw = described(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
+    raw = read_known_columns(table, DROID_USUAL, request, remarks=remarks, clock_name=clock)
     # The serial number in the episode's metadata begins with the robot's name.
     serial = ""
     for path in sorted(Path(table.path).parent.glob("metadata_*.json"))[:1]:
         with suppress(OSError, ValueError, RecursionError, AttributeError), path.open("rb") as file:
-            serial = str(json.loads(file.read(TOLD_LIMIT)).get("robot_serial", "")).lower()
+            serial = str(json.loads(file.read(DESCRIPTION_BYTES)).get("robot_serial", "")).lower()
     hint = next((name for name in FRANKA if serial.startswith(f"{name}-")), None)
     return replace(raw, robot_hint=hint)
 

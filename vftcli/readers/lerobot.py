@@ -18,13 +18,13 @@ from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.table import listed
-from vftcli.readers.tables import described
+from vftcli.readers.tables import read_known_columns
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
 
 Json = Any  #: A value of a description.
 
-TOLD_LIMIT = 64 * 1024 * 1024  #: Bytes of a description beside the data that are parsed.
+DESCRIPTION_BYTES = 64 * 1024 * 1024  #: Bytes of a description beside the data that are parsed.
 
 FRAME = "frame_index"
 
@@ -82,7 +82,7 @@ class Element(NamedTuple):
 def episodes(file: LogFile) -> Iterator[Episodes]:
     """The episodes of a dataset."""
     read = partial(read_episode, file, info_of(file.path))
-    yield {each.number: partial(read, each) for each in episodes_told(file.path)}
+    yield {each.number: partial(read, each) for each in dataset_episodes(file.path)}
 
 
 def read_episode(
@@ -100,7 +100,7 @@ def read_episode(
         each_of = each_of.items() if isinstance(each_of, dict) else ()
         features = {name: each.get("names") for name, each in each_of if isinstance(each, dict)}
         usual, names, side, remarks = _columns_of(file.path, table, features, request)
-    raw = described(table, usual, request, joint_names=names, remarks=remarks)
+    raw = read_known_columns(table, usual, request, joint_names=names, remarks=remarks)
     robot = str(info.get("robot_type", "")).lower()
     return replace(
         _by_frames(raw, table, info.get("fps")),
@@ -211,15 +211,15 @@ def info_of(folder: Path) -> dict[str, Any]:
 
 def text_of(path: Path) -> str:
     """The text of a description beside the data."""
-    if path.stat().st_size > TOLD_LIMIT:
-        raise LogError(f"{path}: larger than {TOLD_LIMIT >> 20} MiB; no description is.")
+    if path.stat().st_size > DESCRIPTION_BYTES:
+        raise LogError(f"{path}: larger than {DESCRIPTION_BYTES >> 20} MiB; no description is.")
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 
 
-def episodes_told(folder: Path) -> list[Episode]:
+def dataset_episodes(folder: Path) -> list[Episode]:
     """The episodes of a dataset, rising."""
     tables = sorted((folder / "meta" / "episodes").rglob("*.parquet"))
     lines = folder / "meta" / "episodes.jsonl"

@@ -45,11 +45,13 @@ class Library:
         """Read a log once unless it is read, and return the part of it that is chosen."""
         choice = choice or ReadChoice()
         if isinstance(path, Recording):
-            return choice.within(choice.taken(path))
+            return choice.within(choice.with_stated_effort(path))
         at, label = absolute(path), self.label(path)
         read = replace(choice, interval=None)
         if (at, read) not in self._recordings:
-            self._recordings[at, read] = read.taken(reading.read_chosen(path, read, label))
+            self._recordings[at, read] = read.with_stated_effort(
+                reading.read_chosen(path, read, label)
+            )
         return choice.within(self._recordings[at, read])
 
     def open_each(
@@ -151,7 +153,7 @@ class LogCollection:
             from vftcli.readers import lerobot
 
             meta = tuple(files_of(path / "meta"))
-            for episode in lerobot.episodes_told(path):
+            for episode in lerobot.dataset_episodes(path):
                 if chosen in {None, episode.number}:
                     own = lerobot.data_file(path, episode)
                     yield LogEntry(path, episode.number, (*meta, own))

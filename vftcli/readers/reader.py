@@ -163,7 +163,7 @@ class ReadChoice(Choice):
         """The same without its interval and episode: a free run is a log of its own, read whole."""
         return replace(self, interval=None, episode=None, all_episodes=False)
 
-    def taken(self, recording: "Recording") -> "Recording":
+    def with_stated_effort(self, recording: "Recording") -> "Recording":
         """A recording with its effort taken for what it is said to be, its velocities derived.
 
         Raises:

@@ -22,7 +22,7 @@ from vftcli.readers.table import (
     listed,
     unchecked_picks,
 )
-from vftcli.readers.tables import picked
+from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.option import interval_text
@@ -49,7 +49,7 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     is_parquet = file.head.startswith(b"PAR1")
     table: Table = ParquetTable(file) if is_parquet else TextTable(file)
     picks = _stated(table, columns) if columns else _found(table)
-    raw = picked(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
+    raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick
     # No cleaning here: a reference is made by a program, and must be whole.
     check_clock(t, str(path))
@@ -129,7 +129,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
         )
     signals["jacobian"] = Pick(signal="jacobian", cells=cells)
     picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
-    raw = without_repeats(measured(picked(table, picks, ReadChoice()), path), path)
+    raw = without_repeats(measured(load_signals(table, picks, ReadChoice()), path), path)
     t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)
     inside = (t >= start) & (t <= stop)

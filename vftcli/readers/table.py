@@ -98,7 +98,7 @@ class JacobianError(LogError):
 
 def picks_of(table: Table, spec: ColumnSpec) -> Picks:
     """The columns that a --columns text of a log means."""
-    return checked(table, unchecked_picks(table, spec))
+    return require_positions(table, unchecked_picks(table, spec))
 
 
 def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
@@ -222,7 +222,7 @@ def listed(names: Sequence[str], most: int = 24) -> str:
     return f"{shown} and {len(names) - most} more" if len(names) > most else shown
 
 
-def checked(table: Table, picks: Picks) -> Picks:
+def require_positions(table: Table, picks: Picks) -> Picks:
     """Return the picks, or raise unless there are positions and all signals have their width."""
     joints = next((len(p.cells) for p in picks.signals if p.signal == "q"), 0)
     if joints == 0:

@@ -17,7 +17,7 @@ from vftcli.readers.aliases import (
     robot_of,
     table_clock,
 )
-from vftcli.readers.columns import ColumnSpec, guessed, parse_columns, tick_of
+from vftcli.readers.columns import ColumnSpec, guess_columns, parse_columns, tick_of
 from vftcli.readers.delimited import EchoTable, TextTable, joint_names
 from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
@@ -56,7 +56,7 @@ def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     item = spec.item("q")
     more |= {"segment": spec.segment, "degrees_possible": item is None or item.unit is None}
     if spec.items and (not table.names or not spec.named):
-        return picked(table, picks_of(table, spec), request, **more)
+        return load_signals(table, picks_of(table, spec), request, **more)
     if not table.names and table.width == 1:
         raise LogError(
             f"{table.path}: a single column of numbers: one signal in a file of its own. Join the "
@@ -66,7 +66,7 @@ def from_table(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
         return _read_by_values(table, request, **more)
     picks, joints = picks_by_alias(table, spec.items)
     more |= {"joint_names": joints, "robot_hint": robot_of(joints)}
-    return picked(table, picks, request, **more)
+    return load_signals(table, picks, request, **more)
 
 
 def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
@@ -92,13 +92,13 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     payload = layout.payload.split()
     constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
     picks = replace(picks, signals=tuple(signals), constants=constants)
-    raw = picked(table, picks, request, clock_name=layout.clock)
+    raw = load_signals(table, picks, request, clock_name=layout.clock)
     if layout is not UR:
         return raw
     return replace(raw, wrench_frame=force_frame(names, raw.stamps * raw.tick))
 
 
-def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
+def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table whose columns are known, but for what a --columns text says of them."""
     stated = request.spec
     if stated.items and not stated.named:
@@ -123,7 +123,7 @@ def described(table: Table, usual: str, request: ReadChoice, **more: RawField) -
     spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}
-    return picked(table, picks_of(table, spec), request, **more)
+    return load_signals(table, picks_of(table, spec), request, **more)
 
 
 def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
@@ -132,7 +132,7 @@ def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawL
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue
             columns = table.load(range(table.width), clock=0)
-    found = guessed(list(columns.values())) if columns else None
+    found = guess_columns(list(columns.values())) if columns else None
     if found is None or found.others:
         likely = "as in t,q:6,dq:6,current:6 (_:13 skips 13 columns)."
         if found is not None:
@@ -145,7 +145,7 @@ def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawL
     named = {str(k): column for k, column in columns.items()}
     loaded = ArrayTable(path=table.path, columns=named, headed=False, remarks=table.remarks)
     picks = picks_of(loaded, parse_columns(found.columns))
-    return picked(loaded, picks, request, remarks=(remark,), **more)
+    return load_signals(loaded, picks, request, remarks=(remark,), **more)
 
 
 @dataclass
@@ -227,7 +227,7 @@ def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:
     return from_table(TextTable(file), request)
 
 
-def picked(
+def load_signals(
     table: Table,
     picks: Picks,
     request: ReadChoice,

@@ -18,7 +18,7 @@ from vftcli.batch.datasets import (
     Single,
     Statistics,
 )
-from vftcli.readers.lerobot import data_file, episodes_told, info_of, text_of
+from vftcli.readers.lerobot import data_file, dataset_episodes, info_of, text_of
 from vftcli.readers.parquet import EPISODE, guarded
 from vftcli.signals.errors import LogError
 from vftcli.signals.packages import needed
@@ -43,7 +43,7 @@ class LeRobotDataset:
     def files(self) -> Iterator[DataFile]:
         """The data files with their episodes, in the order of these."""
         numbers: dict[Path, list[int]] = {}
-        for episode in episodes_told(self.folder):
+        for episode in dataset_episodes(self.folder):
             place = data_file(self.folder, episode).relative_to(self.folder)
             numbers.setdefault(place, []).append(episode.number)
         for place, own in numbers.items():

@@ -46,13 +46,13 @@ BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(messages: Iterable[Message], ingest: "Ingest") -> Iterator[Batch]:
+def batched(messages: Iterable[Message], budget: "ReadBudget") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0
     for channel, time, content in messages:
         if channel is None:
-            raise LogError(f"{ingest.path}: messages of an unknown topic; the file is damaged.")
+            raise LogError(f"{budget.path}: messages of an unknown topic; the file is damaged.")
         _, times, contents = found.setdefault(id(channel), (channel, [], []))
         times.append(time)
         contents.append(content)
@@ -72,7 +72,7 @@ def _batch(found: tuple[Channel, list[int], list[bytes]]) -> Batch:
 
 
 @dataclass
-class Census:
+class MessageCount:
     """What a container says of its messages, and what was found."""
 
     kept: int = 0  #: Messages found.
@@ -83,28 +83,28 @@ class Census:
     missing: int = 0  #: Bytes of messages that should stand before that place. [B]
     closed: bool = False  #: Whether its recorder closed it.
 
-    def tell(self, ingest: "Ingest", left: int, counter: str) -> None:
+    def report(self, budget: "ReadBudget", left: int, counter: str) -> None:
         """Say so if the container is cut, and how much of it was kept."""
         kept, chunks, missing = self.kept, self.chunks, self.missing
         if self.counted is not None and kept > self.counted:
             raise LogError(
-                f"{ingest.path}: {counter} counts {self.counted} messages, the chunks hold {kept}; "
+                f"{budget.path}: {counter} counts {self.counted} messages, the chunks hold {kept}; "
                 "the file is damaged."
             )
         if self.counted is not None and kept < self.counted:
-            ingest.note(warning("messages-missing", kept=kept, counted=self.counted, by=counter))
+            budget.note(warning("messages-missing", kept=kept, counted=self.counted, by=counter))
         elif self.counted_chunks is not None and chunks != self.counted_chunks:
             counted = self.counted_chunks
-            ingest.note(warning("chunks-missing", kept=kept, chunks=chunks, counted=counted))
+            budget.note(warning("chunks-missing", kept=kept, chunks=chunks, counted=counted))
         elif self.counted is None and missing > 0:
             size = self.data_end + missing
-            ingest.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size))
+            budget.note(warning("bytes-missing", kept=kept, missing_bytes=missing, bytes=size))
         elif left and self.closed:
-            ingest.note(fact("index-cut", kept=kept, chunks=chunks))
+            budget.note(fact("index-cut", kept=kept, chunks=chunks))
         elif left:
-            ingest.note(warning("chunks-cut", kept=kept, rest_bytes=left))
+            budget.note(warning("chunks-cut", kept=kept, rest_bytes=left))
         elif not self.closed:
-            ingest.note(caution("recorder-stopped", kept=kept))
+            budget.note(caution("recorder-stopped", kept=kept))
 
 
 #: Records that may be read of a container: no recorded message takes less than some bytes, and
@@ -113,7 +113,7 @@ SPARE_PIECES, PIECES_PER_BYTE = 1_000_000, 2
 
 
 @dataclass
-class Ingest:
+class ReadBudget:
     """What reading a container may cost, and what had to be left behind."""
 
     path: Path  #: The file, for messages.
@@ -167,7 +167,7 @@ CONTAINERS = {
 }
 
 
-def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
+def batches(files: Sequence[LogFile], budget: ReadBudget) -> Iterator[Batch]:
     """The messages of files, one behind the other; what a library raises is said in one line."""
     for file in files:
         found = next((x for magic, x in CONTAINERS.items() if file.head.startswith(magic)), None)
@@ -175,24 +175,24 @@ def batches(files: Sequence[LogFile], ingest: Ingest) -> Iterator[Batch]:
             raise LogError(f"{file.path}: neither a ROS bag nor an MCAP file.")
         try:
             messages_of = getattr(import_module("vftcli.readers.bags.records"), found)
-            for batch in batched(messages_of(file, ingest), ingest):
+            for batch in batched(messages_of(file, budget), budget):
                 yield batch
                 file.release()
         except LogError:
             raise
         except MemoryError:
             raise LogError(
-                f"{ingest.path}: a part of it claims more memory than the file holds; it is "
+                f"{budget.path}: a part of it claims more memory than the file holds; it is "
                 "damaged."
             ) from None
         except Exception as error:  # noqa: BLE001 - libraries document none of what damage raises
             reason = printable(f"{type(error).__name__}: {error}")[:100]
             raise LogError(
-                f"{ingest.path}: not a readable bag; it is damaged ({reason})."
+                f"{budget.path}: not a readable bag; it is damaged ({reason})."
             ) from None
-        if file.path != ingest.path:
+        if file.path != budget.path:
             for remark in file.remarks:
-                ingest.note(replace(remark, where=Where(about=file.path.name)))
+                budget.note(replace(remark, where=Where(about=file.path.name)))
 
 
 def printable(name: str) -> str:
@@ -222,7 +222,7 @@ def sized(content: Any, place: int, width: int = 4) -> tuple[bytes, int]:  # noq
     return content[start:end], end
 
 
-def unpacked(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
+def unpacked(budget: ReadBudget, name: str, packed: bytes, size: int) -> bytes:
     """One chunk of a bag or MCAP, unpacked to the size that it claims."""
     import bz2
 
@@ -231,7 +231,7 @@ def unpacked(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
 
     if name in {"", "none"}:
         return packed
-    ingest.claim(size)
+    budget.claim(size)
     content: bytes
     if name == "lz4":
         content = lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1)
@@ -240,9 +240,9 @@ def unpacked(ingest: Ingest, name: str, packed: bytes, size: int) -> bytes:
     elif name == "zstd":
         content = zstandard.ZstdDecompressor().stream_reader(packed).read(size + 1)
     else:
-        raise LogError(f"{ingest.path}: unknown chunk compression {name[:20]!r}.")
+        raise LogError(f"{budget.path}: unknown chunk compression {name[:20]!r}.")
     if len(content) != size:
-        raise LogError(f"{ingest.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
+        raise LogError(f"{budget.path}: a {name} chunk is damaged; it does not unpack to {size} B.")
     return content
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.aliases import along_arm
-from vftcli.readers.bags.container import Batch, Bytes, Channel, Ingest, Integers, strided
+from vftcli.readers.bags.container import Batch, Bytes, Channel, Integers, ReadBudget, strided
 from vftcli.readers.bags.ros_messages import SIZES, Field, LayoutError, Types, types_for
 from vftcli.readers.table import Column, JoinedRows
 from vftcli.signals.arrays import Array, Mask
@@ -253,8 +253,8 @@ class _Topic:
 class Decoder:
     """Turns batches into streams, keeping only the numbers a Recording can hold."""
 
-    def __init__(self, ingest: Ingest) -> None:
-        self.ingest = ingest
+    def __init__(self, budget: ReadBudget) -> None:
+        self.budget = budget
         self.topics: dict[Channel, _Topic] = {}
         self.others: dict[str, str] = {}
         self._chance = np.random.default_rng(0)
@@ -279,7 +279,7 @@ class Decoder:
             topic.parts.clear()
         except LayoutError as error:
             raise LogError(
-                f"{self.ingest.path}: a message of {channel.topic} does not fit the definition of "
+                f"{self.budget.path}: a message of {channel.topic} does not fit the definition of "
                 f"{channel.type} ({error}). The bag is damaged, or its definition is another's."
             ) from None
 

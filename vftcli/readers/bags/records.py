@@ -21,11 +21,11 @@ from mcap.stream_reader import MAGIC_SIZE
 from rosbags.rosbag1.reader import RecordType
 
 from vftcli.readers.bags.container import (
-    Census,
     Channel,
     CutError,
-    Ingest,
     Message,
+    MessageCount,
+    ReadBudget,
     printable,
     sized,
     type_name,
@@ -45,9 +45,9 @@ BYTES_PER_FIELD = 8
 Header = dict[bytes, bytes]  #: Name of a field → its bytes.
 
 
-def bag_messages(file: LogFile, ingest: Ingest) -> Iterator[Message]:
+def bag_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
     """Messages of a bag, chunk by chunk, up to the last whole chunk."""
-    return _Bag(ingest).messages(file.content.obj)
+    return _Bag(budget).messages(file.content.obj)
 
 
 def _fields(head: bytes) -> Header:
@@ -65,15 +65,15 @@ class _Bag:
     """What is known of a bag while its records come in.
 
     Attributes:
-        census: What its header and index count, and what was found.
+        counts: What its header and index count, and what was found.
         channels: Connection → topic.
         starts, indexed: Where messages begin in the last chunk, by it and by the records behind it.
         listed, counted: Chunks that the index at the end lists; messages that it counts.
     """
 
-    def __init__(self, ingest: Ingest) -> None:
-        self.ingest = ingest
-        self.census = Census()
+    def __init__(self, budget: ReadBudget) -> None:
+        self.budget = budget
+        self.counts = MessageCount()
         self.channels: dict[bytes, Channel] = {}
         self.starts: list[int] = []
         self.indexed: list[int] = []
@@ -90,39 +90,39 @@ class _Bag:
             yield from self._take(header, data)
             end = place
         self._check_index()
-        self.census.tell(self.ingest, len(content) - end, "its index")
+        self.counts.report(self.budget, len(content) - end, "its index")
 
     def _record(self, content: Content, place: int) -> tuple[Header, bytes, int]:
         head, place = sized(content, place)
-        self.ingest.spend(1 + len(head) // BYTES_PER_FIELD)
+        self.budget.spend(1 + len(head) // BYTES_PER_FIELD)
         data, place = sized(content, place)
         return _fields(head), data, place
 
     def _take(self, header: Header, data: bytes) -> Iterator[Message]:
         """Take up a record; the messages in it, if it is a chunk."""
-        op, census = header[b"op"][0], self.census
+        op, counts = header[b"op"][0], self.counts
         if op == RecordType.IDXDATA:
             self.indexed += [place for *_, place in struct.iter_unpack("<III", data)]
             return
         self._check_index()
         if op == RecordType.CHUNK:
-            census.chunks += 1
+            counts.chunks += 1
             yield from self._chunk(header, data)
         elif op == RecordType.CONNECTION:
             self._connect(header, data)
         elif op == RecordType.CHUNK_INFO:
             self.listed += 1
             self.counted += sum(count for _, count in struct.iter_unpack("<II", data))
-            census.counted = self.counted if self.listed == census.counted_chunks else None
+            counts.counted = self.counted if self.listed == counts.counted_chunks else None
         elif op == RecordType.BAGHEADER:
             if header.get(b"encryptor"):
-                raise LogError(f"{self.ingest.path}: the bag is encrypted. Decrypt it first.")
+                raise LogError(f"{self.budget.path}: the bag is encrypted. Decrypt it first.")
             # The place of the index is written when the bag is closed.
-            census.closed = any(header[b"index_pos"])
+            counts.closed = any(header[b"index_pos"])
             chunks = int.from_bytes(header[b"chunk_count"], "little")
-            census.counted_chunks = chunks if census.closed else None
+            counts.counted_chunks = chunks if counts.closed else None
         else:
-            raise LogError(f"{self.ingest.path}: an unknown record; the bag is damaged.")
+            raise LogError(f"{self.budget.path}: an unknown record; the bag is damaged.")
 
     def _connect(self, header: Header, data: bytes) -> None:
         about = {name: value.decode("utf-8", "replace") for name, value in _fields(data).items()}
@@ -135,7 +135,7 @@ class _Bag:
 
     def _chunk(self, header: Header, data: bytes) -> Iterator[Message]:
         name, size = header[b"compression"].decode(), int.from_bytes(header[b"size"], "little")
-        chunk, place = unpacked(self.ingest, name, data, size), 0
+        chunk, place = unpacked(self.budget, name, data, size), 0
         while place < len(chunk):
             start = place
             inner, content, place = self._record(chunk, start)
@@ -146,14 +146,14 @@ class _Bag:
             elif inner[b"op"] == CONNECTION:
                 self._connect(inner, content)
             else:
-                raise LogError(f"{self.ingest.path}: an unknown record; the bag is damaged.")
-        self.census.kept += len(self.starts)
+                raise LogError(f"{self.budget.path}: an unknown record; the bag is damaged.")
+        self.counts.kept += len(self.starts)
 
     def _check_index(self) -> None:
         """Check that the records behind a chunk list the messages that it holds."""
         if self.indexed and sorted(self.indexed) != self.starts:
             raise LogError(
-                f"{self.ingest.path}: a chunk and its index count differently; it is damaged."
+                f"{self.budget.path}: a chunk and its index count differently; it is damaged."
             )
         self.starts, self.indexed = [], []
 
@@ -167,9 +167,9 @@ DATA_END_BYTES = 13  #: Length of the record that ends the data, its head includ
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def mcap_messages(file: LogFile, ingest: Ingest) -> Iterator[Message]:
+def mcap_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
     """Messages of an MCAP file, up to the last whole chunk."""
-    return _Mcap(ingest).messages(file.content.obj)
+    return _Mcap(budget).messages(file.content.obj)
 
 
 def _text(value: object) -> str:
@@ -179,9 +179,9 @@ def _text(value: object) -> str:
 class _Mcap:
     """Schemas and channels met so far, what the summary says, and what was found."""
 
-    def __init__(self, ingest: Ingest) -> None:
-        self.ingest = ingest
-        self.census = Census()
+    def __init__(self, budget: ReadBudget) -> None:
+        self.budget = budget
+        self.counts = MessageCount()
         #: Number of a schema → its name, encoding and data.
         self.schemas: dict[int, tuple[bytes, bytes, bytes]] = {}
         self.channels: dict[int, Channel] = {}
@@ -189,44 +189,44 @@ class _Mcap:
 
     def messages(self, content: Content) -> Iterator[Message]:
         """The messages of the file, chunk by chunk, those outside chunks one by one."""
-        census, end = self.census, MAGIC_SIZE
+        counts, end = self.counts, MAGIC_SIZE
         with suppress(CutError, struct.error):
             for op, body, place in self._records(content, MAGIC_SIZE):
                 end = place
-                if op in DATA and not census.closed:
-                    census.data_end = end
+                if op in DATA and not counts.closed:
+                    counts.data_end = end
                 if op == Opcode.CHUNK:
-                    census.chunks += 1
+                    counts.chunks += 1
                     yield from self._chunk(body)
                 elif op == Opcode.FOOTER:
                     if (left := len(content) - end) != MAGIC_SIZE:
                         raise LogError(
-                            f"{self.ingest.path}: {left} bytes follow its end where {MAGIC_SIZE} "
+                            f"{self.budget.path}: {left} bytes follow its end where {MAGIC_SIZE} "
                             "should; it is damaged."
                         )
                     (summary,) = struct.unpack_from("<Q", body)
                     if summary:  # the messages should end before it
-                        census.missing = summary - DATA_END_BYTES - census.data_end
+                        counts.missing = summary - DATA_END_BYTES - counts.data_end
                     end = len(content)
                     break
                 else:
                     yield from self._take(op, body, end)
-        if self.indexed > census.chunks:
-            census.counted_chunks = self.indexed
-        census.tell(self.ingest, len(content) - end, "its statistics")
+        if self.indexed > counts.chunks:
+            counts.counted_chunks = self.indexed
+        counts.report(self.budget, len(content) - end, "its statistics")
 
     def _records(self, content: Content, place: int) -> Iterator[tuple[int, bytes, int]]:
         """Kind and content of the records, and where each ends."""
         while place < len(content):
             op = content[place]
             body, place = sized(content, place + 1, 8)
-            self.ingest.spend(1)
+            self.budget.spend(1)
             yield op, body, place
 
     def _take(self, op: int, body: bytes, end: int) -> Iterator[Message]:
         """Remember what a record says; the message that it is, if it is one."""
         if op == Opcode.MESSAGE:
-            self.census.kept += 1
+            self.counts.kept += 1
             number, _, time, _ = struct.unpack_from("<HIQQ", body)
             yield self.channels.get(number), time, body[22:]
         elif op == Opcode.SCHEMA:
@@ -248,27 +248,27 @@ class _Mcap:
                 idl=language == b"ros2idl",
             )
         elif op == Opcode.STATISTICS:
-            self.census.closed, self.census.counted = True, struct.unpack_from("<Q", body)[0]
+            self.counts.closed, self.counts.counted = True, struct.unpack_from("<Q", body)[0]
         elif op == Opcode.CHUNK_INDEX:
             self.indexed += 1
         elif op == Opcode.DATA_END:
-            self.census.closed, self.census.data_end = True, end - DATA_END_BYTES
+            self.counts.closed, self.counts.data_end = True, end - DATA_END_BYTES
 
     def _chunk(self, body: bytes) -> Iterator[Message]:
         """The messages of a chunk, unpacked and checked."""
         *_, size, checksum = struct.unpack_from("<QQQI", body)
         compression, place = sized(body, 28)
         packed, _ = sized(body, place, 8)
-        content, end = unpacked(self.ingest, _text(compression), packed, size), 0
+        content, end = unpacked(self.budget, _text(compression), packed, size), 0
         # A checksum of zero means that the writer made none.
         if checksum and zlib.crc32(content) != checksum:
-            raise LogError(f"{self.ingest.path}: a chunk does not match its checksum; damaged.")
+            raise LogError(f"{self.budget.path}: a chunk does not match its checksum; damaged.")
         with suppress(CutError, struct.error):
             for op, inner, place in self._records(content, 0):
                 yield from self._take(op, inner, 0)  # a chunk inside a chunk is none
                 end = place
         if end < len(content):
-            raise LogError(f"{self.ingest.path}: a record ends outside its chunk; damaged.")
+            raise LogError(f"{self.budget.path}: a record ends outside its chunk; damaged.")
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -288,13 +288,13 @@ STEPS = 10_000
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 
 
-def db3_messages(file: LogFile, ingest: Ingest) -> Iterator[Message]:
+def db3_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
     """Messages of a db3 file, in the order of recording."""
     with closing(_opened(file)) as db:
-        yield from _messages(db, len(file.content), ingest)
+        yield from _messages(db, len(file.content), budget)
     journal = file.path.with_name(f"{file.path.name}-wal")
     if file.wrapping is None and journal.is_file() and (size := journal.stat().st_size):
-        ingest.note(warning("journal-left", journal=printable(journal.name), bytes=size))
+        budget.note(warning("journal-left", journal=printable(journal.name), bytes=size))
 
 
 def _opened(file: LogFile) -> sqlite3.Connection:
@@ -321,9 +321,9 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
     return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
 
 
-def _messages(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Message]:
+def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Iterator[Message]:
     """The messages of a database of a size, one by one."""
-    tables = _checked_tables(db, ingest)
+    tables = _checked_tables(db, budget)
     db.set_authorizer(_permission)
     # Topics and definitions are read beside the messages.
     left = 2 * size + 4096
@@ -334,7 +334,7 @@ def _messages(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Mes
         for row in db.execute(f"SELECT {columns} FROM {table}"):
             left -= 4 + sum(len(value) for value in row if isinstance(value, bytes))
             if left < 0:
-                raise LogError(f"{ingest.path}: its rows hold more than the file does; damaged.")
+                raise LogError(f"{budget.path}: its rows hold more than the file does; damaged.")
             yield row
 
     definitions = {}
@@ -354,27 +354,27 @@ def _messages(db: sqlite3.Connection, size: int, ingest: Ingest) -> Iterator[Mes
     for number, time, content in rows("messages ORDER BY id", "topic_id, timestamp, data"):
         if not isinstance(content, bytes) or not isinstance(time, int):
             raise LogError(
-                f"{ingest.path}: a message of topic {number!s:.20} is no bytes; damaged."
+                f"{budget.path}: a message of topic {number!s:.20} is no bytes; damaged."
             )
         data = content
         if content.startswith(ZSTD):  # on its own
             import zstandard
 
             length = zstandard.frame_content_size(content)
-            ingest.claim(length if length >= 0 else MESSAGE_LIMIT)
+            budget.claim(length if length >= 0 else MESSAGE_LIMIT)
             unpacker = zstandard.ZstdDecompressor(max_window_size=1 << 27)
             data = unpacker.decompress(content, max_output_size=MESSAGE_LIMIT)
         yield channels.get(number), time, data
 
 
-def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
+def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
     """The tables of a bag that a database has."""
     # A view and a virtual table have no root page.
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
     if not found >= {"topics", "messages"}:
         raise LogError(
-            f"{ingest.path}: an SQLite database without plain tables of a ROS 2 bag (topics, "
+            f"{budget.path}: an SQLite database without plain tables of a ROS 2 bag (topics, "
             f"messages; it has {', '.join(sorted(found)) or 'none of them'})."
         )
     for name in sorted(found):
@@ -382,7 +382,7 @@ def _checked_tables(db: sqlite3.Connection, ingest: Ingest) -> set[str]:
         traits = db.execute(f"PRAGMA table_xinfo({name})").fetchall()
         if missing := sorted(TABLES[name] - {_text(row[1]) for row in traits if row[6] == 0}):
             raise LogError(
-                f"{ingest.path}: the table {name} has no stored column {missing[0]}: it is "
+                f"{budget.path}: the table {name} has no stored column {missing[0]}: it is "
                 "computed or not there. No recorder writes such a bag; it was edited."
             )
     return found

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.aliases import RESIDUAL_TURNED, effort_of, robot_of
-from vftcli.readers.bags.container import Ingest, Integers, batches, storage_files
+from vftcli.readers.bags.container import Integers, ReadBudget, batches, storage_files
 from vftcli.readers.bags.decode import Decoder, Stream
 from vftcli.readers.bags.documents import Documents
 from vftcli.readers.columns import SIGNALS, Item
@@ -44,7 +44,7 @@ def aligned(
             if values is not None:
                 release(values)
     frame = gathering.take_wrench(streams)
-    gathering.tell_left(streams, others)
+    gathering.report_left_out(streams, others)
     width = lead.signals["q"].shape[1]
     # Another topic about the arm may have the names.
     named = [s.names for s in streams if len(s.names) == width and robot_of(s.names)]
@@ -213,7 +213,7 @@ class Gathering:
         )
         return resample_columns(x, xp, values)
 
-    def tell_left(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
+    def report_left_out(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
         lead, topic = self.lead, self.lead.channel.topic
         for stream in streams:
@@ -329,10 +329,10 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     """Read any container of messages."""
     paths = [file.path / name for name in storage_files(file)]
     size = sum(path.stat().st_size for path in paths) if file.is_folder else len(file.content)
-    ingest = Ingest(path=file.path, size=size)
-    decoder, documents = Decoder(ingest), Documents(file.path)
+    budget = ReadBudget(path=file.path, size=size)
+    decoder, documents = Decoder(budget), Documents(file.path)
     messages = 0
-    for batch in batches([open_log(path) for path in paths] if paths else [file], ingest):
+    for batch in batches([open_log(path) for path in paths] if paths else [file], budget):
         messages += len(batch.offsets)
         if not documents.take(batch):
             decoder.take(batch)
@@ -343,11 +343,11 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         counted = messages if match is None else int(match[1])
         if messages < counted:
             said = warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
-            ingest.note(said)
+            budget.note(said)
         elif messages > counted:
-            ingest.note(fact("message-count-differs", counted=counted, found=messages))
+            budget.note(fact("message-count-differs", counted=counted, found=messages))
     if messages == 0:
-        why = "; ".join(["no messages in any whole chunk", *map(str, ingest.remarks)])
+        why = "; ".join(["no messages in any whole chunk", *map(str, budget.remarks)])
         raise LogError(f"{file.path}: {why}.")
     of_documents = documents.streams(request)
     streams = [*decoder.streams(), *of_documents]
@@ -359,4 +359,4 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
         rows = (channel for channel in documents.found if channel.topic not in known)
         others = decoder.others | {c.topic: c.type or c.encoding for c in rows}
         raw = aligned(streams, file.path, request, others)
-    return replace(raw, remarks=(*ingest.remarks, *raw.remarks))
+    return replace(raw, remarks=(*budget.remarks, *raw.remarks))
