@@ -127,20 +127,15 @@ class TextTable(Table):
 
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
         """The wanted columns, some megabytes of text at a time."""
-        quoted = any('"' in line for line in self.sample)
-        for text in self._pieces(quoted=quoted):
+        for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a failure.
-            found = self._parse(text, kinds, quoted=quoted)
-            if found is None or _has_blank_rows(found):
-                found = self._parse(self._mended(text), kinds, quoted=quoted)
-            if found is None or _has_blank_rows(found):
+            found = self._parse(text, kinds) or self._parse(self._mended(text), kinds)
+            if found is None:
                 raise self._diagnosed(kinds)
             yield found
             self.file.release()
 
-    def _parse(
-        self, text: bytes, kinds: Mapping[int, str], *, quoted: bool
-    ) -> dict[int, Series] | None:
+    def _parse(self, text: bytes, kinds: Mapping[int, str]) -> dict[int, Series] | None:
         """The wanted columns by polars, each of its type; None where it refuses the text."""
         import polars as pl
 
@@ -152,14 +147,18 @@ class TextTable(Table):
                 separator=self.separator,
                 columns=sorted(kinds),
                 schema={str(c): types.get(c, pl.String) for c in range(self.width)},
-                quote_char='"' if quoted else None,
+                quote_char='"' if self._is_quoted else None,
                 decimal_comma=self.decimal_comma,
             )
         except pl.exceptions.NoDataError:  # a header alone, before polars 2
             return {c: pl.Series(dtype=kind) for c, kind in types.items()}
         except pl.exceptions.PolarsError:
             return None
-        return {c: frame[str(c)] for c in kinds}
+        found = {c: frame[str(c)] for c in kinds}
+        if all(series.null_count() for series in found.values()):  # as in every blank row
+            blank = np.all([series.is_null() for series in found.values()], axis=0).any()
+            return None if blank else found
+        return found
 
     @cached_property
     def is_headed(self) -> bool:
@@ -168,7 +167,11 @@ class TextTable(Table):
         first = next((line for line in lines if not line.startswith("#")), "")
         return bool(self.names) and self.cells(first) == list(self.names)
 
-    def _pieces(self, *, quoted: bool) -> Iterator[bytes]:
+    @cached_property
+    def _is_quoted(self) -> bool:
+        return any('"' in line for line in self.sample)
+
+    def _pieces(self) -> Iterator[bytes]:
         """The text of the rows; in one piece where a line's end may not be a row's."""
         if self._needs_mending(self.file.head):
             yield self._mended_rows()
@@ -177,7 +180,7 @@ class TextTable(Table):
         end = self._end()
         place = (content.find(b"\n") + 1 or end) if self.is_headed else 0
         while True:
-            stop = -1 if quoted else content.find(b"\n", place + BLOCK_BYTES, end)
+            stop = -1 if self._is_quoted else content.find(b"\n", place + BLOCK_BYTES, end)
             stop = stop + 1 or end
             yield content[place:stop]
             if (place := stop) >= end:
@@ -253,12 +256,6 @@ class TextTable(Table):
                         "not a number. Cut the row out, or leave the column out with _."
                     )
         return LogError(f"{self.path}: cannot be parsed as a table of numbers; is it a log?")
-
-
-def _has_blank_rows(columns: Mapping[int, Series]) -> bool:
-    if all(series.null_count() == 0 for series in columns.values()):
-        return False
-    return bool(np.all([series.is_null() for series in columns.values()], axis=0).any())
 
 
 def _names_in(comment: str, row: str) -> bool:

@@ -58,7 +58,8 @@ class ColumnarTable(Table):
         with guarded(self.path):
             schema, self._count = self._opened(file)
             self._about = (schema.metadata or {}).get(b"vftcli", b"{}")
-            self._lists = [k for k, kind in enumerate(schema.types) if _is_list(kind)]
+            lists = ("list<", "large_list<", "fixed_size_list<")
+            self._lists = [k for k, kind in enumerate(schema.types) if str(kind).startswith(lists)]
             if self._count == 0:
                 raise LogError(f"{file.path}: the table has no rows; nothing was recorded into it.")
         self.names = tuple(schema.names)
@@ -164,13 +165,6 @@ def plain(values: Arrow) -> Column:
     if values.null_count or values.type.bit_width < 8:
         return np.asarray(values.to_numpy(zero_copy_only=False))
     return np.from_dlpack(values)
-
-
-def _is_list(kind: Arrow) -> bool:
-    import pyarrow as pa
-
-    types = pa.types
-    return bool(types.is_list(kind) or types.is_large_list(kind) or types.is_fixed_size_list(kind))
 
 
 def is_number(kind: Arrow) -> bool:
