@@ -156,7 +156,6 @@ def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]
 
 
 def _npz_arrays(file: LogFile) -> dict[str, Column]:
-    """The arrays of an .npz file by name, unpacked within bounds."""
     arrays = {}
     with naming_damage(file.path, "a damaged .npz file", NOT_A_BUNDLE):
         bundle = zipfile.ZipFile(BytesIO(file.content))

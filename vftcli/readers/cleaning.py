@@ -224,7 +224,6 @@ COLUMN = {"wrench": "axis", "jacobian": "cell"}
 
 
 def _refuse_unknown_numbers(raw: RawLog, path: Path) -> None:
-    """Raise a LogError that names the row and column of the first NaN, infinity or absurd value."""
     if not np.isfinite(raw.stamps).all():
         row = raw.first_row + int(np.argmin(np.isfinite(raw.stamps)))
         raise LogError(f"{path}: the clock is not a number in sample {row}. Cut the row out.")
@@ -265,7 +264,6 @@ SEGMENT_ROWS = 20
 
 
 def _refuse_backward_steps(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError that names the first sample whose stamp lies before the one before."""
     backward = np.diff(raw.stamps) < 0
     if not backward.any():
         return
@@ -289,7 +287,6 @@ def _refuse_backward_steps(raw: RawLog, path: Path) -> None:
 
 
 def _refuse_standing_clock(raw: RawLog, path: Path) -> None:
-    """Raise a ClockError if the clock does not run, or as the clock of no robot's log can."""
     t, start = seconds(raw), float(raw.stamps[0]) * raw.tick + raw.origin
     rows, span, steps = len(t), float(t[-1]), np.diff(t)
     if not abs(start) <= FARTHEST_START:

@@ -126,7 +126,6 @@ class TextTable(Table):
         return kinds
 
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
-        """The wanted columns, some megabytes of text at a time."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a failure.
             found = self._parse(text, kinds) or self._parse(self._mended(text), kinds)
@@ -136,7 +135,6 @@ class TextTable(Table):
             self.file.release()
 
     def _parse(self, text: bytes, kinds: Mapping[int, str]) -> dict[int, Series] | None:
-        """The wanted columns by polars, each of its type; None where it refuses the text."""
         import polars as pl
 
         types = {c: getattr(pl, kind) for c, kind in kinds.items()}

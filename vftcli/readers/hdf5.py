@@ -43,7 +43,6 @@ DEFLATE_RATIO = 1032  #: The most that deflate unpacks a byte to (zlib, algorith
 
 
 def _check_chunks(name: str, dataset: Hdf5, limit: int) -> None:
-    """Check that no chunk unpacks to more than a log's may."""
     if dataset.chunks is None:
         return
     size = math.prod(dataset.chunks) * dataset.dtype.itemsize
@@ -347,7 +346,6 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
 
 
 def _placed(place: str, read: Callable[[ReadChoice], RawLog], request: ReadChoice) -> RawLog:
-    """An episode; the place of one of several is said."""
     raw = read(request)
     said = (fact("episode-place", place=place),) if place else ()
     return replace(raw, remarks=(*said, *raw.remarks))

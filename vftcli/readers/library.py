@@ -38,7 +38,6 @@ class Library:
         self._recordings: dict[tuple[Path, ReadChoice], Recording] = {}
 
     def __len__(self) -> int:
-        """How many logs it knows of."""
         return len(self._labels)
 
     def open(self, path: str | Path | Recording, choice: ReadChoice | None = None) -> Recording:

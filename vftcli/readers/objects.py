@@ -258,7 +258,6 @@ class ArrayUnpickler(pickle.Unpickler):
             raise Refused(f"{module}.{name}"[:80]) from None
 
     def _encoded(self, text: Data, encoding: Data = "latin1") -> bytes:
-        """Text that old pickles hold the bytes of an array as."""
         if not isinstance(text, str) or encoding not in {"latin1", "latin-1"}:
             raise Refused("an odd encoding")
         self._claim(len(text))

@@ -208,13 +208,14 @@ class ArrowTable(ColumnarTable):
         check_unpacked(file.path, sum(size for _, size in batches), self._size)
         return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
-    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:  # noqa: ARG002
+    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
         import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))
         for batch in pa.ipc.open_stream(self._content, options=options):
             batch.validate(full=True)  # a damaged offset would lead out of the file
-            yield batch
+            for start in range(0, batch.num_rows, rows):
+                yield batch.slice(start, rows)
 
 
 def claims(content: Arrow) -> Iterator[tuple[int, int]]:

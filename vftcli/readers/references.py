@@ -66,7 +66,6 @@ def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
 
 
 def _stated(table: Table, columns: str) -> Picks:
-    """The picks of a text: a torque or a wrench, and one column of time."""
     picks = unchecked_picks(table, parse_columns(columns, log=False))
     signals = {pick.signal: pick for pick in picks.signals}
     if not {TORQUE, "wrench"} & set(signals):
@@ -79,7 +78,6 @@ def _stated(table: Table, columns: str) -> Picks:
 
 
 def _found(table: Table) -> Picks:
-    """Find the clock, the torques and the wrench by their names."""
     if not table.names:
         raise LogError(
             f"{table.path}: a table without a header. Say what its {table.width} columns are with "

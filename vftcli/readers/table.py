@@ -119,7 +119,6 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
 
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
-    """Picks of a text that counts the columns in file order."""
     cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
     missing = len(cells) - spec.width
     rest = any(item.count == 0 for item in spec.items)
@@ -292,7 +291,6 @@ class JoinedRows:
             self._write()
 
     def _write(self) -> None:
-        """Write the rows that wait behind those in the file."""
         try:
             if self._file is None:
                 self._file = TemporaryFile()  # noqa: SIM115 - open until all rows are there

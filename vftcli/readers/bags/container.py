@@ -210,11 +210,11 @@ class CutError(ValueError):
     """The content ends inside a record."""
 
 
-def sized(content: Any, place: int, width: int = 4) -> tuple[bytes, int]:  # noqa: ANN401
-    """The bytes behind their own length, which takes so many, and where they end.
+Content = Any  #: Bytes, or a mapped file.
 
-    Of bytes, or of a mapped file.
-    """
+
+def sized(content: Content, place: int, width: int = 4) -> tuple[bytes, int]:
+    """The bytes behind their own length, which takes so many, and where they end."""
     start = place + width
     end = start + int.from_bytes(content[place:start], "little")
     if end > len(content):

@@ -91,7 +91,6 @@ class MessageLayout:
         return np.hstack(columns) if len(columns) != 2 else columns[1]
 
     def _walk(self, path: str, kind: str, depth: int) -> None:
-        """Walk the fields of one message: numbers, text, or messages."""
         if depth > MAX_DEPTH:
             raise LayoutError("nested too deeply")
         # Empty messages take no bytes: a few nested types of them would be visited without end.
@@ -284,7 +283,6 @@ class Decoder:
             ) from None
 
     def _of_length(self, batch: Batch, topic: _Topic, length: int) -> None:
-        """Decode the messages of one length, layout by layout."""
         rows = np.flatnonzero(batch.lengths == length)
         known, place = topic.layouts.setdefault(length, []), 0
         while rows.size:
@@ -298,7 +296,6 @@ class Decoder:
             rows, place = rows[~fits], place + 1
 
     def _decode(self, batch: Batch, topic: _Topic, layout: MessageLayout, rows: Integers) -> None:
-        """Decode messages of one layout into a part of their stream."""
         layout.uses += 1
         if layout.uses & (layout.uses - 1) == 0:  # the first, second, fourth, eighth … batch
             for row in self._chance.choice(rows, min(CHECKED_ROWS, len(rows)), replace=False):
@@ -358,7 +355,6 @@ def _layout_of(batch: Batch, topic: _Topic, row: int) -> MessageLayout:
 
 
 def _in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:
-    """The times and signals that all parts of a batch have, in the order of recording."""
     order = np.argsort(np.concatenate([part.pop("place") for part in parts]), kind="stable")
     for name, value in parts[0].items():
         values = [part[name] for part in parts if name in part]

@@ -97,7 +97,6 @@ class Documents:
     def _read(
         self, channel: Channel, rows: Sequence[Document], times: list[int], request: ReadChoice
     ) -> RawLog:
-        """A channel's documents as a table of their fields, by --columns or by alias."""
         each = {key: column_of(rows, key) for key in rows[0]}
         columns = {
             key: column

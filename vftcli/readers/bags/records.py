@@ -22,6 +22,7 @@ from rosbags.rosbag1.reader import RecordType
 
 from vftcli.readers.bags.container import (
     Channel,
+    Content,
     CutError,
     Message,
     MessageCount,
@@ -34,8 +35,6 @@ from vftcli.readers.bags.container import (
 from vftcli.readers.opening import LogFile
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import warning
-
-Content = Any  #: Bytes, or a mapped file.
 
 BAG_MAGIC = 13  #: Bytes before the first record of a ROS 1 bag.
 MESSAGE, CONNECTION = bytes([RecordType.MSGDATA]), bytes([RecordType.CONNECTION])
@@ -99,7 +98,6 @@ class _Bag:
         return _fields(head), data, place
 
     def _take(self, header: Header, data: bytes) -> Iterator[Message]:
-        """Take up a record; the messages in it, if it is a chunk."""
         op, counts = header[b"op"][0], self.counts
         if op == RecordType.IDXDATA:
             self.indexed += [place for *_, place in struct.iter_unpack("<III", data)]
@@ -150,7 +148,6 @@ class _Bag:
         self.counts.kept += len(self.starts)
 
     def _check_index(self) -> None:
-        """Check that the records behind a chunk list the messages that it holds."""
         if self.indexed and sorted(self.indexed) != self.starts:
             raise LogError(
                 f"{self.budget.path}: a chunk and its index count differently; it is damaged."
@@ -216,7 +213,6 @@ class _Mcap:
         counts.report(self.budget, len(content) - end, "its statistics")
 
     def _records(self, content: Content, place: int) -> Iterator[tuple[int, bytes, int]]:
-        """Kind and content of the records, and where each ends."""
         while place < len(content):
             op = content[place]
             body, place = sized(content, place + 1, 8)
@@ -224,7 +220,6 @@ class _Mcap:
             yield op, body, place
 
     def _take(self, op: int, body: bytes, end: int) -> Iterator[Message]:
-        """Remember what a record says; the message that it is, if it is one."""
         if op == Opcode.MESSAGE:
             self.counts.kept += 1
             number, _, time, _ = struct.unpack_from("<HIQQ", body)
@@ -255,7 +250,6 @@ class _Mcap:
             self.counts.closed, self.counts.data_end = True, end - DATA_END_BYTES
 
     def _chunk(self, body: bytes) -> Iterator[Message]:
-        """The messages of a chunk, unpacked and checked."""
         *_, size, checksum = struct.unpack_from("<QQQI", body)
         compression, place = sized(body, 28)
         packed, _ = sized(body, place, 8)
@@ -322,7 +316,6 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
 
 
 def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Iterator[Message]:
-    """The messages of a database of a size, one by one."""
     tables = _checked_tables(db, budget)
     db.set_authorizer(_permission)
     # Topics and definitions are read beside the messages.
@@ -368,7 +361,6 @@ def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Iterator
 
 
 def _checked_tables(db: sqlite3.Connection, budget: ReadBudget) -> set[str]:
-    """The tables of a bag that a database has."""
     # A view and a virtual table have no root page.
     query = "SELECT 1 FROM sqlite_master WHERE type = 'table' AND name = ? AND rootpage > 0"
     found = {name for name in TABLES if db.execute(query, (name,)).fetchone() is not None}
