@@ -200,7 +200,7 @@ def tick_of(stamps: Array, name: str) -> tuple[float, str]:
 
 
 ROWS = 20_000  #: Rows that are looked at; of more, the first.
-FITTED = 2000  #: Rows, of these, by which a drive constant is told.
+FITTED = 2000  #: Rows, of these, from which a drive constant is found.
 JOINTS = range(3, 13)  #: Numbers of joints that a table may be of.
 #: Rows over which a velocity's integral is compared with the change of a position.
 STEPS = (1, 4, 16, 64)

@@ -86,9 +86,12 @@ class ColumnarTable(Table):
     def lists(self) -> Mapping[int, int]:
         """Columns of lists and their length in the first row."""
         with guarded(self.path):
-            first = {k: (b for b in self._batches([k], 1) if b.num_rows) for k in self._lists}
-            rows = {k: next(batches, None) for k, batches in first.items()}
-            return {k: len((b and b.column(0)[0].as_py()) or ()) for k, b in rows.items()}
+            found = {}
+            for k in self._lists:
+                batch = next((b for b in self._batches([k], 1) if b.num_rows), None)
+                first = None if batch is None else batch.column(0)[0].as_py()
+                found[k] = len(first or ())
+            return found
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
         """Decode some columns."""

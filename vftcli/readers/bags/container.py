@@ -32,14 +32,14 @@ class Channel:
 class Batch(NamedTuple):
     """Messages of one channel, one behind the other."""
 
-    channel: Channel  #: Whose messages they are.
+    channel: Channel  #: The topic of all of them.
     buffer: Bytes  #: Their bytes.
     offsets: Integers  #: Where each begins. (k,)
     lengths: Integers  #: How long each is. (k,)
     times: Integers  #: When each was recorded. (k,) [ns]
 
 
-#: Whose a message is, None where the file does not say; when it was recorded [ns]; its bytes.
+#: The channel of a message, None where the file does not say; its time [ns]; its bytes.
 Message = tuple[Channel | None, int, bytes]
 
 BATCH_BYTES = 16 * 1024 * 1024
