@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from itertools import permutations
 from typing import NamedTuple
 
 import numpy as np
@@ -308,10 +309,8 @@ def _derivatives(t: Array, table: Array) -> Mask:
 
 def _efforts(parts: Sequence[Array], dq: Array) -> tuple[list[tuple[str, ...]], str]:
     """All readings of the blocks of columns behind the velocities that fit, by name, and why."""
-    if not parts:
-        return [()], ""
     if len(parts) != 3:
-        return [], ""
+        return ([] if parts else [()]), ""
     pairs = sorted((fit for fit in _driven(parts, dq) if fit[0] < DRIVEN), key=lambda fit: fit[0])
     readings = []
     for misfit, torque, current, constants in pairs:
@@ -331,7 +330,7 @@ def _driven(
     parts: Sequence[Array], dq: Array
 ) -> Iterator[tuple[float, int, int, tuple[float, ...]]]:
     """Misfit of blocks as torque and current, friction beside it; both; constants [N·m/A]."""
-    for torque, current in ((a, b) for a in range(len(parts)) for b in range(len(parts)) if a != b):
+    for torque, current in permutations(range(len(parts)), 2):
         size = np.sqrt(np.mean(parts[current] ** 2, axis=0))
         if np.abs(parts[torque]).max() < CONSTANTS[0] * np.abs(parts[current]).max():
             continue
