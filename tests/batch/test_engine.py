@@ -67,6 +67,23 @@ def test_groups_are_taken_only_as_workers_get_free() -> None:
     assert taken == [0]
 
 
+@pytest.mark.slow
+def test_work_goes_to_workers_once_it_takes_longer_than_they_to_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tasks = [(0,), (1,), (2,)]
+    own = f"{socket.gethostname()}:{os.getpid()}"
+
+    def places(limit: float) -> list[bool]:
+        monkeypatch.setattr("vftcli.batch.cluster.LITTLE", limit)
+        ended = run_tasks(iter(tasks), float, WorkersChoice(), silent)
+        efforts = [outcome.effort for outcome in ended]
+        return [effort is not None and effort.place == own for effort in efforts]
+
+    assert places(60.0) == [True, True, True]
+    assert places(-1.0) == [True, False, False]
+
+
 @pytest.mark.statistical
 def test_a_task_that_kills_its_worker_fails_alone_and_nothing_is_lost() -> None:
     """Eleven tasks that return, in groups too, and one that ends its process each time."""

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from functools import cache
-from itertools import count, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
@@ -27,6 +27,7 @@ from vftcli.signals.version import VERSION
 if TYPE_CHECKING:
     from distributed import Client, Future
 
+LITTLE = 20.0  #: Work of this process before workers are started, who take some seconds. [s]
 ANSWER = 10.0  #: A scheduler has to answer within this time, and to have a worker. [s]
 SETTLED = 0.5  #: A worker's nanny knows of it so long after it takes its first task. [s]
 LOOK = 5.0  #: How often the workers are counted while nothing ends. [s]
@@ -136,15 +137,20 @@ def run_tasks(
     An error of the work is an outcome like any other. If its worker dies a task runs again, three
     times in all. Closing the iterator ends what has not begun.
     """
-    if choice.in_process:
-        if choice.jobs is None:
+    rest, begun = iter(groups), time.monotonic()
+    if choice.in_process or (choice.jobs is None and choice.address is None):
+        if choice.in_process and choice.jobs is None:
             tell(f"one log after the other; to use every core: {EXTRA}")
-        for group in groups:
+        # Little work ends sooner here than workers start.
+        for group in rest:
             for task in group:
                 yield Outcome(task, *perform(work, task))
-        return
-    with connected(choice, seen, tell) as client:
-        yield from outcomes(client, groups, work, standing=choice.address is not None)
+            if not choice.in_process and time.monotonic() - begun > LITTLE:
+                break
+    if left := list(islice(rest, 1)):
+        with connected(choice, seen, tell) as client:
+            every = chain(left, rest)
+            yield from outcomes(client, every, work, standing=choice.address is not None)
 
 
 @contextmanager
