@@ -377,14 +377,6 @@ class LumpedArm:
             flange_translation=turn.T @ flange.translation,
         )
 
-    def lumped(self) -> dict[str, float]:
-        """Joint of the arm that carries locked ones → mass that its own link carries. [kg]"""
-        carriers = sorted({*self.locked.values()} - {BASE})
-        return {
-            (joint := self.joints[j]).name: self.bodies[j].mass - self.tree.bodies[joint.child].mass
-            for j in carriers
-        }
-
 
 def shortened(words: Sequence[str]) -> str:
     """Some words, and how many more there are than a message lists."""

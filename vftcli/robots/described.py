@@ -172,7 +172,12 @@ def arm_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
     if not locked:
         yield fact("arm-taken", **taken)
     else:
-        lumps = lumped.lumped()
+        # Joint of the arm that carries locked ones → mass that its own link carries. [kg]
+        lumps = {
+            (joint := lumped.joints[j]).name: mass - lumped.tree.bodies[joint.child].mass
+            for j, mass in enumerate(chain.mass.tolist())
+            if j in lumped.locked.values()
+        }
         zero = [name for name, value in locked.items() if not value]
         held = [f"{name} at {value:g}" for name, value in locked.items() if value]
         held += [f"{shortened(zero)} at 0"] if zero else []

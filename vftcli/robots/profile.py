@@ -29,7 +29,7 @@ from vftcli.robots.robot_file import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.parsing import shown
-from vftcli.signals.pose import Pose, rpy_angles, rpy_matrix
+from vftcli.signals.pose import Pose, inverse, rpy_angles, rpy_matrix
 from vftcli.signals.remarks import fact
 
 SCHEMA = 1
@@ -300,8 +300,14 @@ def robot_document(robot: Robot) -> Table:
     if old.get("convention") not in CONVENTIONS:
         old = xyz_rpy_document(robot)
     tables = [dict(table) for table in old["joints"]]
-    update_inertials(tables, old, robot.chain)
-    for j, table in enumerate(tables):
+    chain, (_, frames, _) = robot.chain, kinematics(old["convention"], tables, old)
+    for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
+        body = Body(float(chain.mass[j]), chain.com[j], chain.inertia[j]).moved(inverse(frame))
+        values = {"com": body.com, "inertia": body.inertia[np.triu_indices(3)]}
+        for key, value in {"mass": np.array(body.mass), **values}.items():
+            scale, before = float(np.max(np.abs(value), initial=1e-12)), table.get(key)
+            if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
+                table[key] = value.tolist()
         table["rotor_inertia"] = float(robot.chain.rotor_inertia[j])
         if robot.torque_constant is not None:
             table["torque_constant"] = float(robot.torque_constant[j])
@@ -312,24 +318,6 @@ def robot_document(robot: Robot) -> Table:
     document |= {"torque_source": robot.torque_source, "gravity": robot.chain.gravity.tolist()}
     document |= {"dof": robot.joints, "joints": tables, "payload": payload_tables(robot)}
     return {key: value for key, value in document.items() if value != {}}
-
-
-def update_inertials(tables: list[Table], document: Mapping[str, Any], chain: Chain) -> None:
-    """Put the chain's inertials into the joint tables, in their frames."""
-    _, frames, _ = kinematics(document["convention"], tables, document)
-    for j, (table, frame) in enumerate(zip(tables, frames, strict=True)):
-        R = frame.rotation
-        tensor = R.T @ chain.inertia[j] @ R
-        values = {
-            "mass": np.array(chain.mass[j]),
-            "com": R.T @ (chain.com[j] - frame.translation),
-            "inertia": tensor[np.triu_indices(3)],
-        }
-        for key, value in values.items():
-            scale = float(np.max(np.abs(value), initial=1e-12))
-            before = table.get(key)
-            if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
-                table[key] = value.tolist()
 
 
 def payload_tables(robot: Robot) -> Table:
