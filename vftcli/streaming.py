@@ -11,7 +11,6 @@ from vftcli.doctor.examination import stretches
 from vftcli.observers.observer import BlockObserver
 from vftcli.observers.table import OBSERVERS
 from vftcli.pipeline import AnalysisChoice, observe, read, sense
-from vftcli.readers.opening import WHOLE_ROWS
 from vftcli.robots.run import Run, Runs
 from vftcli.robots.terms import RunningTerms
 from vftcli.signals.external_torque import ExternalTorque
@@ -19,6 +18,9 @@ from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import caution
 from vftcli.signals.series import clock_of
 from vftcli.signals.steady_filter import PIECE
+
+#: A log of no more rows is analysed in one piece: there is memory for all that is done with it.
+WHOLE_ROWS = 100_000
 
 
 def comes_in_blocks(recording: Recording, choice: AnalysisChoice) -> bool:

@@ -28,9 +28,6 @@ UNPACKED_LIMIT = 128 * 1024 * 1024
 #: Recorded numbers shrink by 3 to 15; a log that shrinks a hundredfold is not a recorded log.
 UNPACKED_RATIO = 50
 
-#: A log of no more rows is read in one piece: there is memory for all that is done with it.
-WHOLE_ROWS = 100_000
-
 CHUNK = 1024 * 1024
 #: zstd is fed in pieces so small that even a bomb yields only some tens of megabytes at a time.
 ZSTD_BYTES = 1024
