@@ -272,7 +272,7 @@ MOST = {
     "functions": 2984,
     "functions over 60 lines": 11,
     "names, operators, numbers": 384_457,
-    "characters a line that is not blank": 50.7,
+    "characters a line that is not blank": 51.2,
     "noqa": 94,
     "lines of TOML, JavaScript, CSS": 6545,
 }

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from vftcli.observers.choice import ObserverChoice
 from vftcli.observers.observer import Observer
 from vftcli.observers.table import PAPER, Setup, build_observers
 from vftcli.observers.tuning import match_observers, parse_goal
+from vftcli.robots import load_robot
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import DynamicsTerms
 
@@ -25,7 +27,7 @@ def tuned(goal: str, step: float = 0.008, convention: str | None = None) -> list
     settings = {"kfo": {"noise_convention": convention}} if convention else {}
     how = setup(step, settings=settings)
     asked = parse_goal(goal, allowed=("delay", "bandwidth"))
-    return list(match_observers(build_observers(PAPER, how)[0], asked, how)[0])
+    return list(match_observers(build_observers(PAPER, how)[0], asked, step, 3)[0])
 
 
 @pytest.mark.parametrize("step", [0.001, 0.008])
@@ -64,9 +66,8 @@ def test_matched_fdo_and_gmo_are_one_filter() -> None:
     terms = DynamicsTerms(t=t, p=p, mu=mu)
     fdo, gmo = (o.estimate(terms).tau for o in tuned("delay=0.05")[:2])
     assert np.max(np.abs(fdo - gmo)) < 1e-10 * np.max(np.abs(p)) / 0.05
-    _, remarks = match_observers(
-        build_observers(PAPER, setup())[0], parse_goal("delay=0.05"), setup()
-    )
+    observers, _ = build_observers(PAPER, setup())
+    _, remarks = match_observers(observers, parse_goal("delay=0.05"), 0.008, 3)
     assert [r.code for r in remarks] == ["delay-matched", "first-order-observers-alike"]
     assert remarks[0].values["delay_s"] == 0.05
     assert "are one filter" in str(remarks[1])
@@ -95,14 +96,13 @@ def test_one_joint_out_of_reach_is_refused() -> None:
     how = setup(gains=gains)
     observers, _ = build_observers(["kfo-zoh"], how)
     with pytest.raises(ParameterError, match=r"no gain gives kfo-zoh a delay of 0\.02 s"):
-        match_observers(observers, parse_goal("delay=0.02"), how)
+        match_observers(observers, parse_goal("delay=0.02"), 0.008, 3)
 
 
 def test_printed_formulas_are_not_matched() -> None:
-    how = setup(as_printed=True)
-    observers, _ = build_observers(PAPER, how)
+    choice = ObserverChoice.parsed(gains="delay=0.05", as_printed=True)
     with pytest.raises(ParameterError, match="--as-printed"):
-        match_observers(observers, parse_goal("delay=0.05"), how)
+        choice.build(load_robot("ur5"), 0.008)
 
 
 @pytest.mark.parametrize(
@@ -117,6 +117,6 @@ def test_first_order_observers_are_called_alike_where_both_run(
     names: list[str], codes: list[str]
 ) -> None:
     observers, _ = build_observers(names, setup())
-    _, remarks = match_observers(observers, parse_goal("bandwidth=3"), setup())
+    _, remarks = match_observers(observers, parse_goal("bandwidth=3"), 0.008, 3)
     assert [remark.code for remark in remarks] == codes
     assert remarks[0].values == {"bandwidth_Hz": 3.0}

@@ -8,7 +8,7 @@ import pytest
 
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import ParameterError
-from vftcli.simulation.contacts import STYLES, Contact, Place, draw_walk, drawn, started
+from vftcli.simulation.contacts import STYLES, Place, SimulatedContact, draw_walk, drawn, started
 from vftcli.simulation.scenario import (
     HandSpec,
     LoadSpec,
@@ -26,7 +26,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(1)
 
 
-def wrench(contact: Contact, t: float, place: Place = HERE) -> Array:
+def wrench(contact: SimulatedContact, t: float, place: Place = HERE) -> Array:
     """The contact's wrench at a time, none outside of its spans."""
     k = contact.index_at(t)
     return np.zeros(6) if k is None else contact.wrench(k, t, place)

@@ -190,7 +190,12 @@ class ObserverChoice(Choice):
             return observers, remarks
         from vftcli.observers.tuning import match_observers
 
-        observers, on_match = match_observers(observers, self.match, setup)
+        if self.as_printed:
+            raise ParameterError(
+                "--gains tunes the corrected observers; the printed ones have another response. "
+                "Leave --gains or --as-printed away"
+            )
+        observers, on_match = match_observers(observers, self.match, step, robot.joints)
         return observers, (*remarks, *on_match)
 
     def run(self, observer: "Observer", terms: "DynamicsTerms") -> "ExternalTorque":

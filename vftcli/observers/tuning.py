@@ -10,7 +10,7 @@ with the filter's exact complex response H, or the smoother's real one.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -24,9 +24,6 @@ from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.option import numbers
 from vftcli.signals.remarks import Remark, fact, on_joints, warning
 from vftcli.signals.shown import Shown
-
-if TYPE_CHECKING:
-    from vftcli.observers.table import Setup
 
 SLOWEST = 1.0  #: Least natural frequency to try. [rad/s]
 #: That of `best`: it keeps 84 % of the peak of a push of .6 s, a half sine, as the smoother
@@ -217,18 +214,13 @@ def parse_goal(
 
 
 def match_observers(
-    observers: Sequence[Observer], goal: Goal, setup: "Setup"
+    observers: Sequence[Observer], goal: Goal, step: float, joints: int
 ) -> tuple[tuple[Observer, ...], tuple[Remark, ...]]:
     """Observers with one delay behind a slow ramp, or −3 dB bandwidth, and remarks on it.
 
     A Kalman filter keeps R and Q_p and moves Q_τ.
     """
-    if setup.as_printed:
-        raise ParameterError(
-            "--gains tunes the corrected observers; the printed ones have another response. Leave "
-            "--gains or --as-printed away"
-        )
-    tuned = tuple(tune(observer, goal, setup.step, setup.joints) for observer in observers)
+    tuned = tuple(tune(observer, goal, step, joints) for observer in observers)
     remarks: tuple[Remark, ...] = (fact("bandwidth-matched", bandwidth_Hz=goal.value),)
     if goal.name == "delay":
         remarks = (fact("delay-matched", delay_s=goal.value),)

@@ -216,13 +216,13 @@ def clock_ground(recording: Recording) -> Ground:
     t, steps = recording.t, np.diff(recording.t)
     longest, at = (steps.max(), t[np.argmax(steps)]) if len(steps) else (0.0, 0.0)
     gaps = int(np.count_nonzero(steps > 0.1))
-    remarks = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
-    odd = gaps > 0 or any(remark.level != "fact" for remark in remarks)
+    ranked = sorted(recording.source.remarks, key=lambda remark: remark.level == "fact")
+    odd = gaps > 0 or any(remark.level != "fact" for remark in ranked)
     words = f"no gap above {1e3 * longest:.0f} ms"
     if gaps:
         words = f"{counted(gaps, 'gap')}, the longest {longest:.2g} s at {at:.1f} s"
-    more = f", and {len(remarks) - 1} more" if len(remarks) > 1 else ""
-    words += f"; {sentence(remarks[0])}{more}" if remarks else ", nothing repaired"
+    more = f", and {len(ranked) - 1} more" if len(ranked) > 1 else ""
+    words += f"; {sentence(ranked[0])}{more}" if ranked else ", nothing repaired"
     remedy = command("inspect", recording) if odd else None
     return Ground("caution" if odd else "good", "clock", words, remedy)
 

@@ -52,7 +52,7 @@ class Push(NamedTuple):
         return size * self.wrench
 
 
-class Contact(NamedTuple):
+class SimulatedContact(NamedTuple):
     """A contact during a run: when it acts, and its wrench then."""
 
     spans: Sequence[tuple[float, float]]  #: Start and end of each application. [s]
@@ -140,7 +140,7 @@ class Hand:
         return hold * np.concatenate([force, torque])
 
 
-def stop_of(spec: StopSpec) -> Contact:
+def stop_of(spec: StopSpec) -> SimulatedContact:
     """A hard stop: it pushes along its normal where it is met, and never pulls."""
     if not any(spec.normal):
         raise ParameterError(f"contacts.{spec.name}.normal has no length")
@@ -151,10 +151,10 @@ def stop_of(spec: StopSpec) -> Contact:
         size = max(spec.stiffness * depth - spec.damping * float(normal @ place.velocity), 0.0)
         return np.concatenate([size * (depth > 0.0) * normal, np.zeros(3)])
 
-    return Contact([(-math.inf, math.inf)], wrench)
+    return SimulatedContact([(-math.inf, math.inf)], wrench)
 
 
-def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> Contact:
+def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> SimulatedContact:
     """Pushes that follow one another, in base axes or in the link's."""
 
     def wrench(k: int, t: float, place: Place) -> Array:
@@ -163,10 +163,10 @@ def pushes_of(pushes: Sequence[Push], *, in_link: bool = False) -> Contact:
             return size
         return np.concatenate([place.rotation @ part for part in np.split(size, 2)])
 
-    return Contact([(push.start, push.stop) for push in pushes], wrench)
+    return SimulatedContact([(push.start, push.stop) for push in pushes], wrench)
 
 
-def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Contact:
+def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> SimulatedContact:
     """A contact ready to act in a run of `duration` [s]; only pushes are drawn."""
     where = f"contacts.{spec.name}"
     if isinstance(spec, PushesSpec):
@@ -180,7 +180,7 @@ def started(spec: WrenchSpec, rng: np.random.Generator, duration: float) -> Cont
                     f"{where}.{name} has {len(rows)} rows; it must have one for each of the "
                     f"{len(spec.spans)} spans"
                 )
-        return Contact(spec.spans, Hand(spec).wrench)
+        return SimulatedContact(spec.spans, Hand(spec).wrench)
     if isinstance(spec, LoadSpec):
         if spec.weight < 0:
             raise ParameterError(f"{where}.weight is negative")
@@ -197,7 +197,7 @@ class Mounted(NamedTuple):
     """A contact and the body it acts on."""
 
     name: str  #: The contact's name.
-    contact: Contact  #: When it acts, and how.
+    contact: SimulatedContact  #: When it acts, and how.
     joint: int  #: The joint that carries the body, from 1.
     turn: Array  #: Orientation of the link's frame in the joint's frame. (3, 3)
     point: Array  #: The contact's point in the joint's frame. (3,) [m]
