@@ -40,7 +40,7 @@ def test_an_overshoot_is_printed_in_per_cent_with_a_true_minus(release: Replay) 
 def test_rows_for_machines_are_not_rounded(release: Replay, tmp_path: Path) -> None:
     rows = json.loads(json_rows(release.rows))
     assert rows == json.loads(json.dumps(list(release.rows)))
-    for name, replay in (("full", release), ("empty", replace(release, rows=()))):
+    for name, replay in (("full", release), ("empty", replace(release, drags=()))):
         write_admittance(tmp_path / name, replay, None)
     with (tmp_path / "full/comparison.csv").open(encoding="utf-8") as file:
         read = list(csv.DictReader(file))
