@@ -258,7 +258,8 @@ def contacts_csv(lists: Sequence[ContactList]) -> str:
         for found in lists
         for contact in found.contacts
     ]
-    keys = list(dict.fromkeys(key for row in rows for key in row)) or ["recording", *FIRST_COLUMNS]
+    keys = list(dict.fromkeys(key for row in rows for key in row))
+    keys = keys or ["recording", *FIRST_COLUMNS]
     return csv_rows([{key: row.get(key) for key in keys} for row in rows], keys)
 
 

@@ -317,7 +317,8 @@ def log_folder(paths: Iterable[Path], force: bool) -> OutputFolder:
         if not path.name:
             raise OutputError(f"{path} is a folder; give the name of a log file with -o")
         # A bag is a folder: the files of the one that is there go when the new ones come.
-        inside = [file for file in path.rglob("*") if not file.is_dir()] if path.is_dir() else []
+        files = path.rglob("*") if path.is_dir() else ()
+        inside = [file for file in files if not file.is_dir()]
         # A killed run may have left it without its metadata, or empty.
         if any(file.suffix not in {".mcap", ".db3", ".yaml"} for file in inside):
             raise OutputError(f"{path} is a folder and no bag; give another -o")

@@ -122,7 +122,8 @@ def logs_of(errors: pl.DataFrame, place: str) -> Iterator[pl.DataFrame]:
 
 def block(rows: pl.DataFrame) -> Block:
     """The rows of one recording as a matrix."""
-    joints, observers = rows["joint"].unique().sort(), rows["observer"].unique(maintain_order=True)
+    joints = rows["joint"].unique().sort()
+    observers = rows["observer"].unique(maintain_order=True)
     values = {(r["observer"], r["joint"]): r["rmse_Nm"] for r in rows.iter_rows(named=True)}
     floors = dict(rows.select("joint", "reference_floor_Nm").iter_rows())
     # Joints may differ in how many samples have a reference.

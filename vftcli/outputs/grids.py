@@ -54,7 +54,8 @@ def joints_grid(robot: "Robot") -> Grid:
         table = robot.friction[j].table if robot.friction else {}
         friction = "none"
         if table:
-            model, trust = table.pop("model"), table.pop("confidence", "no confidence stated")
+            model = table.pop("model")
+            trust = table.pop("confidence", "no confidence stated")
             numbers = ", ".join(
                 f"{key} {' '.join(f'{v:g}' for v in (x if isinstance(x, list) else [x]))}"
                 for key, x in table.items()
@@ -148,14 +149,14 @@ def pairs_text(table: "pl.DataFrame") -> str:
             names = names[::-1]
         else:
             low, high = -high, -low
-        interval, by = f"{significant(low)} to {significant(high)}", abs(row["difference_Nm"])
+        interval = f"{significant(low)} to {significant(high)}"
+        by = abs(row["difference_Nm"])
         # A blank keeps the digits of those without a star below the others.
         sure = f"{row['p']:.3f}{'*' if row['p'] < SURE else ' '}"
         rows.append((row["recording"], f"J{row['joint']}", *names, by, interval, sure))
     heads = ("joint", "better", "than", "by [N·m]", "95 % interval", "p")
-    return (
-        f"{terminal(Grid((*words('recording'), *map(Column, heads)), rows))}*: p below {SURE:g}\n"
-    )
+    grid = Grid((*words("recording"), *map(Column, heads)), rows)
+    return f"{terminal(grid)}*: p below {SURE:g}\n"
 
 
 def print_text(found: "Comparison") -> str:

@@ -257,4 +257,5 @@ def shape_choice_grid(choices: pl.DataFrame) -> Grid:
         for r in choices.iter_rows(named=True)
     ]
     title = "RMS on the fifth of the log left out; the simplest within 1 % of the best is chosen"
-    return Grid((*words("friction"), *map(Column, ("joint", "RMS [N·m]", ""))), rows, title)
+    columns = *words("friction"), *map(Column, ("joint", "RMS [N·m]", ""))
+    return Grid(columns, rows, title)

@@ -183,7 +183,9 @@ def write_jacobian_folder(
     import polars as pl
 
     log, wrench = made.log, made.vendor.wrench
-    both = {"vendor": made.vendor, **({} if made.sensor is None else {"reference": made.sensor})}
+    both = {"vendor": made.vendor}
+    if made.sensor is not None:
+        both["reference"] = made.sensor
     columns: dict[str, Array | None] = {"t": log.t}
     for name, one in both.items():
         columns |= per_joint(f"tau_ext/{name}", one.torque.tau)

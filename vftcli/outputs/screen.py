@@ -139,7 +139,8 @@ def list_screen(found: ContactList, canvas: Canvas, *, every: bool) -> str:
 def head_lines(analysis: Analysis, canvas: Canvas) -> list[str]:
     """The facts, and the answer in a sentence."""
     answered = canvas.wrapped(printable(headline(analysis)), 2)
-    return [canvas.painted(facts(analysis), "bold"), *(f"  {line.strip()}" for line in answered)]
+    lines = [f"  {line.strip()}" for line in answered]
+    return [canvas.painted(facts(analysis), "bold"), *lines]
 
 
 def facts(analysis: Analysis) -> str:

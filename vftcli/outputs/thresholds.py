@@ -63,7 +63,13 @@ def check_grid(check: ThresholdDetection) -> Grid:
     """The contacts of a log, and their evidence."""
     missed = {True: "on already", False: "missed"}
     times = (Column(head, "s", ".2f") for head in ("from", "to"))
-    columns = Column("#"), *times, Column("|F|", "N"), Column("delay", "ms", ".0f"), *words("by")
+    columns = (
+        Column("#"),
+        *times,
+        Column("|F|", "N"),
+        Column("delay", "ms", ".0f"),
+        *words("by"),
+    )
     rows = [
         (str(k), c.start, c.stop, c.peak_force, 1e3 * c.delay, c.by or missed[c.already_above])
         for k, c in enumerate(check.contacts, start=1)

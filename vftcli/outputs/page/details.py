@@ -39,7 +39,14 @@ LETTER = 7.5  #: Width of a letter: labels must not overlap.
 SIZE, EDGE = np.array([84.0, 64.0]), 9.0  #: Size of the arm's drawing, and margin.
 ARROW, HEAD = 20.0, 5.0  #: Arrow in the drawing's plane, and its head.
 #: Headings of the tables of contacts: vectors, and what follows them.
-VECTORS = ("force [N]", "± sd", "moment [N·m]", "± sd", "mean force [N]", "impulse [N·s]")
+VECTORS = (
+    "force [N]",
+    "± sd",
+    "moment [N·m]",
+    "± sd",
+    "mean force [N]",
+    "impulse [N·s]",
+)
 EVIDENCE = (
     "log-likelihood ratio [nats]",
     "margin of the place [nats]",
@@ -177,7 +184,8 @@ def arm_drawing(analysis: Analysis, contact: Contact) -> ArmDrawing:
     shaft: list[Array] = []
     if hit and contact.wrench is not None:
         force = contact.wrench[:3]
-        direction = np.array([force @ across, -force[2]]) / max(float(np.linalg.norm(force)), 1e-12)
+        size = max(float(np.linalg.norm(force)), 1e-12)
+        direction = np.array([force @ across, -force[2]]) / size
         shaft = arrow(np.vstack(hit).mean(axis=0), direction)
     return ArmDrawing(SIZE, drawn, hit, shaft)
 

@@ -190,7 +190,8 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
     first, t, styles = sensed.wrenches[0], analysis.t, observer_styles(analysis)
     if first.sigma_min is not None:
         lines = [ChartLine("σ_min of J", first.sigma_min[:, None])]
-        title, least = "What the pose can tell: σ_min", np.array([sensed.sensor.least_sigma])
+        title = "What the pose can tell: σ_min"
+        least = np.array([sensed.sensor.least_sigma])
         yield Chart.of_one("sigma_min", title, "m", t, lines)._replace(
             band=least, band_label="masked below", lowest=0.0
         )
@@ -209,7 +210,8 @@ def condition_charts(analysis: Analysis) -> Iterator[Chart]:
             for w in sensed.wrenches
             if w.null_space is not None
         ]
-        limit, title = sensed.null_space_limit, "Torque that no wrench at the flange explains"
+        limit = sensed.null_space_limit
+        title = "Torque that no wrench at the flange explains"
         yield Chart.of_one("null_space", title, "N·m", t, lines)._replace(
             band=None if limit is None else np.array([limit]), band_label="free part"
         )

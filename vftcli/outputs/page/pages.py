@@ -188,7 +188,8 @@ def index_headline(analyses: Sequence[Analysis]) -> tuple[str, str]:
 
 def overview(lines: Sequence[LogSummary]) -> Grid:
     """The table of all logs, the worst first; a click on a head sorts by it."""
-    return Grid(words(*HEADS), [*map(overview_row, sorted(lines, key=lambda line: line.rank))])
+    ordered = sorted(lines, key=lambda line: line.rank)
+    return Grid(words(*HEADS), list(map(overview_row, ordered)))
 
 
 def overview_row(line: LogSummary) -> tuple[GridCell | str, ...]:
