@@ -104,6 +104,17 @@ def test_missing_positions_or_clock_say_what_to_record(tmp_path: Path) -> None:
         read(path)
 
 
+def test_a_table_with_targets_of_its_own_is_no_recording_of_ur(tmp_path: Path) -> None:
+    """`target_q_0` beside names that are not RTDE's; it was refused for want of a timestamp."""
+    names = [f"{name}_{j}" for name in ("q", "dq", "tau", "target_q") for j in range(6)]
+    path = tmp_path / "own.csv"
+    rows = (",".join(f"{0.01 * k + 0.1 * c:.3f}" for c in range(25)) for k in range(40))
+    path.write_text("\n".join([",".join(["time", *names]), *rows]) + "\n")
+    log = read(path)
+    assert log.source.format == "table"
+    assert {"q", "dq", "torque", "target_q"} <= set(log.signals)
+
+
 def test_binary_records(tmp_path: Path) -> None:
     path = ur_binary(tmp_path / "x.csv")
     np.testing.assert_array_equal(read(path).q, motion()["q"])
