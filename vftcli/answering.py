@@ -54,18 +54,10 @@ def errors_of(
     )
 
 
-class FreeThresholds(NamedTuple):
-    """Thresholds that contact-free logs show."""
-
-    runs: list[Run]  #: The logs.
-    signals: "list[ComparedSignals]"  #: What is compared with the thresholds along each.
-    found: "Thresholds"  #: The thresholds, with what limits them.
-
-
 def free_thresholds(
     logs: Sequence[Opened], choice: AnalysisChoice, rate: float, *, anyway: bool
-) -> FreeThresholds:
-    """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
+) -> "tuple[list[Run], list[ComparedSignals], Thresholds]":
+    """Contact-free logs, their signals, and what motion like theirs exceeds at a rate. [1/h]"""
     from vftcli.contacts.threshold_check import compared_signals
     from vftcli.contacts.thresholds import find_thresholds
 
@@ -74,7 +66,7 @@ def free_thresholds(
     shown = [remark for run in runs for remark in touched(run, anyway=anyway)]
     signals = [compared_signals(run) for run in runs]
     found = find_thresholds(signals, rate)
-    return FreeThresholds(runs, signals, replace(found, remarks=(*found.remarks, *shown)))
+    return runs, signals, replace(found, remarks=(*found.remarks, *shown))
 
 
 def modelled(recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs) -> Run:

@@ -239,7 +239,7 @@ def compare(
 def thresholds(free: Opened | Sequence[Opened], asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     logs = several(free)
-    return free_thresholds(logs, asked.analysis(logs), rate, anyway=asked.anyway).found
+    return free_thresholds(logs, asked.analysis(logs), rate, anyway=asked.anyway)[2]
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))

@@ -14,6 +14,7 @@ from vftcli.batch.annotation import (
     SIGN,
     EpisodesTask,
     ForceChoice,
+    Record,
     estimate_episodes,
     force_columns,
 )
@@ -63,7 +64,7 @@ def annotate(
     progress: Callable[[str, float, float], None],
     *,
     force: bool = False,
-) -> dict[str, Any]:
+) -> Record:
     """Write a copy of a dataset with the forces of every frame.
 
     Frames without an estimate stop the run, or are filled with zeros and marked where the choice
@@ -177,10 +178,10 @@ def gathered(
     outcomes: Iterable[Outcome[Any]],
     choice: ForceChoice,
     progress: Callable[[str, float, float], None],
-) -> dict[str, Any]:
+) -> Record:
     """Results of all episodes as of `estimate_episodes`, in the order of their files."""
-    episodes: list[dict[str, Any]] = []
-    made: dict[str, Any] = {"episodes": episodes, "robot": None, "observer": None}
+    episodes: list[Record] = []
+    made: Record = {"episodes": episodes, "robot": None, "observer": None}
     for outcome in outcomes:
         some = value_of(outcome)
         for record in () if choice.anyway else some["episodes"]:
@@ -196,7 +197,7 @@ def gathered(
 REMEDY = "--anyway writes 0 there, and a column that says so"
 
 
-def refuse_missing(record: Mapping[str, Any]) -> None:
+def refuse_missing(record: Record) -> None:
     """Refuse an episode of which frames are missing."""
     if record["status"] == "missing":
         # All files of DROID have one name.
@@ -216,7 +217,7 @@ def refuse_missing(record: Mapping[str, Any]) -> None:
         )
 
 
-def joint_names(made: Mapping[str, Any]) -> list[str]:
+def joint_names(made: Record) -> list[str]:
     """The names of the joints, of the first episode that tells any; all must have as many."""
     episodes = made["episodes"]
     known = [one for one in episodes if one["status"] != "missing"]
@@ -232,9 +233,7 @@ def joint_names(made: Mapping[str, Any]) -> list[str]:
     return known[0]["joints"] or [f"joint_{k + 1}" for k in range(known[0]["joint_count"])]
 
 
-def write_file(
-    dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask
-) -> dict[str, Any]:
+def write_file(dataset: Dataset, columns: list[ForceColumn], suffix: str, task: FileTask) -> Record:
     """Write a data file with its columns; return its place and the statistics of its episodes."""
     begin("writing")
     rows: dict[str, Any] = {}

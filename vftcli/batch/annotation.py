@@ -30,6 +30,7 @@ from vftcli.virtual_sensor.choice import WrenchChoice
 from vftcli.virtual_sensor.frames import FRAMES
 
 USUAL = "kfo-zoh"  #: The observer where none is named: it needs no sample that comes later.
+Record = dict[str, Any]  #: What is recorded of episodes, by name.
 SIGN = "what the environment exerts ON the robot"  #: Sign of all that is added.
 
 
@@ -92,17 +93,17 @@ class EpisodesTask(NamedTuple):
     rows: Path  #: Where their columns are put.
 
 
-def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> dict[str, Any]:
+def estimate_episodes(choice: ForceChoice, task: EpisodesTask) -> Record:
     """Records of some episodes, with robot and observer of the first; forces into a file."""
     if task.rows.is_file():
         return dict(json.loads(str(stored_rows(task.rows)["told"])))
     library, examiner = Library([task.file.log]), Examiner(anyway=choice.anyway)
     arrays: dict[str, Single] = {}
-    records: list[dict[str, Any]] = []
-    told: dict[str, Any] = {"episodes": records, "robot": None, "observer": None}
+    records: list[Record] = []
+    told: Record = {"episodes": records, "robot": None, "observer": None}
     for number in task.file.episodes:
         begin(f"episode {number}")
-        record: dict[str, Any] = {"episode": number, "file": task.file.place.as_posix()}
+        record: Record = {"episode": number, "file": task.file.place.as_posix()}
         try:
             asked = AnalysisChoice(
                 read=replace(choice.read, episode=number),
@@ -190,7 +191,7 @@ def by_row(values: Array, samples: Indices | None) -> Single:
     return np.where(samples[:, None] >= 0, values[samples], np.nan).astype(np.float32)
 
 
-def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> dict[str, Any]:
+def record_of(analysis: Analysis, columns: Mapping[str, Single]) -> Record:
     """Record of a finished episode."""
     recording, observer = analysis.recording, analysis.observers[0]
     missing = {name: int(np.isnan(v).any(axis=1).sum()) for name, v in columns.items()}

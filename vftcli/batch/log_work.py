@@ -6,7 +6,7 @@ Its rows are of a log × observer × joint or axis, in fixed columns.
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -44,8 +44,7 @@ class LogJob:
         check_known(self.do, COMMANDS, f"--do {self.do!r}")
 
 
-@dataclass(frozen=True, kw_only=True)
-class LogTask:
+class LogTask(NamedTuple):
     """One log of a batch."""
 
     job: LogJob  #: What is done with it.
@@ -118,8 +117,9 @@ def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
     return replace(choice, contacts=choice.contacts and (choice.wrench is not None or judged))
 
 
+Kinds = dict[str, Any]  #: Column → its type in polars.
 #: Columns with one value a log.
-OF_LOG: dict[str, Any] = {
+OF_LOG: Kinds = {
     "robot": pl.String,
     "samples": pl.Int64,
     "duration_s": pl.Float64,
@@ -135,7 +135,7 @@ OF_LOG: dict[str, Any] = {
     "told_N": pl.Float64,
 }
 #: Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below.
-OF_ESTIMATE: dict[str, Any] = {
+OF_ESTIMATE: Kinds = {
     "observer": pl.String,
     "joint": pl.Int64,
     "axis": pl.String,
@@ -146,13 +146,13 @@ OF_ESTIMATE: dict[str, Any] = {
 }
 COMPARED = "compared_samples"  #: Samples of a comparison; `samples` are the log's.
 #: Columns of the errors, as `vftcli compare --json` has them; null without a reference.
-OF_ERROR: dict[str, Any] = {
+OF_ERROR: Kinds = {
     COMPARED if name == "samples" else name: kind
     for name, kind in WRENCH_SCHEMA.items()
     if name not in {"recording", *OF_ESTIMATE}
 }
 #: Columns of a log's rows.
-SCHEMA: dict[str, Any] = {"key": pl.String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
+SCHEMA: Kinds = {"key": pl.String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
 JOINED = ("observer", "joint", "axis")  #: By which an estimate and its error belong together.
 
 

@@ -39,15 +39,11 @@ def make_app(load: Collection[str] = tuple(COMMANDS)) -> typer.Typer:
             module = import_module(f"vftcli.cli.{command.file}")
             app.command(name, **how)(getattr(module, command.function))
         else:
-            app.command(name, help=command.summary, **how)(not_loaded)
+            app.command(name, help=command.summary, **how)(lambda: None)
     return app
 
 
 HELP = {"help_option_names": ["-h", "--help"]}  #: How help is asked for.
-
-
-def not_loaded() -> None:
-    """Stand in for a command that this call does not need."""
 
 
 def __getattr__(name: str) -> Any:  # noqa: ANN401 - a module's attributes are of every kind

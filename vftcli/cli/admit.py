@@ -8,6 +8,15 @@ import typer
 from vftcli.admittance.choice import ControlChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.console import (
+    command_line,
+    detail,
+    open_made,
+    say,
+    say_json,
+    say_left_out,
+    steps_of,
+)
 from vftcli.cli.progress import echo, echo_data
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
@@ -52,7 +61,6 @@ def admit(
     Example: vftcli admit --release x=0.3 --robot ur5 --alpha 1,1.3,1.6,1.9
     """
     from vftcli.answering import replayed
-    from vftcli.cli.console import command_line, open_made, say, say_left_out, steps_of
     from vftcli.outputs.admittance import files_of_replay, write_admittance
     from vftcli.outputs.files import OutputFolder
     from vftcli.readers.library import Library
@@ -103,7 +111,6 @@ def admit(
 
 def show(found: "Replayed", shown: ShownOptions) -> None:
     """The comparison on stdout, remarks on stderr."""
-    from vftcli.cli.console import detail, say, say_json
     from vftcli.outputs.admittance_tables import (
         comparison_text,
         latency_text,

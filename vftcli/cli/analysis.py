@@ -4,6 +4,7 @@ import os
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
+from vftcli.cli.console import health_of, stages
 from vftcli.cli.options import Anyway, Bundle, TalkOptions, Typed, Wrench
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
@@ -59,7 +60,6 @@ class LogOptions(Bundle):
         **others: Any,  # noqa: ANN401 - choices
     ) -> "AnalysisChoice":
         """What is asked of such a log, its health said, with other choices."""
-        from vftcli.cli.console import health_of
         from vftcli.pipeline import AnalysisChoice
 
         return AnalysisChoice(
@@ -112,8 +112,6 @@ class AnalysisOptions(Bundle):
         **observers: Any,  # noqa: ANN401 - words in place of those that are typed
     ) -> "AnalysisChoice":
         """The choice that the options state, a reference's with it where there is one."""
-        from vftcli.cli.console import stages
-
         give_back()
         compared = reference is not None and reference.words["reference"]
         return self.log.asked(

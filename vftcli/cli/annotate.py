@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.console import command_line, detail, say, stages
 from vftcli.cli.progress import echo_data
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
@@ -68,7 +69,6 @@ def annotate_dataset(
     """
     from vftcli.batch.annotated_copy import annotate
     from vftcli.batch.annotation import USUAL, ForceChoice
-    from vftcli.cli.console import command_line, detail, say, stages
     from vftcli.outputs.run_record import to_json
 
     added = added_columns(add)

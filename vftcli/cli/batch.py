@@ -10,6 +10,8 @@ import typer
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
+from vftcli.cli.console import command_line, say
+from vftcli.cli.progress import STAGES, clock, is_watched
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import Option, names_at
 
@@ -53,8 +55,6 @@ def batch(
     """
     from vftcli.batch.log_work import LogJob, for_comparison, for_estimates
     from vftcli.batch.run import BatchRun
-    from vftcli.cli.console import command_line, say
-    from vftcli.cli.progress import STAGES
     from vftcli.doctor.examination import Examiner
     from vftcli.outputs.batch_folder import BatchFolder
     from vftcli.readers.library import Library, LogCollection, absolute
@@ -111,8 +111,6 @@ MOST_TOLD = 10  #: Failures that are printed.
 
 def say_passed(names: list[str]) -> None:
     """Say which files of the folders are no logs."""
-    from vftcli.cli.console import say
-
     if not names:
         return
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
@@ -123,9 +121,6 @@ def say_passed(names: list[str]) -> None:
 def progress_line() -> "Callable[[BatchCount], None]":
     """Who shows how far the batch is: a line that changes on a terminal, else one now and then."""
     import time
-
-    from vftcli.cli.console import say
-    from vftcli.cli.progress import STAGES, clock, is_watched
 
     watched, last = is_watched(), time.monotonic()
 

@@ -89,39 +89,32 @@ def with_command(words: list[str]) -> list[str]:
     return [DEFAULT, *words] if is_log or first.startswith("-") else words
 
 
-class Renewed(NamedTuple):
-    """Words of a call with today's in place of former ones."""
-
-    words: list[str]  #: The words.
-    notes: list[str]  #: What each former one is now.
-
-
-def renewed(words: list[str], options: Container[str]) -> Renewed:
-    """Options of the release before by what they are now; one that the command has stays.
+def renewed(words: list[str], options: Container[str]) -> tuple[list[str], list[str]]:
+    """The words with today's options for former ones, and what each former one is now.
 
     Raises:
         ParameterError: If one is gone, or lacks its value.
     """
-    found, arguments, rest = Renewed([], []), [], iter(words)
+    found, notes, arguments, rest = list[str](), list[str](), list[str](), iter(words)
     for word in rest:
         name, equals, value = word.partition("=")
         if word == "--":
-            found.words.extend([word, *rest])
+            found.extend([word, *rest])
         elif name in options or (now := now_of(name, value)) is None:
-            found.words.append(word)
+            found.append(word)
         else:
             if "VALUE" in now and not equals:
                 if (value := next(rest, "")) == "":
                     raise ParameterError(f"{name} is now {now.replace('VALUE', '…')}; give a value")
                 now = now_of(name, value) or now
-            found.notes.append(f"{name} is now {now.replace('VALUE', '…')}")
+            notes.append(f"{name} is now {now.replace('VALUE', '…')}")
             if name == "--robot-arg":
                 arguments.append(value.replace("=", ":=", 1))
             else:
-                found.words.extend(each.replace("VALUE", value) for each in now.split())
+                found.extend(each.replace("VALUE", value) for each in now.split())
     if arguments:
-        add_arguments(found.words, arguments)
-    return found
+        add_arguments(found, arguments)
+    return found, notes
 
 
 def now_of(name: str, value: str) -> str | None:

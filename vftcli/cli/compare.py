@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
+from vftcli.cli.console import LeftOut, say, say_analysis, say_json
 from vftcli.cli.progress import echo, echo_data
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import OUTPUT, WRITE, Option
@@ -65,7 +66,6 @@ class DrawnErrors(opt.Bundle):
     def write(self, errors: "pl.DataFrame") -> None:
         """Draw the errors, if that is asked for, and say where."""
         if (figures := self.folder()) is not None:
-            from vftcli.cli.console import say
             from vftcli.outputs.figures import error_figures
             from vftcli.outputs.paper import write_figures
 
@@ -90,7 +90,6 @@ def compare(
 
     from vftcli.answering import errors_of
     from vftcli.batch.log_work import for_comparison
-    from vftcli.cli.console import LeftOut, say_analysis, say_json
     from vftcli.evaluation import paired_significance
     from vftcli.outputs import error_tables as tables
     from vftcli.outputs.grids import pairs_text

@@ -33,6 +33,7 @@ OTHERWISE = {
     "convert": {"log.derive"},  # it writes what was logged
 }
 LARGEST = 1 << 20  #: Bytes that such a file has at most.
+Table = dict[str, Any]  #: A table of TOML.
 FILE = "file:"  #: What a reference's file begins with.
 
 
@@ -46,37 +47,20 @@ class Taken(NamedTuple):
 
 NOTHING = Taken()  #: What a command took that read no file.
 
-_words: ContextVar[Sequence[str]] = ContextVar("words", default=())
-_taken: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
-
-
-def taken() -> Taken:
-    """What this command took from a file."""
-    return _taken.get()
-
-
-def begin(words: Sequence[str]) -> None:
-    """Begin a call of these words."""
-    _words.set(words)
-
-
-def typed() -> list[str]:
-    """The words of this call, former ones by what they are now."""
-    return list(_words.get())
-
-
-def forget() -> None:
-    """Begin a command: nothing is taken yet."""
-    _taken.set(NOTHING)
+#: The words of this call, former ones by what they are now.
+WORDS: ContextVar[Sequence[str]] = ContextVar("words", default=())
+#: What this command took from a file.
+TAKEN: ContextVar[Taken] = ContextVar("taken", default=NOTHING)
 
 
 def effective(words: list[str]) -> list[str]:
     """The words of a command line that does the same without a file of options."""
-    if not taken().words:
+    kept = TAKEN.get().words
+    if not kept:
         return words
     # What stands behind -- are logs.
     end = words.index("--") if "--" in words else len(words)
-    return [*words[:end], *taken().words, "--config", NONE, *words[end:]]
+    return [*words[:end], *kept, "--config", NONE, *words[end:]]
 
 
 def config_option() -> TyperOption:
@@ -118,7 +102,7 @@ def take(ctx: Any, _param: Any, named: str | None) -> None:  # noqa: ANN401
         for key, value in keys.items()
         if "." in key and any(kind.takes(key) for kind in choices)
     }
-    _taken.set(Taken(path, settings=settings))
+    TAKEN.set(Taken(path, settings=settings))
 
 
 def settle(ctx: Any) -> None:  # noqa: ANN401
@@ -126,7 +110,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
 
     What cannot be meant for its logs is left away.
     """
-    path = taken().path
+    path = TAKEN.get().path
     if path is None:
         return
     arguments = [p for p in ctx.command.params if p.param_type_name == "argument"]
@@ -134,7 +118,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
     each_log = (log for one in given for log in (one if isinstance(one, tuple) else (one,)))
     logs = [Path(log) for log in each_log if log is not None]
     typed = [word.partition("=")[0].strip() for word in ctx.params.get("set") or ()]
-    settings = {name: text for name, text in taken().settings.items() if name not in typed}
+    settings = {name: text for name, text in TAKEN.get().settings.items() if name not in typed}
     words = [word for name, text in settings.items() for word in ("--set", f"{name}={text}")]
     for param in ctx.command.params:
         source = ctx.get_parameter_source(param.name)
@@ -145,7 +129,7 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
             ctx.params[param.name] = value
         each = value if isinstance(value, list) else [value]
         words += [word for one in each if one is not None for word in as_typed(key, one)]
-    _taken.set(Taken(path, tuple(words), settings))
+    TAKEN.set(Taken(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
 
@@ -172,7 +156,7 @@ def as_typed(key: str, value: str | bool) -> tuple[str, ...]:
     return (f"--{key}={value}",) if value.startswith("-") else (f"--{key}", value)
 
 
-def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
+def keys_for(command: Any, path: Path) -> Table:  # noqa: ANN401
     """What a file holds for a command: what is on top, then what is in the command's table.
 
     Settings have their dotted names, and their values are texts.
@@ -199,15 +183,15 @@ def keys_for(command: Any, path: Path) -> dict[str, Any]:  # noqa: ANN401
 
 def flattened(
     path: Path,
-    table: Mapping[str, Any],
+    table: Table,
     choices: Iterable[type[Choice]],
     known: Container[str],
-) -> dict[str, Any]:
+) -> Table:
     """A table with the settings of each group in it by their dotted names, as texts.
 
     A former key is read as what it is now.
     """
-    found: dict[str, Any] = {}
+    found: Table = {}
     now = [
         {key: value} if key in known or isinstance(value, dict) else key_now(path, key, value)
         for key, value in table.items()
@@ -229,7 +213,7 @@ def flattened(
     return found
 
 
-def key_now(path: Path, key: str, value: Any) -> dict[str, Any]:  # noqa: ANN401 - of TOML
+def key_now(path: Path, key: str, value: Any) -> Table:  # noqa: ANN401 - of TOML
     """A former key as the option or setting that it is now, with a note; any other as it is."""
     text = next(words_in(value), "")
     now = None if key in TYPED or isinstance(value, list) else now_of(f"--{key}", text)
@@ -245,9 +229,7 @@ def key_now(path: Path, key: str, value: Any) -> dict[str, Any]:  # noqa: ANN401
     return {option: taken.replace("VALUE", text) if taken else value}
 
 
-def check_keys(
-    path: Path, whose: str, table: Mapping[str, Any], there: Mapping[str, object]
-) -> None:
+def check_keys(path: Path, whose: str, table: Table, there: Mapping[str, object]) -> None:
     """Check that every key of a table is an option."""
     for key in table:
         if "." in key:
@@ -259,7 +241,7 @@ def check_keys(
             raise ParameterError(f"{path}: {shown(key)} is no option {whose}.{near}")
 
 
-def tables_of(path: Path) -> dict[str, Any]:
+def tables_of(path: Path) -> Table:
     """What a file holds."""
     if not (path.is_file() or path.is_fifo()):
         raise ParameterError(

@@ -7,6 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.console import LeftOut, canvas, command_line, say_analysis, say_json, stages
 from vftcli.cli.progress import echo, echo_data
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Option
@@ -45,7 +46,6 @@ def list_contacts(
     if form.json and form.csv:
         raise typer.BadParameter("choose one of --json, --csv")
 
-    from vftcli.cli.console import LeftOut, say_analysis, stages
     from vftcli.pipeline import analyse_logs, list_touches
     from vftcli.readers.library import Library
     from vftcli.readers.references import stored_observers
@@ -73,7 +73,6 @@ def list_contacts(
 
 def print_stored(estimates: Path, form: ListOptions) -> None:
     """Print the list that the folder of an ``estimates.parquet`` holds."""
-    from vftcli.cli.console import canvas, say_json
     from vftcli.outputs.contacts import contacts_csv, stored_list, stored_record
     from vftcli.outputs.screen import list_screen
 
@@ -90,7 +89,6 @@ def print_lists(
     found: "list[Analysis]", form: ListOptions, failed: "Mapping[str, str]", *, every: bool
 ) -> None:
     """Print the lists in the form that is asked for."""
-    from vftcli.cli.console import canvas, command_line
     from vftcli.outputs.contacts import contacts_csv
     from vftcli.outputs.report import contacts_envelope
     from vftcli.outputs.run_record import to_json

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.console import command_line, say, say_json, say_left_out, steps_of
 from vftcli.cli.progress import echo
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.option import Option, names_at
@@ -27,7 +28,6 @@ def convert_log(
 
     Example: vftcli convert fixtures/ur5_circle.csv -o ur5_circle.mcap
     """
-    from vftcli.cli.console import say, say_json, say_left_out
     from vftcli.doctor import examine
     from vftcli.outputs.conversion import check_conversion, convert
     from vftcli.outputs.examination import health_line
@@ -91,7 +91,6 @@ def simulate_log(
 
     Example: vftcli simulate ur5-circle -o log.csv --seed 2
     """
-    from vftcli.cli.console import command_line, say, say_json, say_left_out, steps_of
     from vftcli.outputs.conversion import free_path, log_folder, save
     from vftcli.robots import load_robot
     from vftcli.signals.packages import check_installed

@@ -16,7 +16,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from vftcli.cli import options as opt
 from vftcli.cli.commands import COMMANDS, former, renewed, with_command
-from vftcli.cli.config import begin, config_option, forget, is_configured, settle
+from vftcli.cli.config import NOTHING, TAKEN, WORDS, config_option, is_configured, settle
 from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
@@ -39,7 +39,7 @@ class GroupedCommand(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words; of an option that there is not, name the nearest if it is near."""
-        forget()
+        TAKEN.set(NOTHING)
         try:
             rest = super().parse_args(ctx, args)
         except Exception as error:
@@ -57,16 +57,42 @@ class GroupedCommand(TyperCommand):
         return own or Option("", "", "", group=OUTPUT)
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """Write the help."""
-        formatter.write(command_help(ctx))
+        """Write how it is called, what it does, its options by group."""
+        width = columns()
+        usage = ["Usage:", ctx.command_path, *self.collect_usage_pieces(ctx)]
+        lines = [" ".join(usage), ""]
+        for paragraph in (self.help or "").split("\n\n"):
+            lines += textwrap.wrap(" ".join(paragraph.split()), width)
+        found: dict[str, list[tuple[str, str]]] = {}
+        for param in self.get_params(ctx):
+            if (record := row_of(param, ctx)) is not None:
+                is_log = param.param_type_name == "argument"
+                group = LOG if is_log else self.option(param).group or OWN
+                found.setdefault(group, []).append(record)
+        others = [group for group in found if group not in GROUPS]
+        for group in (LOG, *others, *GROUPS[1:]):
+            if group in found:
+                lines += [f"{group}:", *two_columns(found[group], width)]
+        formatter.write("\n".join(lines) + "\n")
 
 
 class JourneyGroup(TyperGroup):
     """The program: its `--help` lists the commands by what one sets out to do."""
 
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
-        """Write the list of commands."""
-        formatter.write(program_help(self, ctx))
+        """Write the commands by what one sets out to do, then the program's options."""
+        width, usage = columns(), "Usage: vftcli [COMMAND] LOG… [OPTIONS]"
+        lines = [usage, "", *textwrap.wrap(self.help or "", width)]
+        left = max(map(len, self.commands))
+        for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
+            lines += ["", journey]
+            for name, command in COMMANDS.items():
+                if command.journey == journey:
+                    text = f"  {name:<{left}}  {command.summary}"
+                    lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
+        shown = (p for p in self.get_params(ctx) if p.name != "show_completion")
+        rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
+        formatter.write("\n".join([*lines, "", *two_columns(rows, width)]) + "\n")
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words: without a command of the default one, former words by today's."""
@@ -78,7 +104,7 @@ class JourneyGroup(TyperGroup):
                 notes.insert(0, f"{args[0]} is now {former()['commands'][args[0]]}")
             for note in notes:
                 echo(printable(f"note: {note}"), err=True)
-        begin(words)
+        WORDS.set(words)
         return super().parse_args(ctx, words)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
@@ -93,33 +119,6 @@ class JourneyGroup(TyperGroup):
 def columns() -> int:
     """Width of a help text."""
     return min(max(shutil.get_terminal_size().columns, NARROWEST), WIDEST)
-
-
-def command_help(ctx: typer.Context) -> str:
-    """The help of a command: how it is called, what it does, its options by group."""
-    command, width = ctx.command, columns()
-    lines = [" ".join(["Usage:", ctx.command_path, *command.collect_usage_pieces(ctx)]), ""]
-    for paragraph in (command.help or "").split("\n\n"):
-        lines += textwrap.wrap(" ".join(paragraph.split()), width)
-    for group, rows in grouped(ctx):
-        lines += [f"{group}:", *two_columns(rows, width)]
-    return "\n".join(lines) + "\n"
-
-
-def grouped(ctx: typer.Context) -> Iterator[tuple[str, list[tuple[str, str]]]]:
-    """The options of each heading that has any, as they are typed and what they mean."""
-    command: Any = ctx.command
-    found: dict[str, list[tuple[str, str]]] = {}
-    for param in command.get_params(ctx):
-        option = command.option(param)
-        if (record := row_of(param, ctx)) is None:
-            continue
-        group = LOG if param.param_type_name == "argument" else option.group or OWN
-        found.setdefault(group, []).append(record)
-    others = [group for group in found if group not in GROUPS]
-    for group in (LOG, *others, *GROUPS[1:]):
-        if group in found:
-            yield group, found[group]
 
 
 def row_of(param: Any, ctx: typer.Context) -> tuple[str, str] | None:  # noqa: ANN401
@@ -140,22 +139,6 @@ def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
         else:
             yield f"  {typed:<{left}}  {lines.pop(0)}".rstrip()
         yield from (f"{'':{left + 4}}{line}" for line in lines)
-
-
-def program_help(group: TyperGroup, ctx: typer.Context) -> str:
-    """The commands by what one sets out to do, one line each; then the program's options."""
-    width = columns()
-    lines = ["Usage: vftcli [COMMAND] LOG… [OPTIONS]", "", *textwrap.wrap(group.help or "", width)]
-    left = max(map(len, group.commands))
-    for journey in dict.fromkeys(command.journey for command in COMMANDS.values()):
-        lines += ["", journey]
-        for name, command in COMMANDS.items():
-            if command.journey == journey:
-                text = f"  {name:<{left}}  {command.summary}"
-                lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
-    shown = (p for p in group.get_params(ctx) if p.name != "show_completion")
-    rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
-    return "\n".join([*lines, "", *two_columns(rows, width)]) + "\n"
 
 
 TOPICS = Path(__file__).parent / "topics.toml"  #: Topic → its summary and its text.

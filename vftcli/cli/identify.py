@@ -7,6 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.console import (
+    command_line,
+    detail,
+    health_of,
+    open_made,
+    say,
+    say_json,
+    say_recording,
+    say_robots,
+)
 from vftcli.cli.progress import echo, echo_data
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
@@ -80,15 +90,6 @@ def identify_robot(
     Example: vftcli identify free.csv --robot ur5 --method friction -o my_robot.toml
     """
     from vftcli.answering import identified
-    from vftcli.cli.console import (
-        command_line,
-        detail,
-        health_of,
-        open_made,
-        say,
-        say_recording,
-        say_robots,
-    )
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.identification import (
         beside,
@@ -140,7 +141,6 @@ def find_gains(
 ) -> None:
     """Write the gains that a goal asks for: the log's spectra show what error every gain makes."""
     from vftcli.answering import TUNED, gains_of
-    from vftcli.cli.console import command_line, detail, say, say_json, say_recording
     from vftcli.outputs.examination import health_record, overridden_lines
     from vftcli.outputs.figures import write_tuned
     from vftcli.outputs.files import check_file

@@ -10,6 +10,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.config import NAME
+from vftcli.cli.console import say, say_json, say_robots
 from vftcli.cli.progress import echo
 from vftcli.signals.option import Option
 
@@ -37,7 +38,6 @@ def inspect_log(
 
     Example: vftcli inspect fixtures/ur5_circle.csv
     """
-    from vftcli.cli.console import say_json, say_robots
     from vftcli.doctor import Examiner, examine
     from vftcli.outputs.examination import examination_record, examination_text
     from vftcli.outputs.files import check_file
@@ -72,7 +72,6 @@ def write_options(
     output: Path, logs: Sequence[Path], logged: LogOptions, *, force: bool
 ) -> dict[str, Any]:
     """Write the options that logs call for, and give them for machines."""
-    from vftcli.cli.console import say
     from vftcli.outputs.files import write_text
     from vftcli.proposal import config_text, propose
     from vftcli.readers.library import Library

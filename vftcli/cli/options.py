@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, NamedTuple, TypeVar, 
 
 import typer
 
+from vftcli.cli.config import TAKEN
+from vftcli.cli.console import speaking
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.option import (
     ESTIMATE,
@@ -190,15 +192,13 @@ def command(function: Callable[..., None]) -> Callable[..., None]:
         )
 
     def called(**values: Any) -> None:  # noqa: ANN401
-        from vftcli.cli.config import taken
-        from vftcli.cli.console import speaking
         from vftcli.outputs.files import protected
 
-        kept = taken().path
+        kept = TAKEN.get()
         if part.choices:
             typed = settings_of(values.get("set") or (), part.choices)
-            values["settings"] = {**taken().settings, **typed}
-        inputs = [*inputs_of(values), *([kept] if kept is not None else [])]
+            values["settings"] = {**kept.settings, **typed}
+        inputs = [*inputs_of(values), *([kept.path] if kept.path is not None else [])]
         # How much it says: what its -v and -q ask, as usual where it has none.
         asked = {name.rpartition("_")[2]: value for name, value in values.items()}
         loud = speaking(details=bool(asked.get("details")), quiet=bool(asked.get("quiet")))
@@ -262,11 +262,9 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
         return Part(part.parameters, lambda values: kind(**part.made(values)), part.choices)
     if (typed := get_origin(kind)) in {Typed, Needed}:
         (choice,) = get_args(kind)
-        fields = choice.options().items()
-        needed = typed is Needed
         found = {
-            word: typed_as(choice, *field, needed=needed)
-            for word, field in fields
+            word: (typed_as(choice, *field, needed=typed is Needed), EMPTY)
+            for word, field in choice.options().items()
             if not field[2].is_setting
         }
         part = members(f"{name}_", found, choice.GROUP)
@@ -302,15 +300,14 @@ def typed_as(
     option: Option,
     *,
     needed: bool,
-) -> tuple[Any, object]:
-    """What typer makes of a field's typed text, and where that is missing: the room knows."""
+) -> Any:  # noqa: ANN401
+    """What typer makes of a field's typed text; where that is missing the room knows."""
     among, default = (kind, *get_args(kind)), getattr(choice, field, EMPTY)
     one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
     what: Any = list[one] if option.several else one if option.metavar else bool  # type: ignore[valid-type]
     if not (needed and default is EMPTY) and option.metavar:
         what = what | None
-    plain = option._replace(reads=None)
-    return Annotated[what, plain], EMPTY
+    return Annotated[what, option._replace(reads=None)]
 
 
 def inputs_of(values: Mapping[str, Any]) -> Iterator[Path]:

@@ -8,6 +8,7 @@ import sys
 import textwrap
 import threading
 import time
+from functools import partial
 from typing import TextIO
 
 import typer
@@ -39,7 +40,7 @@ class Stages:
         now = time.monotonic()
         if self._begun is None:
             self._begun = now
-            watch(self._see)
+            watch(partial(setattr, self, "_share"))
             atexit.register(self.end)
             self._wait(QUICK)
             self._from = (now, begin)
@@ -80,9 +81,6 @@ class Stages:
             self.clear()
             typer.echo(text.rstrip("\n"))
 
-    def _see(self, share: float) -> None:
-        self._share = share
-
     def _wait(self, seconds: float) -> None:
         # A thread of its own: what takes long may tell nothing meanwhile.
         timer = threading.Timer(seconds, self._tick)
@@ -97,19 +95,18 @@ class Stages:
     def _show(self) -> None:
         with self._lock:
             if self._stage:
-                line = self._line()
+                done = round(BAR * self._share)
+                bar = f"[{'#' * done}{rest() * (BAR - done)}] {100.0 * self._share:2.0f} %"
+                since, first = self._from
+                gained, left = self._share - first, ""
+                if gained > ENOUGH:
+                    seconds = (time.monotonic() - since) * (1.0 - self._share) / gained
+                    left = f"  {clock(seconds)} left"
+                most = min(WIDTH, shutil.get_terminal_size().columns - 1)
+                room = most - len(bar) - len(left) - 2
+                line = f"{bar}  {self._stage[: max(room, 0)]}{left}"
                 typer.echo(f"\r{line:<{self._shown}}", err=True, nl=False)
                 self._shown = len(line)
-
-    def _line(self) -> str:
-        done = round(BAR * self._share)
-        bar = f"[{'#' * done}{rest() * (BAR - done)}] {100.0 * self._share:2.0f} %"
-        since, first = self._from
-        gained, left = self._share - first, ""
-        if gained > ENOUGH:
-            left = f"  {clock((time.monotonic() - since) * (1.0 - self._share) / gained)} left"
-        room = min(WIDTH, shutil.get_terminal_size().columns - 1) - len(bar) - len(left) - 2
-        return f"{bar}  {self._stage[: max(room, 0)]}{left}"
 
 
 def rest() -> str:

@@ -7,6 +7,17 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions, ExtraOptions
+from vftcli.cli.console import (
+    LeftOut,
+    canvas,
+    command_line,
+    judge_by_jacobian,
+    open_made,
+    say,
+    say_analysis,
+    say_written,
+    show,
+)
 from vftcli.cli.progress import echo_data
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import WRITE, Choice, Option, setting
@@ -49,7 +60,6 @@ def report(
 
     Example: vftcli report fixtures/ur5_circle.csv --robot ur5
     """
-    from vftcli.cli.console import LeftOut, command_line, open_made, say_analysis, say_written
     from vftcli.evaluation.published import check_published, compare_with
     from vftcli.outputs.estimates import extra_files
     from vftcli.outputs.files import OutputFolder
@@ -105,7 +115,6 @@ def show_answers(
     analyses: "Sequence[Analysis]", failed: Mapping[str, str], *, details: bool
 ) -> None:
     """Print the screen; with details every table behind it too."""
-    from vftcli.cli.console import canvas, show
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.grids import print_text
     from vftcli.outputs.screen import FILE_LINES, MOST_LINES, log_screen, logs_screen
@@ -142,7 +151,6 @@ def estimate(
     Example: vftcli estimate fixtures/ur5_circle.csv --robot ur5
     """
     from vftcli.batch.log_work import for_estimates
-    from vftcli.cli.console import command_line, open_made, say_written
     from vftcli.outputs.estimates import estimate_files, write_estimate_folder
     from vftcli.outputs.files import OutputFolder
     from vftcli.pipeline import analyse, prepared
@@ -187,7 +195,6 @@ def estimate(
 
 def show_short(made: "Analysis") -> None:
     """Print the answer in short."""
-    from vftcli.cli.console import canvas, say_analysis, show
     from vftcli.outputs.screen import short_screen
 
     say_analysis(made)
@@ -204,7 +211,6 @@ def write_by_jacobian(
     json: bool,
 ) -> None:
     """Write what there is of a vendor's torques beside a Jacobian, where it is asked for."""
-    from vftcli.cli.console import command_line, judge_by_jacobian, say, show
     from vftcli.outputs.error_tables import to_terminal
     from vftcli.outputs.report import write_jacobian_folder
 

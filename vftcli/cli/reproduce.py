@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
+from vftcli.cli.console import command_line, say, say_json, show, stages
 from vftcli.cli.progress import echo, echo_data
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import Choice, Option, setting
@@ -33,7 +34,6 @@ def reproduce(
 
     Example: vftcli reproduce huang2025 --only table3
     """
-    from vftcli.cli.console import command_line, say, show, stages
     from vftcli.outputs.files import OutputFolder
     from vftcli.outputs.grid import terminal
     from vftcli.reproduction.experiments import (
@@ -88,7 +88,6 @@ def bench(
 
     Example: vftcli bench --set bench.rounds=3
     """
-    from vftcli.cli.console import say_json
     from vftcli.outputs import grid
     from vftcli.outputs.grids import bench_grid
     from vftcli.reproduction.timing import benchmark

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
+from vftcli.cli.console import say, say_json, say_recording, say_robots
 from vftcli.cli.progress import echo
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 from vftcli.signals.option import COMPARE, Option
@@ -40,7 +41,6 @@ def contact_thresholds(
     Example: vftcli thresholds free.csv --robot ur5 --rate 1 --check pushed.csv
     """
     from vftcli.answering import free_thresholds, modelled
-    from vftcli.cli.console import say, say_json, say_recording, say_robots
     from vftcli.contacts.threshold_check import check_contacts, compared_signals, left_out
     from vftcli.contacts.thresholds import check_alike
     from vftcli.outputs.examination import health_record

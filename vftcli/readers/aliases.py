@@ -12,6 +12,8 @@ from vftcli.readers.columns import SIGNALS, Item
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.table import (
     Cell,
+    Cells,
+    Names,
     Pick,
     Picks,
     Table,
@@ -80,9 +82,9 @@ RESIDUAL_TURNED = fact("residual-turned")  #: Said wherever libfranka's residual
 class Group(NamedTuple):
     """Columns of one name but for their index; `twice` is one that has the index of another."""
 
-    cells: tuple[Cell, ...]
+    cells: Cells
     indices: tuple[int, ...]
-    joints: tuple[str, ...] = ()
+    joints: Names = ()
     twice: str = ""
 
 
@@ -122,7 +124,7 @@ class NamedColumns:
             ordered = tuple(of_joint[name] for name in names)
             self.groups[stem] = Group(ordered, tuple(range(len(names))), names)
 
-    def cells(self, name: str) -> tuple[Cell, ...]:
+    def cells(self, name: str) -> Cells:
         """The cells of a group."""
         group, path = self.groups[name.lower()], self.table.path
         if group.twice:
@@ -201,7 +203,7 @@ class NamedColumns:
                 yield replace(fitting[0], remark=remark)
 
 
-def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, tuple[str, ...]]:
+def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
     """Find the signals of a headed table by the names of its columns, and the joints' names."""
     columns = NamedColumns(table)
     groups = columns.groups
@@ -343,9 +345,7 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
     return tuple(range(len(names)))
 
 
-def along_arm(
-    names: tuple[str, ...], signals: dict[str, Array]
-) -> tuple[tuple[str, ...], dict[str, Array]]:
+def along_arm(names: Names, signals: dict[str, Array]) -> tuple[Names, dict[str, Array]]:
     """Joints base to tip without a gripper's fingers: their names, and signals with a column each.
 
     Of an arm of six joints the wrench has as many columns, but they are no joints.
@@ -367,7 +367,7 @@ def effort_of(names: Sequence[str]) -> str:
     return "current" if is_ur else "torque"
 
 
-def laid_along(raw: RawLog, names: tuple[str, ...], request: ReadChoice) -> RawLog:
+def laid_along(raw: RawLog, names: Names, request: ReadChoice) -> RawLog:
     """A log of JointState messages with its joints base to tip, its effort by their names."""
     items = request.spec.items
     if any("|" in (item.pattern or "") for item in items):

@@ -23,7 +23,7 @@ from vftcli.readers.objects import columns_of, columns_of_lines, lines_of, load_
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpacked_limit
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Column, listed
+from vftcli.readers.table import Column, Columns, listed
 from vftcli.readers.tables import UR, ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
 from vftcli.signals.remarks import Remark, fact
@@ -138,7 +138,7 @@ def _read_arrays(
     return from_table(table, request)
 
 
-def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]:
+def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> Columns:
     arrays = {}
     for name, value in log.items():
         rows = value.shape[0] if isinstance(value, np.ndarray) and value.ndim else 0
@@ -155,7 +155,7 @@ def _arrays_of_lists(file: LogFile, log: Mapping[Any, Any]) -> dict[str, Column]
     return arrays
 
 
-def _npz_arrays(file: LogFile) -> dict[str, Column]:
+def _npz_arrays(file: LogFile) -> Columns:
     arrays = {}
     with naming_damage(file.path, "a damaged .npz file", NOT_A_BUNDLE):
         bundle = zipfile.ZipFile(BytesIO(file.content))
@@ -269,7 +269,7 @@ def _is_clock(name: str) -> bool:
     return name.rpartition(".")[2].lower() in CLOCKS
 
 
-def _matlab_73(file: LogFile) -> dict[str, Column]:
+def _matlab_73(file: LogFile) -> Columns:
     """The variables of numbers of a file of version 7.3, as MATLAB shows them."""
     with opened(file) as content:
         table = table_of(file.path, content, fewest_rows=1)
@@ -281,7 +281,7 @@ def _matlab_73(file: LogFile) -> dict[str, Column]:
         }
 
 
-def _matlab_5(file: LogFile) -> dict[str, Column]:
+def _matlab_5(file: LogFile) -> Columns:
     """The variables of numbers of a file of version 5, and those of its structs as struct.name."""
     _check_matlab(file)
     from scipy.io import loadmat, whosmat

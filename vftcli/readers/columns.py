@@ -97,7 +97,8 @@ class ColumnSpec:
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     """Parse a --columns text, of a log unless it is of a reference, which has no positions."""
-    if not (parts := _split(text)):
+    parts = [part.strip() for part in re.split(r",(?![^\[]*\])", text) if part.strip()]
+    if not parts:
         raise LogError("--columns is empty. Say which column is which, as in t,q:6,dq:6,current:6.")
     numbers = [part.removeprefix("segment=") for part in parts if part.startswith("segment=")]
     if numbers and (len(numbers) > 1 or not re.fullmatch(r"[0-9]+", numbers[0])):
@@ -124,11 +125,6 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     if log and items and "q" not in names and not named:
         raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
     return ColumnSpec(items=items, named=named, segment=segment)
-
-
-def _split(text: str) -> list[str]:
-    parts = re.split(r",(?![^\[]*\])", text)
-    return [part.strip() for part in parts if part.strip()]
 
 
 def _parse_item(part: str) -> Item:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile
-from vftcli.readers.table import Column, Table
+from vftcli.readers.table import Block, Column, Names, Table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -97,12 +97,12 @@ class TextTable(Table):
         """Whether a cell holds a number as this table writes them."""
         return is_number(cell, decimal_comma=self.decimal_comma)
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
         for found in self._parsed(self._kinds(columns, clock)):
             yield {c: _numbers(found[c], self.file.path) for c in columns}
 
-    def words(self, column: int) -> tuple[str, ...]:
+    def words(self, column: int) -> Names:
         """The different texts that a column holds, in the order in which they come."""
         parts = (found[column] for found in self._parsed({column: "String"}))
         each = (part.unique(maintain_order=True) for part in parts)
@@ -321,7 +321,7 @@ class EchoTable(TextTable):
         return count if count and values >= count and values % count == 0 else 0
 
 
-def joint_names(table: TextTable) -> tuple[str, ...]:
+def joint_names(table: TextTable) -> Names:
     """The joints' names that the rows hold, in the order of the columns."""
     each = enumerate(table.names)
     columns = [k for k, name in each if name.removeprefix("field.")[:4] == "name"]

@@ -29,7 +29,7 @@ from vftcli.readers.opening import (
 )
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Column, listed
+from vftcli.readers.table import Block, Names, listed
 from vftcli.readers.tables import ArrayTable, from_table, read_known_columns
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
@@ -110,7 +110,7 @@ class Hdf5Table(ArrayTable):
         below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
         return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
         return super().blocks(columns, clock)
@@ -195,7 +195,7 @@ class Layout(NamedTuple):
     anchor: str  #: Path of the positions, below the group of an episode.
     read: Callable[[Hdf5Table, ReadChoice], RawLog]  #: Reads one episode of an open file.
 
-    def groups(self, names: Sequence[str]) -> tuple[str, ...]:
+    def groups(self, names: Sequence[str]) -> Names:
         """The groups of its episodes, in their order; none where the file is laid out otherwise."""
         ends = [n.removesuffix(self.anchor) for n in names if n.endswith(self.anchor)]
         return tuple(sorted((e for e in ends if not e or e.endswith("/")), key=natural))

@@ -17,7 +17,7 @@ from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import LogFormat
-from vftcli.readers.table import listed
+from vftcli.readers.table import Names, listed
 from vftcli.readers.tables import read_known_columns
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import Remark, fact
@@ -91,7 +91,7 @@ def read_episode(
     """Read an episode of a dataset, of which meta/info.json says this."""
     path = data_file(file.path, episode)
     table = _rows_of(open_log(path), episode)
-    names: tuple[str, ...] = ()
+    names: Names = ()
     remarks: tuple[Remark, ...] = ()
     if request.spec.item("q"):
         usual, side = "t=timestamp,q=observation.state", ""
@@ -112,7 +112,7 @@ def read_episode(
 
 def _columns_of(
     path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
-) -> tuple[str, tuple[str, ...], str, tuple[Remark, ...]]:
+) -> tuple[str, Names, str, tuple[Remark, ...]]:
     """The --columns text, the joints' names or none, the arm of two or "", what is to be said."""
     there = [e for name in table.names for e in _elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
@@ -145,9 +145,7 @@ def _columns_of(
     return ",".join(["t=timestamp", *items]), names, side, remarks
 
 
-def _in_order(
-    path: Path, signal: str, elements: list[Element], names: tuple[str, ...]
-) -> list[Element]:
+def _in_order(path: Path, signal: str, elements: list[Element], names: Names) -> list[Element]:
     """A signal's elements in the order of the joints, as they stand where they have no names."""
     by_joint = {element.joint: element for element in elements}
     if not names or "" in by_joint:
@@ -306,7 +304,7 @@ def _rows_of(file: LogFile, episode: Episode) -> ParquetTable:
             f"{file.path}: the rows of episode {episode.number} are not those that the table of "
             "episodes tells; the dataset is damaged or was edited."
         )
-    table.keep(rows if len(rows) != len(numbers) else None)
+    table.rows = rows if len(rows) != len(numbers) else None
     return table
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers import reading
-from vftcli.readers.opening import LogFile, files_of, open_log
+from vftcli.readers.opening import files_of, open_log
 from vftcli.readers.reader import ReadChoice
 from vftcli.readers.reading import LogFormat
 from vftcli.readers.references import stored_observers
@@ -211,17 +211,11 @@ class LogCollection:
                 return False  # it describes something
             except LogError:
                 return True
-        if reader.general and not holds_numbers(open_log(path)):
-            return False  # prose reads as a table of one column
+        lines = open_log(path).lines if reader.general else ()
+        # A table of text has numbers in its second or third line; prose reads as one column.
+        if lines and all(len(NUMBER.findall(line)) < FEWEST for line in lines[1:3]):
+            return False
         return not stored_observers(path)
-
-
-def holds_numbers(file: LogFile) -> bool:
-    """Whether a file that may be a table is binary, or has numbers in its second or third line."""
-    if not file.lines:
-        return True
-    rows = [NUMBER.findall(line) for line in file.lines[1:3]]
-    return any(len(numbers) >= FEWEST for numbers in rows)
 
 
 def matching(place: Path) -> list[Path]:

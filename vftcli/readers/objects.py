@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile, reason_of
-from vftcli.readers.table import Column
+from vftcli.readers.table import Columns
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import printable
 from vftcli.signals.remarks import Remark, fact
@@ -50,9 +50,9 @@ def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
 
 def columns_of_lines(
     file: LogFile, lines: Iterable[tuple[int, bytes]]
-) -> tuple[dict[str, Column], tuple[Remark, ...]]:
+) -> tuple[Columns, tuple[Remark, ...]]:
     """The numbers of objects, one a line; a last one that is cut is left out and said."""
-    blocks: list[dict[str, Column]] = []
+    blocks: list[Columns] = []
     objects: Objects = []
     waiting: int | None = None
     first = number = 1
@@ -96,9 +96,9 @@ def _object_in(line: bytes) -> dict[str, Any] | None:
     return flat
 
 
-def columns_of(file: LogFile, objects: Objects, first: int) -> dict[str, Column]:
+def columns_of(file: LogFile, objects: Objects, first: int) -> Columns:
     """The numeric fields of some objects, a row an object."""
-    columns: dict[str, Column] = {}
+    columns: Columns = {}
     for name, value in objects[0].items():
         held = value if isinstance(value, list) and value else [value]
         if not all(isinstance(v, int | float) for v in held):

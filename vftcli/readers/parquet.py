@@ -19,7 +19,7 @@ import numpy as np
 
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
-from vftcli.readers.table import Column, Table
+from vftcli.readers.table import Block, Column, Table
 from vftcli.readers.tables import from_table
 from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
@@ -53,7 +53,7 @@ class ColumnarTable(Table):
 
     def __init__(self, file: LogFile) -> None:
         self.path: Path = file.path
-        self._rows: Indices | None = None
+        self.rows: Indices | None = None  #: The rows that are decoded, all for None.
         self._size = len(file.content)
         with guarded(self.path):
             schema, self._count = self._opened(file)
@@ -93,16 +93,16 @@ class ColumnarTable(Table):
                 found[k] = len(first or ())
             return found
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """Decode some columns."""
         self._check(columns)
         with guarded(self.path):
             start = 0
             for batch in self._batches(columns, BLOCK_ROWS):
                 each = {c: batch.column(self.names[c]) for c in columns}
-                if self._rows is not None:
-                    ends = np.searchsorted(self._rows, [start, start + batch.num_rows])
-                    own = self._rows[slice(*ends)] - start
+                if self.rows is not None:
+                    ends = np.searchsorted(self.rows, [start, start + batch.num_rows])
+                    own = self.rows[slice(*ends)] - start
                     each = {c: values.take(own) for c, values in each.items()}
                 start += batch.num_rows
                 yield {c: self._column(values, c, clock) for c, values in each.items()}
@@ -154,10 +154,6 @@ class ColumnarTable(Table):
         if numbers.ndim != 1 or not np.isfinite(numbers).all():
             raise LogError(f"{self.path}: {EPISODE} is not a number in every row.")
         return numbers
-
-    def keep(self, rows: Indices | None) -> None:
-        """Keep some rows only, all for None."""
-        self._rows = rows
 
 
 def plain(values: Arrow) -> Column:
@@ -292,7 +288,7 @@ def episodes(file: LogFile) -> Iterator[Episodes]:
     there = episodes_of(numbers)
 
     def read(number: int, request: ReadChoice) -> RawLog:
-        table.keep(np.flatnonzero(numbers == number) if len(there) > 1 else None)
+        table.rows = np.flatnonzero(numbers == number) if len(there) > 1 else None
         raw = from_table(table, request)
         names = raw.joint_names or tuple(str(name) for name in about.get("joint_names") or ())
         frame = raw.wrench_frame or WrenchFrame.of_conversion(about.get("wrench_frame"))

@@ -15,6 +15,7 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import (
     JACOBIAN,
     Cell,
+    Cells,
     JacobianError,
     Pick,
     Picks,
@@ -147,7 +148,7 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     )
 
 
-def _jacobian_cells(found: JacobianError) -> tuple[tuple[Cell, ...], int]:
+def _jacobian_cells(found: JacobianError) -> tuple[Cells, int]:
     names = found.table.names
     places = {
         (int(match[2]), int(match[3])): Cell(column)

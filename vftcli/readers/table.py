@@ -24,13 +24,16 @@ from vftcli.signals.wrench import WrenchFrame
 #: A cell of a Jacobian among the columns: row, then column.
 JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
 Column = NDArray[Any]  #: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
+Columns = dict[str, Column]  #: Name → column.
+Block = dict[int, Column]  #: Place in the table → column, or some rows of it.
+Names = tuple[str, ...]  #: Names of columns, fields or joints, in their order.
 
 
 class Table(ABC):
     """Columns of numbers that are loaded when they are asked for."""
 
     path: Path | str  #: What messages call the table: the file, and in a bag the topic.
-    names: tuple[str, ...]  #: Column names, none for a headerless table.
+    names: Names  #: Column names, none for a headerless table.
     width: int  #: Number of columns.
     remarks: tuple[Remark, ...] = ()  #: What loading dropped or mended.
 
@@ -40,10 +43,10 @@ class Table(ABC):
         return {}
 
     @abstractmethod
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """Columns as float64, some thousand rows at a time; the clock's may stay whole numbers."""
 
-    def load(self, columns: Sequence[int], clock: int | None = None) -> dict[int, Column]:
+    def load(self, columns: Sequence[int], clock: int | None = None) -> Block:
         """All rows of some columns."""
         first, *more = self.blocks(columns, clock)
         return (
@@ -61,12 +64,15 @@ class Cell(NamedTuple):
     turned: bool = False
 
 
+Cells = tuple[Cell, ...]  #: The cells of a signal.
+
+
 @dataclass(frozen=True, kw_only=True)
 class Pick:
     """The cells that make up one signal."""
 
     signal: str  #: Field of Recording, or "t".
-    cells: tuple[Cell, ...]  #: One cell a joint, base to tip.
+    cells: Cells  #: One cell a joint, base to tip.
     factor: float = 1.0  #: Factor to SI units and to our sign.
     unit: str | None = None  #: The unit if it was stated.
     frame: WrenchFrame | None = None  #: Frame of a wrench if it was stated.
@@ -133,14 +139,14 @@ def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     return [pick_of(item, tuple(islice(left, item.count or missing))) for item in items]
 
 
-def cells_of(table: Table, column: int, elements: slice = slice(None)) -> tuple[Cell, ...]:
+def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
     """The cell of a column, or of elements of its lists one each."""
     if column not in table.lists:
         return (Cell(column),)
     return tuple(Cell(column, k) for k in range(table.lists[column])[elements])
 
 
-def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
+def pick_of(item: Item, cells: Cells) -> Pick:
     """The cells of an item, with its factor to SI units."""
     wrench, turned = item.signal == "wrench", any(cell.turned for cell in cells)
     return Pick(
@@ -153,7 +159,7 @@ def pick_of(item: Item, cells: tuple[Cell, ...]) -> Pick:
     )
 
 
-def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
+def named_cells(table: Table, item: Item) -> Cells:
     """The cells that a pattern names, in the order of its indices."""
     pattern = item.pattern or ""
     names = table.names
@@ -180,7 +186,7 @@ def named_cells(table: Table, item: Item) -> tuple[Cell, ...]:
     return tuple(Cell(found[index]) for index in indices)
 
 
-def _exact(table: Table, item: Item, name: str) -> tuple[Cell, ...]:
+def _exact(table: Table, item: Item, name: str) -> Cells:
     """The cells of one column by its name, or of some elements of its lists: name[0:7], -name."""
     names = table.names
     if name not in names and name.startswith("-"):

@@ -23,7 +23,8 @@ from vftcli.readers.opening import LogFile
 from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
-    Cell,
+    Block,
+    Cells,
     Column,
     Pick,
     Picks,
@@ -74,7 +75,7 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
     spec, names = parse_columns(layout.columns), table.names
     items = []
     for item in spec.items if spec.named else ():
-        cells: tuple[Cell, ...] = ()
+        cells: Cells = ()
         with suppress(LogError):
             cells = named_cells(table, item)
         if item.signal == "t" and cells:
@@ -128,7 +129,7 @@ def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: Ra
 
 def _read_by_values(table: Table, request: ReadChoice, **more: RawField) -> RawLog:
     """Read a table without a header whose values settle what its columns are, and say it."""
-    columns: dict[int, Column] = {}
+    columns: Block = {}
     if 1 < table.width <= WIDEST and not table.lists:
         with suppress(LogError):  # what is no number somewhere is no clue
             columns = table.load(range(table.width), clock=0)
@@ -167,7 +168,7 @@ class ArrayTable(Table):
         arrays = enumerate(self.columns.values())
         return {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[dict[int, Column]]:
+    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """All rows of some columns; whole stamps stay whole."""
         each = list(self.columns.items())
         if len({len(each[c][1]) for c in columns}) > 1:
@@ -272,7 +273,7 @@ def load_signals(
     )
 
 
-def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
+def _stacked(pick: Pick, loaded: Block) -> Array:
     """One signal's cells side by side, scaled. (T, n)"""
     rows = len(loaded[pick.cells[0].column])
     out = np.empty((rows, len(pick.cells)))
@@ -288,7 +289,7 @@ def _stacked(pick: Pick, loaded: Mapping[int, Column]) -> Array:
 
 
 def _stamps(
-    table: Table, picks: Picks, loaded: Mapping[int, Column], rows: int, clock_name: str
+    table: Table, picks: Picks, loaded: Block, rows: int, clock_name: str
 ) -> tuple[Column, float, str]:
     """The stamps of the rows (T,), the length of their tick and which clock they are."""
     clock = picks.clock

@@ -1,6 +1,6 @@
 """Datasets: episodes of LeRobot, DROID and other HDF5, written back with forces in them."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +22,9 @@ class ForceColumn(NamedTuple):
     def width(self) -> int:
         """Numbers a frame."""
         return max(1, len(self.elements))
+
+
+ForceColumns = Sequence[ForceColumn]  #: The columns that are added.
 
 
 class DataFile(NamedTuple):

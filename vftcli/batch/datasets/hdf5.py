@@ -2,10 +2,10 @@
 
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from vftcli.batch.datasets import DataFile, ForceColumn, Forces, OfEpisodes
+from vftcli.batch.datasets import DataFile, ForceColumns, Forces, OfEpisodes
 from vftcli.readers.hdf5 import episode_places
 from vftcli.readers.opening import open_log
 from vftcli.readers.reading import FORMATS
@@ -50,7 +50,7 @@ class Hdf5Dataset:
             there = content[group or "/"].values()
             return next(int(each.shape[0]) for each in there if isinstance(each, h5py.Dataset))
 
-    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+    def check_new(self, file: DataFile, columns: ForceColumns) -> None:
         """Refuse a file that has such data sets already."""
         import h5py
 
@@ -60,9 +60,7 @@ class Hdf5Dataset:
                 if name in content:
                     raise LogError(f"{path}: has {name} already; annotate the original dataset")
 
-    def write(
-        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
-    ) -> None:
+    def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
         """Copy a file and add the data sets to the copy; the original is never opened to write."""
         import h5py
 
@@ -84,5 +82,5 @@ class Hdf5Dataset:
                     if column.elements:
                         data.attrs["names"] = list(column.elements)
 
-    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
+    def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
         """Nothing: the files describe themselves."""

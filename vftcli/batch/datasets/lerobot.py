@@ -12,7 +12,7 @@ import numpy as np
 
 from vftcli.batch.datasets import (
     DataFile,
-    ForceColumn,
+    ForceColumns,
     Forces,
     OfEpisodes,
     Single,
@@ -60,7 +60,7 @@ class LeRobotDataset:
         rows = source.metadata.num_rows if numbers is None else np.sum(numbers == number)
         return int(rows)
 
-    def check_new(self, file: DataFile, columns: Sequence[ForceColumn]) -> None:
+    def check_new(self, file: DataFile, columns: ForceColumns) -> None:
         """Refuse a file that has such columns already."""
         pq = needed("pyarrow.parquet", DATASET)
 
@@ -74,9 +74,7 @@ class LeRobotDataset:
                     f"{path}: has {PREFIX}{column.name} already; annotate the original dataset"
                 )
 
-    def write(
-        self, file: DataFile, columns: Sequence[ForceColumn], forces: Forces, target: Path
-    ) -> None:
+    def write(self, file: DataFile, columns: ForceColumns, forces: Forces, target: Path) -> None:
         """Write a data file with the columns behind its own; row groups stay as they are."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
@@ -98,7 +96,7 @@ class LeRobotDataset:
                 arrays = [*table.columns, *(as_column(each[rows]) for each in whole)]
                 writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
 
-    def finish(self, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path) -> None:
+    def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
         """Write info.json with the new features, and their statistics wherever others are."""
         info = info_of(self.folder)
         third = str(info.get("codebase_version", "")).startswith("v3")
@@ -124,7 +122,7 @@ class LeRobotDataset:
                     raise LogError(f"{path}: holds no statistics; mend or remove it") from None
 
     def _finish_episodes(
-        self, path: Path, columns: Sequence[ForceColumn], statistics: OfEpisodes, copy: Path
+        self, path: Path, columns: ForceColumns, statistics: OfEpisodes, copy: Path
     ) -> None:
         """Write a table of episodes with the statistics of the columns, where it has those."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
@@ -145,9 +143,7 @@ class LeRobotDataset:
         pq.write_table(table, target, compression=codec_of(source))
 
 
-def finish_stats(
-    text: str, columns: Sequence[ForceColumn], statistics: OfEpisodes, target: Path
-) -> None:
+def finish_stats(text: str, columns: ForceColumns, statistics: OfEpisodes, target: Path) -> None:
     """Write stats.json, of the whole dataset."""
     stats = json.loads(text)
     known = next(iter(stats.values()), KEYS)  # older ones have no quantiles
@@ -157,9 +153,7 @@ def finish_stats(
     write_json(target, stats)
 
 
-def finish_lines(
-    text: str, columns: Sequence[ForceColumn], statistics: OfEpisodes, target: Path
-) -> None:
+def finish_lines(text: str, columns: ForceColumns, statistics: OfEpisodes, target: Path) -> None:
     """Write episodes_stats.jsonl, the statistics of version 2.1."""
     lines = []
     for line in filter(str.strip, text.splitlines()):
@@ -216,7 +210,7 @@ def whole_columns(
     path: Path,
     numbers: Any,  # noqa: ANN401 - one a row, or None
     rows: int,
-    columns: Sequence[ForceColumn],
+    columns: ForceColumns,
     forces: Forces,
 ) -> list[Any]:
     """Every column over all rows of a file, whichever episode each row is of. (rows, k) each"""
@@ -246,9 +240,7 @@ def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
     return features
 
 
-def with_features(
-    metadata: Mapping[bytes, bytes], columns: Sequence[ForceColumn]
-) -> dict[bytes, bytes]:
+def with_features(metadata: Mapping[bytes, bytes], columns: ForceColumns) -> dict[bytes, bytes]:
     """A schema's metadata with the columns among the features that the `datasets` library reads."""
     told = dict(metadata)
     try:

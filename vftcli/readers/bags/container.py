@@ -1,6 +1,6 @@
 """Containers of messages: their files on disk, and the channels and batches that each yields."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
@@ -18,8 +18,7 @@ Bytes = NDArray[np.uint8]
 Integers = NDArray[np.int64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Channel:
+class Channel(NamedTuple):
     """One topic of one container."""
 
     topic: str  #: Its name.
@@ -41,12 +40,13 @@ class Batch(NamedTuple):
 
 #: The channel of a message, None where the file does not say; its time [ns]; its bytes.
 Message = tuple[Channel | None, int, bytes]
+Messages = Iterator[Message]
 
 BATCH_BYTES = 16 * 1024 * 1024
 MESSAGE_COST = 128  #: Memory that a message takes beside its bytes. [B]
 
 
-def batched(messages: Iterable[Message], budget: "ReadBudget") -> Iterator[Batch]:
+def batched(messages: Messages, budget: "ReadBudget") -> Iterator[Batch]:
     """Messages by channel, some megabytes at a time, channels in the order of their first ones."""
     found: dict[int, tuple[Channel, list[int], list[bytes]]] = {}
     held = 0

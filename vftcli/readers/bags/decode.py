@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vftcli.readers.aliases import along_arm
 from vftcli.readers.bags.container import Batch, Bytes, Channel, Integers, ReadBudget, strided
 from vftcli.readers.bags.ros_messages import SIZES, Field, LayoutError, Types, types_for
-from vftcli.readers.table import Column, JoinedRows
+from vftcli.readers.table import Column, Columns, JoinedRows, Names
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
 
@@ -49,7 +49,7 @@ class MessageLayout:
 
     def __init__(self, types: Types, message: Bytes, kind: str, *, cdr: bool) -> None:
         self.leaves: dict[str, Leaf] = {}
-        self.texts: dict[str, tuple[str, ...]] = {}
+        self.texts: dict[str, Names] = {}
         self.fixed: list[tuple[int, int]] = []
         self.uses = 0
         self._types, self._message, self._cdr = types, message, cdr
@@ -154,7 +154,7 @@ class MessageLayout:
         return raw.removesuffix(b"\0").decode("utf-8", "replace")
 
 
-def _paths_by_name(text: str) -> dict[str, tuple[str, ...]]:
+def _paths_by_name(text: str) -> dict[str, Names]:
     """Name → paths, of words as "q=position|q": two paths are two releases' names of one field."""
     words = (word.split("=") for word in text.split())
     return {name: tuple(paths.split("|")) for name, paths in words}
@@ -165,11 +165,11 @@ class Kind(NamedTuple):
 
     #: Signal → dotted paths to try in turn; a path of six numbers means force and torque below it.
     #: `effort` is decided later, by the joints' names.
-    signals: Mapping[str, tuple[str, ...]]
+    signals: Mapping[str, Names]
     names: str = ""  #: Path of the joints' names.
     frame: str = ""  #: Path of the frame's name.
     #: Name → paths to try of the load's numbers, of which the last value counts.
-    constants: Mapping[str, tuple[str, ...]] = {}
+    constants: Mapping[str, Names] = {}
     #: Whether it is Franka's: it leads, its residual is turned, its wrench's frame is known.
     franka: bool = False
 
@@ -214,7 +214,7 @@ class Stream:
 
     channel: Channel  #: The topic.
     kind: Kind  #: What its type means.
-    names: tuple[str, ...]  #: The joints' names, base to tip, or empty.
+    names: Names  #: The joints' names, base to tip, or empty.
     mixed: bool  #: Whether the messages had them in another order, or other joints among them.
     frame: str  #: Frame of its stamps' headers, or nothing.
     receive: Integers  #: When each was recorded. (T,) [ns]
@@ -231,7 +231,7 @@ class Stream:
 
 
 #: What tells streams of a topic apart: the joints' names, the frame, the signals.
-_Key = tuple[tuple[str, ...], str, tuple[str, ...]]
+_Key = tuple[Names, str, Names]
 
 
 @dataclass
@@ -241,7 +241,7 @@ class _Topic:
     types: Types
     layouts: dict[int, list[MessageLayout]] = field(default_factory=dict)
     #: Times and signals by name, and `place` in the topic, of each layout of the batch at hand.
-    parts: dict[_Key, list[dict[str, Column]]] = field(default_factory=dict)
+    parts: dict[_Key, list[Columns]] = field(default_factory=dict)
     #: The times and signals of all batches.
     series: dict[_Key, dict[str, JoinedRows]] = field(default_factory=dict)
     mixed: set[_Key] = field(default_factory=set)
@@ -354,7 +354,7 @@ def _layout_of(batch: Batch, topic: _Topic, row: int) -> MessageLayout:
     return MessageLayout(topic.types, message, channel.type, cdr=channel.encoding == "cdr")
 
 
-def _in_recorded_order(parts: list[dict[str, Column]]) -> Iterator[tuple[str, Column]]:
+def _in_recorded_order(parts: list[Columns]) -> Iterator[tuple[str, Column]]:
     order = np.argsort(np.concatenate([part.pop("place") for part in parts]), kind="stable")
     for name, value in parts[0].items():
         values = [part[name] for part in parts if name in part]

@@ -14,7 +14,7 @@ from vftcli.readers.aliases import along_arm, laid_along
 from vftcli.readers.bags.container import Batch, Channel
 from vftcli.readers.bags.decode import KINDS, VECTORS, Stream
 from vftcli.readers.reader import RawLog, ReadChoice
-from vftcli.readers.table import Column
+from vftcli.readers.table import Column, Names
 from vftcli.readers.tables import ArrayTable, from_table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
@@ -71,7 +71,7 @@ class Documents:
             if all(f"wrench.{path}" in row for row in rows for path in VECTORS):
                 streams.append(stream_of(channel, rows, times))
             elif all(map(is_joint_state, rows)):
-                by_names: dict[tuple[str, ...], list[int]] = {}
+                by_names: dict[Names, list[int]] = {}
                 for k, row in enumerate(rows):
                     by_names.setdefault(tuple(row["name"]), []).append(k)
                 for names, at in by_names.items():
@@ -131,7 +131,7 @@ def is_joint_state(row: Document) -> bool:
 
 
 def stream_of(
-    channel: Channel, rows: Sequence[Document], times: list[int], names: tuple[str, ...] = ()
+    channel: Channel, rows: Sequence[Document], times: list[int], names: Names = ()
 ) -> Stream | None:
     """One stream, None where its numbers or stamps are not what they should be."""
     stamps = [stamp_of(row) for row in rows]
@@ -149,7 +149,7 @@ def stream_of(
         return None
     ordered, signals = along_arm(names, signals)
     return Stream(
-        channel=replace(channel, type=kind),
+        channel=channel._replace(type=kind),
         kind=KINDS[kind],
         names=ordered,
         mixed=ordered != names,

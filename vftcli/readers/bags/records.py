@@ -24,8 +24,8 @@ from vftcli.readers.bags.container import (
     Channel,
     Content,
     CutError,
-    Message,
     MessageCount,
+    Messages,
     ReadBudget,
     printable,
     sized,
@@ -44,7 +44,7 @@ BYTES_PER_FIELD = 8
 Header = dict[bytes, bytes]  #: Name of a field → its bytes.
 
 
-def bag_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
+def bag_messages(file: LogFile, budget: ReadBudget) -> Messages:
     """Messages of a bag, chunk by chunk, up to the last whole chunk."""
     return _Bag(budget).messages(file.content.obj)
 
@@ -78,7 +78,7 @@ class _Bag:
         self.indexed: list[int] = []
         self.listed = self.counted = 0
 
-    def messages(self, content: Content) -> Iterator[Message]:
+    def messages(self, content: Content) -> Messages:
         """The messages of the content, up to the last whole chunk."""
         end = BAG_MAGIC
         while True:
@@ -97,7 +97,7 @@ class _Bag:
         data, place = sized(content, place)
         return _fields(head), data, place
 
-    def _take(self, header: Header, data: bytes) -> Iterator[Message]:
+    def _take(self, header: Header, data: bytes) -> Messages:
         op, counts = header[b"op"][0], self.counts
         if op == RecordType.IDXDATA:
             self.indexed += [place for *_, place in struct.iter_unpack("<III", data)]
@@ -131,7 +131,7 @@ class _Bag:
             definition=about[b"message_definition"],
         )
 
-    def _chunk(self, header: Header, data: bytes) -> Iterator[Message]:
+    def _chunk(self, header: Header, data: bytes) -> Messages:
         name, size = header[b"compression"].decode(), int.from_bytes(header[b"size"], "little")
         chunk, place = unpacked(self.budget, name, data, size), 0
         while place < len(chunk):
@@ -164,7 +164,7 @@ DATA_END_BYTES = 13  #: Length of the record that ends the data, its head includ
 ENCODINGS = {"cdr", "ros1", "json", "protobuf"}  #: How messages are serialised that may be read.
 
 
-def mcap_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
+def mcap_messages(file: LogFile, budget: ReadBudget) -> Messages:
     """Messages of an MCAP file, up to the last whole chunk."""
     return _Mcap(budget).messages(file.content.obj)
 
@@ -184,7 +184,7 @@ class _Mcap:
         self.channels: dict[int, Channel] = {}
         self.indexed = 0
 
-    def messages(self, content: Content) -> Iterator[Message]:
+    def messages(self, content: Content) -> Messages:
         """The messages of the file, chunk by chunk, those outside chunks one by one."""
         counts, end = self.counts, MAGIC_SIZE
         with suppress(CutError, struct.error):
@@ -219,7 +219,7 @@ class _Mcap:
             self.budget.spend(1)
             yield op, body, place
 
-    def _take(self, op: int, body: bytes, end: int) -> Iterator[Message]:
+    def _take(self, op: int, body: bytes, end: int) -> Messages:
         if op == Opcode.MESSAGE:
             self.counts.kept += 1
             number, _, time, _ = struct.unpack_from("<HIQQ", body)
@@ -249,7 +249,7 @@ class _Mcap:
         elif op == Opcode.DATA_END:
             self.counts.closed, self.counts.data_end = True, end - DATA_END_BYTES
 
-    def _chunk(self, body: bytes) -> Iterator[Message]:
+    def _chunk(self, body: bytes) -> Messages:
         *_, size, checksum = struct.unpack_from("<QQQI", body)
         compression, place = sized(body, 28)
         packed, _ = sized(body, place, 8)
@@ -282,7 +282,7 @@ STEPS = 10_000
 SPARE_STEPS, STEPS_PER_BYTE = 20_000_000, 200
 
 
-def db3_messages(file: LogFile, budget: ReadBudget) -> Iterator[Message]:
+def db3_messages(file: LogFile, budget: ReadBudget) -> Messages:
     """Messages of a db3 file, in the order of recording."""
     with closing(_opened(file)) as db:
         yield from _messages(db, len(file.content), budget)
@@ -315,7 +315,7 @@ def _permission(action: int, name: str | None, *_: str | None) -> int:
     return sqlite3.SQLITE_OK if reads or action == sqlite3.SQLITE_SELECT else sqlite3.SQLITE_DENY
 
 
-def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Iterator[Message]:
+def _messages(db: sqlite3.Connection, size: int, budget: ReadBudget) -> Messages:
     tables = _checked_tables(db, budget)
     db.set_authorizer(_permission)
     # Topics and definitions are read beside the messages.

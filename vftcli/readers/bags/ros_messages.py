@@ -34,7 +34,7 @@ class Field(NamedTuple):
     many: int | None  #: How many: None for one, a number for a fixed array, −1 for a sequence.
 
 
-Types = Mapping[str, Sequence[Field]]
+Types = dict[str, tuple[Field, ...]]  #: Message type as package/Name → its fields.
 Described = Any  #: Fields or their type as nested tuples of rosbags.
 
 
@@ -43,7 +43,7 @@ class LayoutError(ValueError):
 
 
 @lru_cache(maxsize=64)  # many channels may share one definition, and parsing takes its time
-def types_of(definition: str, name: str, *, idl: bool) -> dict[str, tuple[Field, ...]]:
+def types_of(definition: str, name: str, *, idl: bool) -> Types:
     """Parse a message definition with rosbags' parsers. Type → fields."""
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
@@ -88,9 +88,9 @@ def long_name(kind: str) -> str:
 
 
 @cache
-def own_types() -> dict[str, tuple[Field, ...]]:
+def own_types() -> Types:
     """The fields of every type of `DEFINITIONS`."""
-    found: dict[str, tuple[Field, ...]] = {}
+    found: Types = {}
     for kind, text in DEFINITIONS.items():
         found |= types_of(text, long_name(kind), idl=False)
     return found
@@ -112,7 +112,7 @@ def parts_of(kind: str) -> Sequence[str]:
 
 
 @cache
-def known_types() -> dict[str, tuple[Field, ...]]:
+def known_types() -> Types:
     """The fields of ROS 2 Humble's types, from rosbags' store, and of those defined here."""
     from rosbags.typesys import Stores, get_typestore
 
@@ -125,7 +125,7 @@ def known_types() -> dict[str, tuple[Field, ...]]:
     return found | own_types()
 
 
-def types_for(channel: Channel) -> dict[str, tuple[Field, ...]]:
+def types_for(channel: Channel) -> Types:
     """All types that a channel's messages are made of: the container's own first."""
     known = dict(known_types())
     if channel.definition:
