@@ -300,7 +300,7 @@ def typed_as(
     option: Option,
     *,
     needed: bool,
-) -> Any:  # noqa: ANN401
+) -> object:
     """What typer makes of a field's typed text; where that is missing the room knows."""
     among, default = (kind, *get_args(kind)), getattr(choice, field, EMPTY)
     one = next((one for one in (int, float, Path) if one in among and not option.reads), str)
