@@ -124,8 +124,7 @@ def identified(
     )
     every: list[list[Recording]] = []
     for paths, how in ((logs, choice.read), (check, held_out), (choice.free.logs, unloaded)):
-        episodes = paths is logs and task.method == "payload"
-        opened = library.open_each(paths, how, whole=episodes)
+        opened = library.open_each(paths, how, whole=paths is logs and task.method == "payload")
         every.append([examiner.taken(log, profile, how) for log in opened])
     for recording in (one for some in every for one in some):
         if tell is not None:
@@ -312,6 +311,5 @@ def looped(
         anyway=anyway,
         progress=progress,
     )
-    source = fact("force-of-loop")
-    made = replay(run.wrench, run.q, arm, controllers, source=source, anyway=anyway)
+    made = replay(run.wrench, run.q, arm, controllers, source=fact("force-of-loop"), anyway=anyway)
     return Replayed(made, run=run)

@@ -13,6 +13,8 @@ from inspect import Parameter, Signature, signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
+import polars as pl
+
 from vftcli.admittance.choice import ControlChoice
 from vftcli.analysis import Analysis
 from vftcli.answering import (
@@ -25,7 +27,7 @@ from vftcli.answering import (
     replayed,
 )
 from vftcli.batch.log_work import for_comparison, for_estimates
-from vftcli.doctor.examination import Examiner, examine
+from vftcli.doctor.examination import Examination, Examiner, examine
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification.choice import Task
@@ -44,11 +46,8 @@ from vftcli.signals.remarks import Remarks
 from vftcli.virtual_sensor.choice import WrenchChoice
 
 if TYPE_CHECKING:
-    import polars as pl
-
     from vftcli.contacts.contact_list import ContactList
     from vftcli.contacts.thresholds import Thresholds
-    from vftcli.doctor.examination import Examination
 
 #: A robot as a user names it; None where the log settles it.
 NamedRobot = str | Path | Robot | None
@@ -269,8 +268,6 @@ def simulate(
         seed: Seed of everything random; None for the scenario's own.
         settings: Keys of the scenario → their values, as ``{"duration": 8}``.
     """
-    import polars as pl
-
     from vftcli.signals.packages import check_installed
     from vftcli.simulation import load_scenario
     from vftcli.simulation.experiment import simulate as run
@@ -290,7 +287,6 @@ def admit(
     seed: int | None = None,
 ) -> "pl.DataFrame":
     """The comparison of admittance controllers on a log's force, a row a controller and axis."""
-    import polars as pl
 
     def choice(observer: str, **words: str) -> AnalysisChoice:
         changed = asked._replace(words={**asked.words, **words, "observer": [observer]})

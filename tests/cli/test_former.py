@@ -1,7 +1,6 @@
 """Words of the release before do what they did, each with a note that says today's words."""
 
 import json
-import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,12 +9,12 @@ import pytest
 import typer
 
 from vftcli.cli import make_app
-from vftcli.cli.commands import FORMER
+from vftcli.cli.commands import former
 
 Run = Callable[..., tuple[int, str, str]]
 
 LOG = Path(__file__).parents[2] / "fixtures" / "ur5_taps_ur_rtde.csv"
-TABLE = tomllib.loads(FORMER.read_text("utf-8"))
+TABLE = former()
 SHORT = ("--robot", "ur5", "--interval", "4:6", "--json", "-q")
 
 

@@ -19,7 +19,7 @@ from vftcli.batch.annotation import (
     force_columns,
 )
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import Outcome, begin, run_tasks
+from vftcli.batch.cluster import Outcome, Tell, begin, run_tasks
 from vftcli.batch.datasets import DataFile, ForceColumn, Single, Statistics
 from vftcli.batch.datasets.copying import (
     RECORD,
@@ -43,6 +43,7 @@ TOGETHER = 16  #: Episodes that go to a worker together, and into one file of ro
 #: Episodes, and files to write, for which no processes are started unasked: that takes seconds.
 FEW = 32
 HERE = WorkersChoice(jobs=0)  #: This process alone.
+Progress = Callable[[str, float, float], None]  #: Receives the stage, and its share of the work.
 Dataset = LeRobotDataset | Hdf5Dataset  #: A folder of episodes that a copy is made of.
 
 
@@ -60,8 +61,8 @@ def annotate(
     choice: ForceChoice,
     workers: WorkersChoice,
     command: str,
-    tell: Callable[[str], None],
-    progress: Callable[[str, float, float], None],
+    tell: Tell,
+    progress: Progress,
     *,
     force: bool = False,
 ) -> Record:
@@ -82,17 +83,18 @@ def annotate(
     key = hashlib.sha256(f"{path.resolve()} {choice.key(files_beside)}".encode()).hexdigest()
     with unfinished(copy, key) as folder:
         work = folder / WORK
-        plan = Plan(dataset, work, key)
+        rows, sources = dict[DataFile, list[Path]](), dict[str, str]()
         run = partial(run_tasks, tell=tell, seen=[str(path), str(work)])
         expected = force_columns(choice, (), derived=False, valid=choice.anyway)
         few = sum(len(f.episodes) for f in islice(dataset.files(), FEW + 1)) <= FEW
         place = HERE if few and workers == WorkersChoice() else workers
-        outcomes = run(plan.groups(expected), partial(estimate_episodes, choice), place)
+        groups = planned(dataset, work, key, expected, rows, sources)
+        outcomes = run(groups, partial(estimate_episodes, choice), place)
         made = gathered(outcomes, choice, progress)
         derived, names = any(one.get("derived") for one in made["episodes"]), joint_names(made)
         columns = force_columns(choice, names, derived=derived, valid=choice.anyway)
         write = partial(write_file, dataset, columns, choice.suffix)
-        tasks = [FileTask(f, tuple(r), folder / f.place) for f, r in plan.rows.items()]
+        tasks = [FileTask(f, tuple(own), folder / f.place) for f, own in rows.items()]
         each = (tasks[k : k + TOGETHER] for k in range(0, len(tasks), TOGETHER))
         statistics: dict[int, Mapping[str, Statistics]] = {}
         for outcome in run(each, write, workers if len(tasks) > FEW else HERE):
@@ -100,7 +102,7 @@ def annotate(
             statistics |= outcome.value["statistics"]
         progress("writing descriptions", 0.9, 1.0)
         if path.is_dir():
-            copy_others(path, folder, {file.place for file in plan.rows})
+            copy_others(path, folder, {file.place for file in rows})
         dataset.finish(columns, dict(sorted(statistics.items())), folder)
         found = {
             "dataset": str(path),
@@ -113,7 +115,7 @@ def annotate(
             "transient_frames": max(one.get("transient_frames", 0) for one in made["episodes"]),
             "friction": choice.robot.friction,
             "episodes": made["episodes"],
-            "sources": dict(sorted(plan.sources.items())),
+            "sources": dict(sorted(sources.items())),
         }
         entry = {"recording": path.name, "path": str(path), "sha256": None}
         record = envelope(command, [entry], found=found)
@@ -137,33 +139,33 @@ def open_dataset(path: Path, columns: str | None = None) -> Dataset:
     )
 
 
-class Plan:
-    """The work on a dataset, planned while workers already do the first of it."""
+def planned(
+    dataset: Dataset,
+    work: Path,
+    key: str,
+    columns: list[ForceColumn],
+    rows: dict[DataFile, list[Path]],
+    sources: dict[str, str],
+) -> Iterator[list[EpisodesTask]]:
+    """The episodes in groups that go to a worker together, while workers do the first of them.
 
-    def __init__(self, dataset: Dataset, work: Path, key: str) -> None:
-        self._dataset, self._work, self._key = dataset, work, key
-        #: Data file → the files in which its episodes' columns are.
-        self.rows: dict[DataFile, list[Path]] = {}
-        self.sources: dict[str, str] = {}  #: Data file → its sha256.
-
-    def groups(self, columns: list[ForceColumn]) -> Iterator[list[EpisodesTask]]:
-        """The episodes in groups that go to a worker together."""
-        group: list[EpisodesTask] = []
-        for file in self._dataset.files():
-            self._dataset.check_new(file, columns)
-            source = digest(self._dataset.folder / file.place)
-            self.sources[file.place.as_posix()] = source
-            for first in range(0, len(file.episodes), TOGETHER):
-                some = file._replace(episodes=file.episodes[first : first + TOGETHER])
-                name = hashlib.sha256(f"{self._key} {source} {some}".encode()).hexdigest()
-                rows = self._work / f"{name}.npz"
-                self.rows.setdefault(file, []).append(rows)
-                group.append(EpisodesTask(some, rows))
-                if sum(len(task.file.episodes) for task in group) >= TOGETHER:
-                    yield group
-                    group = []
-        if group:
-            yield group
+    Puts down in `rows` the files in which a data file's columns are, in `sources` its sha256.
+    """
+    group: list[EpisodesTask] = []
+    for file in dataset.files():
+        dataset.check_new(file, columns)
+        source = sources[file.place.as_posix()] = digest(dataset.folder / file.place)
+        for first in range(0, len(file.episodes), TOGETHER):
+            some = file._replace(episodes=file.episodes[first : first + TOGETHER])
+            name = hashlib.sha256(f"{key} {source} {some}".encode()).hexdigest()
+            task = EpisodesTask(some, work / f"{name}.npz")
+            rows.setdefault(file, []).append(task.rows)
+            group.append(task)
+            if sum(len(each.file.episodes) for each in group) >= TOGETHER:
+                yield group
+                group = []
+    if group:
+        yield group
 
 
 def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work returns
@@ -177,7 +179,7 @@ def value_of(outcome: Outcome[Any]) -> Any:  # noqa: ANN401 - what the work retu
 def gathered(
     outcomes: Iterable[Outcome[Any]],
     choice: ForceChoice,
-    progress: Callable[[str, float, float], None],
+    progress: Progress,
 ) -> Record:
     """Results of all episodes as of `estimate_episodes`, in the order of their files."""
     episodes: list[Record] = []

@@ -79,8 +79,7 @@ class WorkersChoice(Choice):
     @property
     def tls(self) -> tuple[Path, ...]:
         """The files of the authority's certificate, the own certificate and its key, or none."""
-        given = (self.ca, self.cert, self.key)
-        return tuple(path for path in given if path is not None)
+        return tuple(path for path in (self.ca, self.cert, self.key) if path is not None)
 
     def check_closed(self, *, anyway: bool) -> None:
         """Refuse a cluster that does not ask who connects to it, unless the user accepts that."""

@@ -60,6 +60,7 @@ Task = TypeVar("Task")
 
 #: What is done with each task; what it returns is small, and can be pickled.
 Work = Callable[[Task], Any]
+Tell = Callable[[str], None]  #: Receives a sentence on each step.
 KILLED = "KilledWorker"  #: Error type of a task if its worker died each time.
 
 _stage: ContextVar[str] = ContextVar("stage", default="")
@@ -129,7 +130,7 @@ def run_tasks(
     groups: Iterable[Sequence[Task]],
     work: Work[Task],
     choice: WorkersChoice,
-    tell: Callable[[str], None],
+    tell: Tell,
     seen: Sequence[str] = (),
 ) -> Iterator[Outcome[Task]]:
     """Do some work on every task and tell how each ended, in the order in which they end.
@@ -154,9 +155,7 @@ def run_tasks(
 
 
 @contextmanager
-def connected(
-    choice: WorkersChoice, seen: Sequence[str], tell: Callable[[str], None]
-) -> Iterator["Client"]:
+def connected(choice: WorkersChoice, seen: Sequence[str], tell: Tell) -> Iterator["Client"]:
     """A new cluster on this machine for a block, or a running one."""
     import dask.config
     import distributed  # noqa: F401 - its settings, which are changed here for a block
@@ -170,7 +169,7 @@ def connected(
 
 
 @contextmanager
-def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
+def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
     """A cluster of processes on this machine, behind a certificate of this run."""
     from dask.system import CPU_COUNT
     from distributed import Client
@@ -199,7 +198,7 @@ def local(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Clien
 
 
 @contextmanager
-def standing(choice: WorkersChoice, tell: Callable[[str], None]) -> Iterator["Client"]:
+def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
     """The cluster of the scheduler at this address, with a worker at least."""
     from distributed import Client
     from distributed.security import Security

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from vftcli.batch.choice import WorkersChoice
-from vftcli.batch.cluster import Effort, Failure, Outcome, run_tasks
+from vftcli.batch.cluster import Effort, Failure, Outcome, Tell, run_tasks
 from vftcli.batch.keys import content_digest, key_of, options_digest, with_files
 from vftcli.batch.log_work import SCHEMA, LogJob, LogTask, work_on_log
 from vftcli.outputs.batch_folder import BatchFolder
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
 TOGETHER = 64  #: At most so many.
 SHARES = 8  #: Least groups of a worker: all end at about one time.
-
-Tell = Callable[[str], None]
 
 
 class BatchCount(NamedTuple):
@@ -136,8 +134,7 @@ class BatchRun:
             return path
 
         with_files(self.job.choice, noted)
-        every = chain([first], groups)
-        ended = run_tasks(every, work_on_log, self.workers, self.tell, seen)
+        ended = run_tasks(chain([first], groups), work_on_log, self.workers, self.tell, seen)
         # A batch that stops early takes its cluster down at once.
         with closing(ended):  # type: ignore[type-var]
             for outcome in ended:

@@ -98,11 +98,6 @@ class AnalysisOptions(Bundle):
     anyway: Anyway
     talk: TalkOptions
 
-    @property
-    def asks_wrench(self) -> bool:
-        """Whether an option asks for a wrench."""
-        return self.also_wrench or self.wrench.is_asked
-
     def choice(
         self,
         library: "Library",
@@ -122,7 +117,7 @@ class AnalysisOptions(Bundle):
             free=self.free.choice(),
             refinement=self.refinement.choice(),
             contacts=self.refinement.choice().contacts,
-            wrench=self.wrench.choice() if self.asks_wrench else None,
+            wrench=self.wrench.choice() if self.also_wrench or self.wrench.is_asked else None,
             reference=replace(reference.choice(), contacts=self.talk.details)
             if reference is not None and compared
             else None,

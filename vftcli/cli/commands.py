@@ -2,12 +2,13 @@
 
 import os
 import re
-from collections.abc import Container, Mapping
-from functools import cache
+from collections.abc import Container
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.signals.errors import ParameterError
+from vftcli.signals.parsing import tables_beside
 
 
 class ListedCommand(NamedTuple):
@@ -62,16 +63,8 @@ DEFAULT = "contacts"  #: The command of words that name none.
 #: Options of the program itself.
 OF_PROGRAM = frozenset({"-h", "--help", "--version", "--install-completion", "--show-completion"})
 
-#: Former commands and options, and what each is now.
-FORMER = Path(__file__).parent / "former.toml"
-
-
-@cache
-def former() -> Mapping[str, Mapping[str, str]]:
-    """What the `commands` and `options` of the release before are now, and what is `gone`."""
-    import tomllib
-
-    return tomllib.loads(FORMER.read_text(encoding="utf-8"))
+#: What the `commands` and `options` of the release before are now, and what is `gone`.
+former = partial(tables_beside, __file__, "former.toml")
 
 
 def with_command(words: list[str]) -> list[str]:
@@ -127,8 +120,8 @@ def now_of(name: str, value: str) -> str | None:
         return None
     if name in former()["gone"]:
         raise ParameterError(f"{name} is gone; {former()['gone'][name]}")
-    there, key = former()["options"], name[2:]
-    return there.get(f"{key}={value}") or there.get(key)
+    there: dict[str, str] = former()["options"]
+    return there.get(f"{name[2:]}={value}") or there.get(name[2:])
 
 
 def add_arguments(words: list[str], arguments: list[str]) -> None:

@@ -58,8 +58,7 @@ class DrawnErrors(opt.Bundle):
         from vftcli.outputs.files import OutputFolder
         from vftcli.outputs.paper import figure_files
 
-        names = figure_files(self.figures, ERROR_FIGURES)
-        folder = OutputFolder(self.output, self.force, names)
+        folder = OutputFolder(self.output, self.force, figure_files(self.figures, ERROR_FIGURES))
         folder.check()
         return folder
 

@@ -5,10 +5,9 @@ Nothing here loads more than the command line itself, so that help comes at once
 
 import shutil
 import textwrap
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterator, Sequence
+from functools import partial
 from importlib import import_module
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -21,7 +20,7 @@ from vftcli.cli.progress import echo
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.errors import ParameterError, UnknownFormatError
 from vftcli.signals.option import GROUPS, LOG, NUMBERS, OUTPUT, Choice, Option, settings_by_name
-from vftcli.signals.parsing import did_you_mean, nearest, printable
+from vftcli.signals.parsing import did_you_mean, nearest, printable, tables_beside
 
 OWN = "This command"  #: Heading of the options that only one command has.
 NARROWEST, WIDEST, LEFT = 72, 80, 33  #: Columns of a help text, and of its left half at most.
@@ -59,8 +58,7 @@ class GroupedCommand(TyperCommand):
     def format_help(self, ctx: Any, formatter: Any) -> None:  # noqa: ANN401
         """Write how it is called, what it does, its options by group."""
         width = columns()
-        usage = ["Usage:", ctx.command_path, *self.collect_usage_pieces(ctx)]
-        lines = [" ".join(usage), ""]
+        lines = [" ".join(["Usage:", ctx.command_path, *self.collect_usage_pieces(ctx)]), ""]
         for paragraph in (self.help or "").split("\n\n"):
             lines += textwrap.wrap(" ".join(paragraph.split()), width)
         found: dict[str, list[tuple[str, str]]] = {}
@@ -141,15 +139,7 @@ def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
         yield from (f"{'':{left + 4}}{line}" for line in lines)
 
 
-TOPICS = Path(__file__).parent / "topics.toml"  #: Topic → its summary and its text.
-
-
-@cache
-def topics() -> Mapping[str, Mapping[str, str]]:
-    """Every topic: its summary and its text."""
-    import tomllib
-
-    return tomllib.loads(TOPICS.read_text(encoding="utf-8"))
+topics = partial(tables_beside, __file__, "topics.toml")  #: Topic → its summary and its text.
 
 
 #: What is listed → what its list shows.
@@ -197,8 +187,7 @@ def show_help(
         echo(topics()[topic]["text"].rstrip())
     elif topic in COMMANDS:
         asked = root.command.commands[topic]
-        of_command = asked.make_context(topic, [], parent=root, resilient_parsing=True)
-        echo(asked.get_help(of_command))
+        echo(asked.get_help(asked.make_context(topic, [], parent=root, resilient_parsing=True)))
     else:
         there = [*topics(), *LISTS]
         near = did_you_mean(topic, [*there, *COMMANDS])

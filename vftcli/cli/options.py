@@ -12,7 +12,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, Generic, NamedTuple, TypeVar, get_args, get_origin
+from typing import Annotated, Any, Generic, NamedTuple, TypeVar, get_args, get_origin
 
 import typer
 
@@ -33,9 +33,6 @@ from vftcli.signals.option import (
     settings_by_name,
 )
 from vftcli.signals.packages import check_installed
-
-if TYPE_CHECKING:
-    from vftcli.readers.reader import ReadChoice
 
 C = TypeVar("C", bound=Choice)
 EMPTY = inspect.Parameter.empty
@@ -117,7 +114,7 @@ SEED = Option("--seed", "N", "Seed everything random.", least=0)
 ENDING = re.compile(r"(?<=.)(\.[A-Za-z]\w*)?(\.(gz|zst|zstd|bz2|xz))?$")
 
 
-def folder_of(output: Path | None, logs: Sequence[Path], reading: "Typed[ReadChoice]") -> Path:
+def folder_of(output: Path | None, logs: Sequence[Path], reading: "Typed[Any]") -> Path:
     """Where a command writes: as typed, else into a folder here that is named after the log."""
     if output is not None:
         return output
@@ -271,8 +268,7 @@ def taken_apart(name: str, kind: Any, default: object) -> Part:  # noqa: ANN401 
         nothing = dict.fromkeys(word for word in choice.options() if word not in found)
 
         def made(values: Mapping[str, Any]) -> Any:  # noqa: ANN401 - `Typed` of this choice
-            words = part.made(values) | nothing | choice.words_of(values["settings"])
-            return typed(choice, words)
+            return typed(choice, part.made(values) | nothing | choice.words_of(values["settings"]))
 
         return Part(part.parameters, made, (choice,))
     if typed is not Annotated:  # typer's own context

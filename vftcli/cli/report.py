@@ -122,8 +122,7 @@ def show_answers(
     if len(analyses) + len(failed) > 1:
         show(logs_screen(analyses, canvas(), failed, every=details))
     else:
-        most = MOST_LINES - FILE_LINES
-        show(log_screen(analyses[0], canvas(), most=most, every=details))
+        show(log_screen(analyses[0], canvas(), most=MOST_LINES - FILE_LINES, every=details))
     for made in analyses if details else ():
         if made.errors is not None:
             show(to_terminal(made.errors, [made]))

@@ -102,8 +102,7 @@ def bench(
         f"NumPy with {result['simd']}"
     )
     if latex:
-        table = replace(bench_grid(result), title=f"Computing time: {title}")
-        echo_data(grid.latex(table))
+        echo_data(grid.latex(replace(bench_grid(result), title=f"Computing time: {title}")))
         return
     echo(title)
     echo(grid.terminal(bench_grid(result)))

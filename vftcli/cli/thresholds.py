@@ -59,8 +59,7 @@ def contact_thresholds(
     counted = left_out(signals, rate)
     checks = []
     for log in check or ():
-        touching = library.open(log, choice.read.whole)
-        pushed = modelled(*prepared(touching, choice), choice, Runs())
+        pushed = modelled(*prepared(library.open(log, choice.read.whole), choice), choice, Runs())
         check_alike((signals[0], compared := compared_signals(pushed)))
         truth = truth_of(pushed, asked or settled_reference(pushed.recording))
         checks.append(check_contacts(compared, thresholds, *truth))

@@ -1,11 +1,9 @@
 """Aliases: the names under which users' tables hold the signals."""
 
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 from typing import NamedTuple
 
 from vftcli.readers.columns import SIGNALS, Item
@@ -26,6 +24,7 @@ from vftcli.readers.table import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
+from vftcli.signals.parsing import tables_beside
 from vftcli.signals.recording import EFFORTS
 from vftcli.signals.remarks import fact
 
@@ -38,9 +37,7 @@ HEADER_STAMP = re.compile(r"(?:.*[./])?header[./]stamp(?:[./]\w+)?")
 #: The log's own stamps [ns] beside a clock that starts at zero, as vftcli convert writes them.
 OWN_STAMPS = "t_src_ns"
 #: Field of Recording → names its columns go by, in lower case and without their index.
-ALIASES: dict[str, list[str]] = tomllib.loads(
-    (Path(__file__).parent / "aliases.toml").read_text(encoding="utf-8")
-)
+ALIASES: dict[str, list[str]] = tables_beside(__file__, "aliases.toml")
 #: Names of libfranka's residual, measured torque minus model: its sign has to be turned.
 TURNED = {"tau_ext_hat_filtered", "state.tau_ext_hat_filtered", "motor_torques_external"}
 #: Names of the six columns of a wrench.

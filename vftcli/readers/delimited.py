@@ -237,8 +237,7 @@ class TextTable(Table):
 
     def _diagnosed(self, kinds: Mapping[int, str]) -> LogError:
         """Look at the table row by row for what the parser could not take."""
-        rows = self._mended_rows().split(b"\n")
-        for number, row in enumerate(rows, start=1):
+        for number, row in enumerate(self._mended_rows().split(b"\n"), start=1):
             cells = self.cells(decoded(row))
             if len(cells) > self.width:
                 return LogError(

@@ -310,8 +310,7 @@ def trajectories(folder: Path) -> Iterator[Path | None]:
 
 def recognises(file: LogFile, _: LogFormat) -> bool:
     """Whether a folder holds DROID's episodes, at any depth."""
-    is_lerobot = (file.path / "meta" / "info.json").is_file()
-    if "metadata.yaml" in file.entries or is_lerobot:
+    if "metadata.yaml" in file.entries or (file.path / "meta" / "info.json").is_file():
         return False
     looked_at = zip(range(MOST_LOOKED_AT), trajectories(file.path), strict=False)
     return any(path is not None for _, path in looked_at)

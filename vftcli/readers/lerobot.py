@@ -162,8 +162,7 @@ def _elements_of(name: str, table: ParquetTable, labels: Json) -> Iterable[Eleme
     """The joints' elements of a feature; none of a gripper, a pose, an action."""
     if not name.startswith("observation."):
         return
-    column = table.names.index(name)
-    width = table.lists.get(column)
+    width = table.lists.get(table.names.index(name))
     last = [part for part in name.lower().split(".") if part not in {"observation", *ARMS}]
     of_feature = next(
         (s for s in MEASURED if last and last[-1] in (*ALIASES[s], *(["state"] * (s == "q")))), ""

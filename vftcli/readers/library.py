@@ -140,8 +140,7 @@ class LogCollection:
 
     def _parts(self, path: Path) -> Iterator[LogEntry]:
         try:
-            reader = reading.recognise(path, self._choice)
-            yield from self._episodes(path, reader)
+            yield from self._episodes(path, reading.recognise(path, self._choice))
         except (LogError, OSError):
             yield LogEntry(path, self._choice.episode, (path,))
 
@@ -154,8 +153,7 @@ class LogCollection:
             meta = tuple(files_of(path / "meta"))
             for episode in lerobot.dataset_episodes(path):
                 if chosen in {None, episode.number}:
-                    own = lerobot.data_file(path, episode)
-                    yield LogEntry(path, episode.number, (*meta, own))
+                    yield LogEntry(path, episode.number, (*meta, lerobot.data_file(path, episode)))
             return
         numbers = reader.numbers(open_log(path)) if chosen is None else ()
         for number in numbers if len(numbers) > 1 else (chosen,):

@@ -58,9 +58,9 @@ def naming_damage(
         raise LogError(f"{path}: {what} ({reason_of(error)}){remedy}") from None
 
 
-def reason_of(error: Exception, most: int = 120) -> str:
+def reason_of(error: Exception) -> str:
     """The beginning of an error's first line."""
-    return str(error).split("\n", maxsplit=1)[0][:most]
+    return str(error).split("\n", maxsplit=1)[0][:120]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,8 +125,7 @@ class LogFile:
         # No text in UTF-8 or an eight-bit encoding holds one of these.
         if any(bytes([c]) in self.head for c in (*range(7), *range(14, 20), 127)):
             return []
-        lines = self.head.replace(b"\r", b"\n").split(b"\n")
-        return [line for line in lines if line.strip()]
+        return [line for line in self.head.replace(b"\r", b"\n").split(b"\n") if line.strip()]
 
     @property
     def first_line(self) -> bytes:

@@ -134,8 +134,7 @@ class ReadChoice(Choice):
     skips_unknown: bool = False
 
     def __post_init__(self) -> None:
-        known = {"arm": ARMS, "derive": DERIVE, "effort": tuple(EFFORT)}
-        for name, there in known.items():
+        for name, there in {"arm": ARMS, "derive": DERIVE, "effort": tuple(EFFORT)}.items():
             if (word := getattr(self, name)) is not None:
                 option = next(o for field, _, o in self.options().values() if field == name)
                 check_known(word, there, f"{option.typed} {word!r}")

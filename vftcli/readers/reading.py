@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import tomllib
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -26,7 +25,7 @@ from vftcli.signals.errors import (
     ShapeError,
     UnknownFormatError,
 )
-from vftcli.signals.parsing import did_you_mean, printable
+from vftcli.signals.parsing import did_you_mean, printable, tables_beside
 from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import warning
 
@@ -93,9 +92,7 @@ class LogFormat:
 #: Every format by its name.
 FORMATS = {
     name: LogFormat(name=name, **entry.pop("reader"), **entry)
-    for name, entry in tomllib.loads(
-        (Path(__file__).parent / "layouts.toml").read_text(encoding="utf-8")
-    ).items()
+    for name, entry in tables_beside(__file__, "layouts.toml").items()
 }
 
 

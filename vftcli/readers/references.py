@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,8 +34,7 @@ from vftcli.signals.wrench import WrenchFrame
 TORQUE = "tau_ext"
 
 
-@dataclass(frozen=True, kw_only=True)
-class ReferenceTable:
+class ReferenceTable(NamedTuple):
     """What a reference file holds."""
 
     t: Array  #: Its stamps, on the clock of the log it belongs to. (T,) [s]
@@ -47,8 +47,7 @@ class ReferenceTable:
 def read_reference(path: Path, columns: str | None = None) -> ReferenceTable:
     """Read a reference file: text, compressed text or Parquet."""
     file = open_log(path)
-    is_parquet = file.head.startswith(b"PAR1")
-    table: Table = ParquetTable(file) if is_parquet else TextTable(file)
+    table: Table = ParquetTable(file) if file.head.startswith(b"PAR1") else TextTable(file)
     picks = _stated(table, columns) if columns else _found(table)
     raw = load_signals(table, picks, ReadChoice(signals=frozenset({TORQUE, "wrench"})))
     t = np.asarray(raw.stamps, dtype=np.float64) * raw.tick

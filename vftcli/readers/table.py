@@ -127,8 +127,7 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
     cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
     missing = len(cells) - spec.width
-    rest = any(item.count == 0 for item in spec.items)
-    if missing < 0 or (missing and not rest):
+    if missing < 0 or (missing and not any(item.count == 0 for item in spec.items)):
         remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
         raise LogError(
             f"{table.path}: --columns describes {spec.width} columns, the table has "

@@ -214,8 +214,7 @@ def recognises(file: LogFile, layout: LogFormat) -> bool:
         return table.width > 1
     # A line of names above mostly numbers.
     cells = table.cells(table.sample[1])
-    numbers = sum(map(table.is_number, cells))
-    return len(cells) > 1 and numbers * 2 >= len(cells)
+    return len(cells) > 1 and sum(map(table.is_number, cells)) * 2 >= len(cells)
 
 
 def read(file: LogFile, request: ReadChoice, layout: LogFormat) -> RawLog:

@@ -4,6 +4,8 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from vftcli.signals.errors import ParameterError
@@ -76,12 +78,20 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
+@cache
+def tables_beside(module: str, name: str) -> dict[str, Any]:
+    """The tables of our own file of TOML beside a module's."""
+    import tomllib  # loaded where a file is read, not for --help
+
+    return tomllib.loads(Path(module).with_name(name).read_text(encoding="utf-8"))
+
+
 LONGEST = 10_000  #: Letters of a line of TOML; 50 000 dots in one take Python's parser 15 s.
 
 
 def toml_tables(text: str) -> dict[str, Any]:
     """The tables of a TOML text."""
-    import tomllib  # loaded where a file is read, not for --help
+    import tomllib
 
     for number, line in enumerate(text.split("\n"), start=1):
         if len(line) > LONGEST:

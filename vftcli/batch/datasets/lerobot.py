@@ -49,16 +49,21 @@ class LeRobotDataset:
         for place, own in numbers.items():
             yield DataFile(place, self.folder, tuple(own))
 
-    def frames(self, file: DataFile, number: int) -> int:
-        """Number of an episode's frames."""
+    def _opened(self, file: DataFile) -> tuple[Path, Any, Any]:
+        """A data file, as pyarrow has it, and each row's episode, None where it holds one."""
         pq = needed("pyarrow.parquet", DATASET)
 
         path = self.folder / file.place
         with guarded(path):
             source = pq.ParquetFile(path)
-            numbers = episode_numbers(source)
-        rows = source.metadata.num_rows if numbers is None else np.sum(numbers == number)
-        return int(rows)
+            if EPISODE not in source.schema_arrow.names:
+                return path, source, None
+            return path, source, source.read(columns=[EPISODE]).column(0).to_numpy()
+
+    def frames(self, file: DataFile, number: int) -> int:
+        """Number of an episode's frames."""
+        _, source, numbers = self._opened(file)
+        return int(source.metadata.num_rows if numbers is None else np.sum(numbers == number))
 
     def check_new(self, file: DataFile, columns: ForceColumns) -> None:
         """Refuse a file that has such columns already."""
@@ -78,10 +83,7 @@ class LeRobotDataset:
         """Write a data file with the columns behind its own; row groups stay as they are."""
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
-        path = self.folder / file.place
-        with guarded(path):
-            source = pq.ParquetFile(path)
-            numbers = episode_numbers(source)
+        path, source, numbers = self._opened(file)
         whole = whole_columns(path, numbers, source.metadata.num_rows, columns, forces)
         added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
         told = with_features(source.schema_arrow.metadata or {}, columns)
@@ -164,13 +166,6 @@ def finish_lines(text: str, columns: ForceColumns, statistics: OfEpisodes, targe
             told["stats"][PREFIX + column.name] = plain(own, known)
         lines.append(json.dumps(told, ensure_ascii=False) + "\n")
     target.write_text("".join(lines), encoding="utf-8")
-
-
-def episode_numbers(source: Any) -> Any:  # noqa: ANN401 - a ParquetFile → an array
-    """The episode of each row of a file, None where it holds one. (rows,)"""
-    if EPISODE not in source.schema_arrow.names:
-        return None
-    return source.read(columns=[EPISODE]).column(0).to_numpy()
 
 
 def codec_of(source: Any) -> str:  # noqa: ANN401 - a ParquetFile

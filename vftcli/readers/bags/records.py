@@ -295,8 +295,7 @@ def _opened(file: LogFile) -> sqlite3.Connection:
     """The database, read-only; an unpacked one is held in memory."""
     if file.wrapping is None:
         # Immutable: SQLite must not look for a journal, nor write one beside a user's bag.
-        uri = f"{file.path.absolute().as_uri()}?mode=ro&immutable=1"
-        db = sqlite3.connect(uri, uri=True)
+        db = sqlite3.connect(f"{file.path.absolute().as_uri()}?mode=ro&immutable=1", uri=True)
     else:
         db = sqlite3.connect(":memory:")
         db.deserialize(bytes(file.content))

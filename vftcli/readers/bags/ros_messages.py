@@ -4,10 +4,8 @@ Bags of ROS 2 Humble and older hold no definitions, and a bag that is written ne
 """
 
 import struct
-import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache, lru_cache
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, Channel, type_name
 from vftcli.signals.errors import LogError, OutputError
+from vftcli.signals.parsing import tables_beside
 
 #: The longest definition of an arm's state, Franka's with all its errors, takes some 10 KiB.
 MAX_DEFINITION = 64 * 1024
@@ -76,9 +75,7 @@ def _described(kind: Described) -> tuple[str, int | None]:
 
 
 #: The definitions of ROS 2's own types that are written, and of Franka's state.
-MESSAGES = Path(__file__).parent / "messages.toml"
-
-ROS, FRANKA = tomllib.loads(MESSAGES.read_text(encoding="utf-8")).values()
+ROS, FRANKA = tables_beside(__file__, "messages.toml").values()
 DEFINITIONS: dict[str, str] = {**ROS, **FRANKA}  #: Message type as package/Name → its definition.
 
 
