@@ -63,6 +63,7 @@ FILES = (
     "robots/robot.py",
     "robots/described.py",
     "robots/robot_file.py",
+    "signals/parsing.py",  # our own tables of TOML, each beside its module
     "signals/remarks.py",  # the catalogue of words
     "simulation/scenario.py",
     "simulation/writers/",

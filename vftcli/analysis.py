@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from vftcli.observers.observer import Observer, Tuning
 from vftcli.robots.robot import Robot
-from vftcli.robots.run import RunSamples
+from vftcli.robots.run import Run, RunSamples
 from vftcli.signals.arrays import Array
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from vftcli.evaluation.published import Comparison
     from vftcli.free_motion.free_motion import FreeMotion
     from vftcli.refinement.refine import Refinement
-    from vftcli.robots.run import Run
     from vftcli.signals.wrench import Wrench
     from vftcli.virtual_sensor.sensing import FreeLog
     from vftcli.virtual_sensor.sensor_reading import SensorReading

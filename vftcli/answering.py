@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from vftcli.admittance.choice import FILE, ControlChoice
+from vftcli.admittance.choice import FILE, ControlChoice, released_robot
 from vftcli.analysis import Analysis
 from vftcli.identification.choice import Task
 from vftcli.observers.choice import LOG_GAINS, GoalChoice, ObserverChoice
@@ -203,7 +203,6 @@ def replayed(
         anyway: Whether unstable controllers run too.
         progress: Called with the steps of a simulation that are done, and all.
     """
-    from vftcli.admittance.choice import released_robot
     from vftcli.admittance.replay import release_deviation, replay, replay_release
     from vftcli.signals.packages import check_installed
 

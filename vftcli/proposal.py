@@ -82,7 +82,12 @@ def of_known_arm(logs: Sequence[Path], choice: AnalysisChoice) -> Iterator[Propo
     if free:
         yield ProposedOption("nothing touches the arm in them", "free", [str(log) for log in free])
     choice = replace(choice, free=FreeChoice(logs=tuple(free)))
-    yield from free_part(recording, robot, choice, models)
+    try:
+        found = read(recording, robot, choice, models).part.remarks
+    except VftError:
+        found = ()  # why there is none says the reference that would need it
+    own = "" if free else "; each log's own is found unasked"
+    yield from (ProposedOption(f"{remark}{own}") for remark in found)
     yield from references(recording, robot, choice, models)
 
 
@@ -147,19 +152,6 @@ def free_log(log: Path, choice: AnalysisChoice, models: Runs) -> ProposedOption:
         )
         return ProposedOption(words, "free", [str(log)], taken=False)
     return ProposedOption(f"{label}: no contact in {recording.duration:.3g} s")
-
-
-def free_part(
-    recording: Recording, robot: Robot, choice: AnalysisChoice, models: Runs
-) -> Iterator[ProposedOption]:
-    """What is known to be free of contact, if anything is."""
-    try:
-        found = read(recording, robot, choice, models).part.remarks
-    except VftError:
-        return  # why there is none says the reference that would need it
-    own = "" if choice.free.logs else "; each log's own is found unasked"
-    for remark in found:
-        yield ProposedOption(f"{remark}{own}")
 
 
 #: Why a difference of cycles may tell nothing.

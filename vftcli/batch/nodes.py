@@ -5,18 +5,19 @@ from typing import Any
 import distributed
 
 
-class Scheduler(distributed.Scheduler):  # type: ignore[misc, unused-ignore]
-    """Dask's scheduler, which listens for those with the run's certificate and nobody else."""
+class Closed:
+    """A node that listens for those with the run's certificate and nobody else."""
 
     def start_http_server(self, *_routes: object, **_where: object) -> None:
         """Start none: it answers whoever asks."""
 
 
-class Worker(distributed.Worker):  # type: ignore[misc, unused-ignore]
-    """Dask's worker, which listens for those with the run's certificate and nobody else."""
+class Scheduler(Closed, distributed.Scheduler):  # type: ignore[misc, unused-ignore]
+    """Dask's scheduler."""
 
-    def start_http_server(self, *_routes: object, **_where: object) -> None:
-        """Start none: it answers whoever asks."""
+
+class Worker(Closed, distributed.Worker):  # type: ignore[misc, unused-ignore]
+    """Dask's worker."""
 
 
 def closed_cluster(workers: int, memory: int, security: Any, silence: int) -> Any:  # noqa: ANN401

@@ -6,7 +6,9 @@ from contextlib import closing
 from dataclasses import dataclass, field, replace
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
+
+import polars as pl
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.batch.cluster import Effort, Failure, Outcome, Tell, run_tasks
@@ -17,9 +19,6 @@ from vftcli.outputs.believability import LogSummary
 from vftcli.outputs.page.pages import batch_lines, render_batch
 from vftcli.outputs.run_record import envelope, versions
 from vftcli.readers.library import LogEntry, absolute, labelled
-
-if TYPE_CHECKING:
-    import polars as pl
 
 SMALL = 300_000  #: Logs of fewer bytes go to a worker together. [B]
 TOGETHER = 64  #: At most so many.
@@ -167,8 +166,6 @@ class BatchRun:
 
     def gather(self) -> "tuple[pl.DataFrame, BatchCount]":
         """Write the tables, the page and the record of what every log took."""
-        import polars as pl
-
         there = self.folder.keys()
         # Logs of equal bytes that were found after one of them had failed.
         ended = {self.keys[n]: f for n, f in self.failures.items() if n in self.keys}

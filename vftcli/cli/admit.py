@@ -11,13 +11,14 @@ from vftcli.cli.analysis import AnalysisOptions
 from vftcli.cli.console import (
     command_line,
     detail,
+    echo,
+    echo_data,
     open_made,
     say,
     say_json,
     say_left_out,
     steps_of,
 )
-from vftcli.cli.progress import echo, echo_data
 from vftcli.signals.option import OUTPUT, WRITE, Option
 
 if TYPE_CHECKING:

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.console import command_line, detail, say, stages
-from vftcli.cli.progress import echo_data
+from vftcli.cli.console import command_line, detail, echo_data, say, stages
 from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import check_known

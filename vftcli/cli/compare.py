@@ -7,8 +7,7 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import AnalysisOptions
-from vftcli.cli.console import LeftOut, say, say_analysis, say_json
-from vftcli.cli.progress import echo, echo_data
+from vftcli.cli.console import LeftOut, echo, echo_data, say, say_analysis, say_json
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import OUTPUT, WRITE, Option
 

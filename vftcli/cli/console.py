@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from vftcli.cli.config import WORDS, effective
-from vftcli.cli.progress import STAGES, echo, echo_data, is_terminal, is_watched
+from vftcli.cli.progress import STAGES, is_terminal, is_watched
 from vftcli.signals.errors import VftError
 from vftcli.signals.packages import check_installed
 from vftcli.signals.parsing import printable
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from vftcli.signals.recording import Recording
     from vftcli.signals.remarks import Remark
 
+echo, echo_data = STAGES.echo, STAGES.echo_data  #: What prints all that a command prints.
 QUIET, USUAL, DETAILS = range(3)  #: How much a command says.
 
 _level: ContextVar[int] = ContextVar("level", default=USUAL)

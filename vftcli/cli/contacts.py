@@ -7,8 +7,16 @@ import typer
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.console import LeftOut, canvas, command_line, say_analysis, say_json, stages
-from vftcli.cli.progress import echo, echo_data
+from vftcli.cli.console import (
+    LeftOut,
+    canvas,
+    command_line,
+    echo,
+    echo_data,
+    say_analysis,
+    say_json,
+    stages,
+)
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.signals.option import OUTPUT, Option
 

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, say, say_json, say_left_out, steps_of
-from vftcli.cli.progress import echo
+from vftcli.cli.console import command_line, echo, say, say_json, say_left_out, steps_of
 from vftcli.readers.reader import ReadChoice
 from vftcli.signals.option import Option, names_at
 

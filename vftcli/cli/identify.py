@@ -10,6 +10,8 @@ from vftcli.cli.analysis import LogOptions
 from vftcli.cli.console import (
     command_line,
     detail,
+    echo,
+    echo_data,
     health_of,
     open_made,
     say,
@@ -17,7 +19,6 @@ from vftcli.cli.console import (
     say_recording,
     say_robots,
 )
-from vftcli.cli.progress import echo, echo_data
 from vftcli.free_motion.choice import FreeChoice
 from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice

@@ -10,8 +10,7 @@ import typer
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
 from vftcli.cli.config import NAME
-from vftcli.cli.console import say, say_json, say_robots
-from vftcli.cli.progress import echo
+from vftcli.cli.console import echo, say, say_json, say_robots
 from vftcli.signals.option import Option
 
 if TYPE_CHECKING:

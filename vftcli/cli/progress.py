@@ -152,4 +152,4 @@ def fitted(text: str, width: int) -> str:
 
 
 STAGES = Stages()  #: The one line that a program has.
-echo, echo_data = STAGES.echo, STAGES.echo_data  #: What prints everything that a command prints.
+echo = STAGES.echo  #: What prints over the line.

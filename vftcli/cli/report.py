@@ -11,6 +11,7 @@ from vftcli.cli.console import (
     LeftOut,
     canvas,
     command_line,
+    echo_data,
     judge_by_jacobian,
     open_made,
     say,
@@ -18,7 +19,6 @@ from vftcli.cli.console import (
     say_written,
     show,
 )
-from vftcli.cli.progress import echo_data
 from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import WRITE, Choice, Option, setting
 

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from vftcli.cli import options as opt
-from vftcli.cli.console import command_line, say, say_json, show, stages
-from vftcli.cli.progress import echo, echo_data
+from vftcli.cli.console import command_line, echo, echo_data, say, say_json, show, stages
 from vftcli.robots.choice import RobotChoice
 from vftcli.signals.option import Choice, Option, setting
 

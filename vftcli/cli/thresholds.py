@@ -5,8 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
-from vftcli.cli.console import say, say_json, say_recording, say_robots
-from vftcli.cli.progress import echo
+from vftcli.cli.console import echo, say, say_json, say_recording, say_robots
 from vftcli.evaluation.reference_choice import FILE, ReferenceChoice
 from vftcli.signals.option import COMPARE, Option
 

@@ -154,8 +154,8 @@ class NamedColumns:
                     f"{', '.join(map(str, indices[:12]))}, with holes. Name them with --columns."
                 )
             if name in TURNED:
-                return Pick(signal=signal, cells=cells, factor=-1.0, remark=RESIDUAL_TURNED)
-            return Pick(signal=signal, cells=cells)
+                return Pick(signal, cells, -1.0, remark=RESIDUAL_TURNED)
+            return Pick(signal, cells)
         return None
 
     def stated(self, item: Item) -> Pick:
@@ -167,11 +167,11 @@ class NamedColumns:
         signal = SIGNALS.get(item.signal, item.signal)
         found = self.find(signal)
         if found is None and signal == "wrench" and (own := self.groups.get("actual_tcp_force")):
-            found = Pick(signal=signal, cells=own.cells)  # UR's
+            found = Pick(signal, own.cells)  # UR's
         if found is None:
             raise missing_column(self.table, item.signal, item.signal)
         pick = pick_of(item, found.cells)
-        return replace(pick, factor=pick.factor * found.factor)
+        return pick._replace(factor=pick.factor * found.factor)
 
     def others(self, stated: Sequence[Pick]) -> Iterator[Pick]:
         """The signals beside those that a text names.
@@ -197,7 +197,7 @@ class NamedColumns:
             if len(fitting) == 1:
                 column = self.table.names[fitting[0].cells[0].column]
                 remark = fact("signal-by-name", signal=fitting[0].signal, column=column)
-                yield replace(fitting[0], remark=remark)
+                yield fitting[0]._replace(remark=remark)
 
 
 def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
@@ -219,10 +219,10 @@ def picks_by_alias(table: Table, stated: Sequence[Item]) -> tuple[Picks, Names]:
         efforts = [groups[name].cells for name in ("effort", "eff") if name in groups]
         for k, pick in enumerate(signals):
             if pick.signal == "torque" and pick.cells in efforts:
-                signals[k] = replace(pick, signal="current", remark=fact("effort-is-current"))
+                signals[k] = pick._replace(signal="current", remark=fact("effort-is-current"))
     origin = table.names.index(OWN_STAMPS) if table.names.count(OWN_STAMPS) == 1 else None
     origin = None if origin in table.lists else origin
-    picks = Picks(signals=tuple(signals), clock=clock, rate=rate, origin=origin)
+    picks = Picks(tuple(signals), clock, rate, origin=origin)
     return require_positions(table, picks), names
 
 
@@ -256,10 +256,10 @@ def wrench_pick(table: Table) -> Pick | None:
     for text in WRENCHES:
         wanted = text.split()
         if all(names.count(name) == 1 for name in wanted):
-            return Pick(signal="wrench", cells=tuple(Cell(names.index(n)) for n in wanted))
+            return Pick("wrench", tuple(Cell(names.index(n)) for n in wanted))
     rows = [c for c, n in enumerate(table.names) if n.lower() == "wrench"]
     if len(rows) == 1 and table.lists.get(rows[0]) == 6:
-        return Pick(signal="wrench", cells=cells_of(table, rows[0]))
+        return Pick("wrench", cells_of(table, rows[0]))
     return None
 
 
@@ -292,7 +292,7 @@ def clock_pick(table: Table) -> Pick | None:
             f"{table.path}: {clocks} could each be the clock. Say which with --columns, as in "
             f"t={'|'.join(table.names[c] for c in found[0])},q=…"
         )
-    return Pick(signal="t", cells=tuple(table_clock(table, c) for c in found[0])) if found else None
+    return Pick("t", tuple(table_clock(table, c) for c in found[0])) if found else None
 
 
 def table_clock(table: Table, column: int) -> Cell:

@@ -74,8 +74,7 @@ class Item:
     rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
 
 
-@dataclass(frozen=True, kw_only=True)
-class ColumnSpec:
+class ColumnSpec(NamedTuple):
     """A parsed --columns text: the items, and whether they name columns or count them.
 
     `segment` is the number of the recording that is wanted of a file that holds several.

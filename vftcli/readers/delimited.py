@@ -99,7 +99,17 @@ class TextTable(Table):
 
     def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
-        for found in self._parsed(self._kinds(columns, clock)):
+        kinds = dict.fromkeys(columns, "Float64")
+        if clock is not None:
+            row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
+            cells = self.cells(row)
+            text = cells[clock] if clock < len(cells) else ""
+            # float64 holds nanoseconds since 1970 only to 256 ns.
+            if re.fullmatch(r"\d{16,19}", text):
+                kinds[clock] = "Int64"
+            elif re.match(r"\d{4}-\d\d-\d\d", text):
+                kinds[clock] = "String"
+        for found in self._parsed(kinds):
             yield {c: _numbers(found[c], self.file.path) for c in columns}
 
     def words(self, column: int) -> Names:
@@ -111,21 +121,8 @@ class TextTable(Table):
             raise self._diagnosed({})
         return tuple(words)
 
-    def _kinds(self, columns: Sequence[int], clock: int | None) -> dict[int, str]:
-        """Column → its polars type; a clock's long whole numbers must not pass through float64."""
-        kinds = dict.fromkeys(columns, "Float64")
-        if clock is not None:
-            row = self.sample[1] if self.names and len(self.sample) > 1 else self.sample[0]
-            cells = self.cells(row)
-            text = cells[clock] if clock < len(cells) else ""
-            # float64 holds nanoseconds since 1970 only to 256 ns.
-            if re.fullmatch(r"\d{16,19}", text):
-                kinds[clock] = "Int64"
-            elif re.match(r"\d{4}-\d\d-\d\d", text):
-                kinds[clock] = "String"
-        return kinds
-
     def _parsed(self, kinds: Mapping[int, str]) -> Iterator[dict[int, Series]]:
+        """The columns of each piece of the text; `kinds` has the polars type of each."""
         for text in self._pieces():
             # Most texts parse as they are; mending copies them, so it waits for a failure.
             found = self._parse(text, kinds) or self._parse(self._mended(text), kinds)

@@ -4,11 +4,12 @@ import re
 import shlex
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,8 +31,7 @@ from vftcli.signals.recording import JOINT_SIGNALS, Recording
 from vftcli.signals.remarks import warning
 
 
-@dataclass(frozen=True, kw_only=True)
-class LogFormat:
+class LogFormat(NamedTuple):
     """One log format."""
 
     name: str  #: Name for ``log.format``.

@@ -1,6 +1,5 @@
 """Reference files: a table with a clock and one external torque a joint, but no positions."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,6 @@ from vftcli.readers.reader import ReadChoice
 from vftcli.readers.table import (
     JACOBIAN,
     Cell,
-    Cells,
     JacobianError,
     Pick,
     Picks,
@@ -92,16 +90,15 @@ def _found(table: Table) -> Picks:
             f"{table.path}: the reference torques cannot be told: {there}. Name them with "
             "--reference-columns, as in t=time,tau_ext=true_tau_{i}."
         )
-    picks = [Pick(signal=TORQUE, cells=columns.cells(name)) for name in groups]
+    picks = [Pick(TORQUE, columns.cells(name)) for name in groups]
     picks += [] if wrench is None else [wrench]
-    return Picks(signals=tuple(picks), clock=columns.find("t"))
+    return Picks(tuple(picks), columns.find("t"))
 
 
 UNIT = 1e-3  #: How far from 1 the axis of a joint may be in the Jacobian.
 
 
-@dataclass(frozen=True, kw_only=True)
-class JacobianLog:
+class JacobianLog(NamedTuple):
     """What such a log holds; the Jacobian's axes and point are the log's own."""
 
     name: str  #: What it is called in tables.
@@ -119,14 +116,25 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
     """Read the log in which positions were looked for in vain."""
     table = found.table
     signals = {p.signal: p for p in found.picks.signals if p.signal in {"tau_ext", "wrench"}}
-    cells, n = _jacobian_cells(found)
+    places = {
+        (int(match[2]), int(match[3])): Cell(column)
+        for column, name in enumerate(table.names)
+        if (match := JACOBIAN.fullmatch(name))
+    }
+    rows, columns = (sorted({place[k] for place in places}) for k in (0, 1))
+    n = len(columns)
+    if len(rows) != 6 or n < 6 or len(places) != 6 * n:
+        raise LogError(
+            f"{table.path}: the Jacobian has {len(rows)} rows, {n} columns and "
+            f"{len(places)} cells; a wrench needs 6 rows and a column for each of 6 joints or more."
+        )
     if "tau_ext" not in signals or len(signals["tau_ext"].cells) != n:
         raise LogError(
             f"{path}: a Jacobian of {n} joints and no external torques of {n} joints beside it. "
             "Name their columns with --columns, as in tau_ext=tau_ext_{i}."
         )
-    signals["jacobian"] = Pick(signal="jacobian", cells=cells)
-    picks = Picks(signals=tuple(signals.values()), clock=found.picks.clock, rate=found.picks.rate)
+    signals["jacobian"] = Pick("jacobian", tuple(places[r, c] for r in rows for c in columns))
+    picks = Picks(tuple(signals.values()), found.picks.clock, found.picks.rate)
     raw = without_repeats(measured(load_signals(table, picks, ReadChoice()), path), path)
     t = seconds(raw)
     start, stop = choice.interval or (-np.inf, np.inf)
@@ -145,22 +153,6 @@ def jacobian_log(path: Path, found: JacobianError, choice: ReadChoice, name: str
         wrench=None if wrench is None else wrench[inside],
         remarks=raw.remarks,
     )
-
-
-def _jacobian_cells(found: JacobianError) -> tuple[Cells, int]:
-    names = found.table.names
-    places = {
-        (int(match[2]), int(match[3])): Cell(column)
-        for column, name in enumerate(names)
-        if (match := JACOBIAN.fullmatch(name))
-    }
-    rows, columns = (sorted({place[k] for place in places}) for k in (0, 1))
-    if len(rows) != 6 or len(columns) < 6 or len(places) != 6 * len(columns):
-        raise LogError(
-            f"{found.table.path}: the Jacobian has {len(rows)} rows, {len(columns)} columns and "
-            f"{len(places)} cells; a wrench needs 6 rows and a column for each of 6 joints or more."
-        )
-    return tuple(places[r, c] for r in rows for c in columns), len(columns)
 
 
 def velocity_first(jacobian: Array, path: Path) -> Array:

@@ -3,7 +3,6 @@
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import islice
 from mmap import ACCESS_READ, mmap
 from pathlib import Path
@@ -67,8 +66,7 @@ class Cell(NamedTuple):
 Cells = tuple[Cell, ...]  #: The cells of a signal.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Pick:
+class Pick(NamedTuple):
     """The cells that make up one signal."""
 
     signal: str  #: Field of Recording, or "t".
@@ -79,8 +77,7 @@ class Pick:
     remark: Remark | None = None  #: What was turned, if anything was.
 
 
-@dataclass(frozen=True, kw_only=True)
-class Picks:
+class Picks(NamedTuple):
     """All signals of a table and its clock, or its rate [Hz] where it has no clock.
 
     `constants` are columns of which the last value counts; `origin` is the column of the log's own
@@ -121,7 +118,7 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
     clock = next((pick for pick in found if pick.signal == "t"), None)
     rate = next((item.rate for item in spec.items if item.rate is not None), None)
-    return Picks(signals=signals, clock=clock, rate=rate)
+    return Picks(signals, clock, rate)
 
 
 def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:

@@ -87,12 +87,12 @@ def read_layout(table: Table, layout: LogFormat, request: ReadChoice) -> RawLog:
             raise LogError(
                 f"{table.path}: no {item.pattern} among its {table.width} columns. {layout.remedy}"
             )
-    picks = picks_of(table, replace(spec, items=tuple(items)) if spec.named else spec)
+    picks = picks_of(table, spec._replace(items=tuple(items)) if spec.named else spec)
     # Of the vendors' signals libfranka's residual alone is turned.
-    signals = [replace(p, remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
+    signals = [p._replace(remark=RESIDUAL_TURNED if p.remark else None) for p in picks.signals]
     payload = layout.payload.split()
     constants = tuple(map(names.index, payload)) if set(payload) <= set(names) else ()
-    picks = replace(picks, signals=tuple(signals), constants=constants)
+    picks = picks._replace(signals=tuple(signals), constants=constants)
     raw = load_signals(table, picks, request, clock_name=layout.clock)
     if layout is not UR:
         return raw

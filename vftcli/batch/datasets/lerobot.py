@@ -84,7 +84,21 @@ class LeRobotDataset:
         pa, pq = needed("pyarrow", DATASET), needed("pyarrow.parquet", DATASET)
 
         path, source, numbers = self._opened(file)
-        whole = whole_columns(path, numbers, source.metadata.num_rows, columns, forces)
+        # Every column over all rows, whichever episode each row is of. (rows, k) each
+        rows, done = source.metadata.num_rows, 0
+        whole = [np.zeros((rows, column.width), np.float32) for column in columns]
+        for number, own in forces.items():
+            place = np.arange(rows) if numbers is None else np.flatnonzero(numbers == number)
+            done += len(place)
+            for column, values in zip(columns, whole, strict=True):
+                if len(own[column.name]) != len(place):
+                    raise LogError(
+                        f"{path}: episode {number} has {len(place)} rows, {len(own[column.name])} "
+                        "were read; it was edited in between"
+                    )
+                values[place] = own[column.name]
+        if done != rows:
+            raise LogError(f"{path}: has rows of episodes that the table of episodes does not tell")
         added = [pa.field(PREFIX + c.name, kind_of(c.width)) for c in columns]
         told = with_features(source.schema_arrow.metadata or {}, columns)
         schema = pa.schema([*source.schema_arrow, *added], metadata=told)
@@ -93,9 +107,9 @@ class LeRobotDataset:
             for group in range(source.num_row_groups):
                 with guarded(path):
                     table = source.read_row_group(group)
-                rows = slice(first, first + table.num_rows)
-                first = rows.stop
-                arrays = [*table.columns, *(as_column(each[rows]) for each in whole)]
+                part = slice(first, first + table.num_rows)
+                first = part.stop
+                arrays = [*table.columns, *(as_column(each[part]) for each in whole)]
                 writer.write_table(pa.table(arrays, schema=schema), row_group_size=len(table) or 1)
 
     def finish(self, columns: ForceColumns, statistics: OfEpisodes, copy: Path) -> None:
@@ -199,31 +213,6 @@ def as_column(values: Any) -> Any:  # noqa: ANN401 - float32 → pyarrow
     flat = pa.array(np.ascontiguousarray(values).ravel())
     width = values.shape[1]
     return flat if width == 1 else pa.FixedSizeListArray.from_arrays(flat, type=kind_of(width))
-
-
-def whole_columns(
-    path: Path,
-    numbers: Any,  # noqa: ANN401 - one a row, or None
-    rows: int,
-    columns: ForceColumns,
-    forces: Forces,
-) -> list[Any]:
-    """Every column over all rows of a file, whichever episode each row is of. (rows, k) each"""
-    whole = [np.zeros((rows, column.width), np.float32) for column in columns]
-    done = 0
-    for number, own in forces.items():
-        place = np.arange(rows) if numbers is None else np.flatnonzero(numbers == number)
-        done += len(place)
-        for column, values in zip(columns, whole, strict=True):
-            if len(own[column.name]) != len(place):
-                raise LogError(
-                    f"{path}: episode {number} has {len(place)} rows, {len(own[column.name])} were "
-                    "read; it was edited in between"
-                )
-            values[place] = own[column.name]
-    if done != rows:
-        raise LogError(f"{path}: has rows of episodes that the table of episodes does not tell")
-    return whole
 
 
 def named_features(folder: Path, info: dict[str, Any]) -> dict[str, Any]:
