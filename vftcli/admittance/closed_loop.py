@@ -195,7 +195,7 @@ class Loop:
 
     def solve(self, x: Array) -> tuple[Array, bool]:
         """Joint positions for a deviation (6,) [m, rad], inside the joints' limits and speeds."""
-        if not np.all(np.isfinite(x)):
+        if not np.isfinite(x).all():
             return self.q_command, False
         goal = exp_matrix(x[3:]) @ self.rotation
         guess = 2.0 * self.q_command - self.q_before
@@ -246,8 +246,8 @@ def run_closed_loop(
             log.append(loop.act(zero))
             reference = loop.reference
             forward = arm.servo.feed_forward(reference)[0]
-            x, fastest = loop.law.x[0], np.max(np.abs(arm.v))
-            near = np.all(np.isfinite(x)) and np.linalg.norm(x[:3]) <= FARTHEST
+            x, fastest = loop.law.x[0], np.abs(arm.v).max()
+            near = np.isfinite(x).all() and np.linalg.norm(x[:3]) <= FARTHEST
             if not near or fastest > 50.0:  # the arm has run away
                 break
             if progress is not None:
@@ -367,4 +367,4 @@ def first_true(flags: Mask, start: int | None) -> int | None:
     """First row from `start` on that is set, or None."""
     if start is None or not flags[start:].any():
         return None
-    return start + int(np.argmax(flags[start:]))
+    return start + int(flags[start:].argmax())

@@ -41,19 +41,19 @@ class FlangeSolver:
 
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
-        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, dtype=np.float64))
+        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, dtype=float))
         place = self.data.oMf[self.frame]
         return np.array(place.rotation), np.array(place.translation)
 
     def check_start(self, q: Array) -> Array:
         """Return a start pose."""
-        q = np.asarray(q, dtype=np.float64)
+        q = np.asarray(q, dtype=float)
         if q.shape != (self.robot.joints,):
             raise ParameterError(
                 f"the start pose has {q.size} joints; {self.robot.name} has {self.robot.joints}"
             )
         if np.any(wrong := ~((q >= self.lower) & (q <= self.upper))):
-            j = int(np.argmax(wrong))
+            j = int(wrong.argmax())
             raise ParameterError(
                 f"the start pose is outside the joint limits of {self.robot.name}: joint {j + 1} "
                 f"is at {q[j]:.4g} rad and may be {self.lower[j]:.4g} to {self.upper[j]:.4g} rad"
@@ -126,7 +126,7 @@ def try_pose(
     solver: FlangeSolver, rotation: Array, point: Array, guess: Array, last: Array
 ) -> tuple[Array, bool]:
     """Joints at a pose from a guess, and if that fails or leaps, from the joints before it."""
-    if not np.all(np.isfinite(point)):
+    if not np.isfinite(point).all():
         return last, False
     found, good = solver.reach(rotation, point, guess)
     if good and np.abs(found - last).max() <= LARGEST_STEP:
@@ -138,5 +138,5 @@ def largest_speed(robot: Robot, q: Array, reached: Mask, period: float) -> Array
     """Largest joint speed between reached samples as a share of the limit. (N,)"""
     share = np.abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
     both = (reached[1:] & reached[:-1])[:, :, None] & np.isfinite(share)
-    largest: Array = np.where(both, share, -1.0).max(axis=(0, 2), initial=-1.0)
+    largest = np.where(both, share, -1.0).max(axis=(0, 2), initial=-1.0)
     return np.where(largest >= 0.0, largest, np.nan)

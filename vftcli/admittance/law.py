@@ -93,8 +93,8 @@ class Admittance:
             object.__setattr__(self, name, frozen(array))
             zero, endless = name in MAY_BE_ZERO, name in MAY_BE_ENDLESS
             fits = ((array > 0.0) | (zero & (array == 0.0))) & (np.isfinite(array) | endless)
-            if not np.all(fits):
-                k = int(np.argmin(fits))
+            if not fits.all():
+                k = int(fits.argmin())
                 raise ParameterError(
                     f"admittance.{name} of axis {AXES[k]} is {array[k]:g}; it must be "
                     f"{'zero or ' * zero}positive"
@@ -154,9 +154,9 @@ def from_table(
     where = "its [admittance]" if table else "an [admittance] section, which it lacks,"
     for name, found in values.items():
         absent = np.isnan(found)
-        if name != "xi" and np.any(absent):
+        if name != "xi" and absent.any():
             listed = ", ".join(np.array(AXES)[absent])
-            section = next(group for group, axes in GROUPS.items() if np.all(absent[list(axes)]))
+            section = next(group for group, axes in GROUPS.items() if absent[list(axes)].all())
             raise ParameterError(
                 f"{robot}: no admittance {name} for {listed}; give it in {where} or "
                 f"with --set {section}.{name}=VALUE"
@@ -170,7 +170,7 @@ def from_table(
     NUMBER.check("admittance.period", plain["period"])
     words = {name: plain[name] for name in ("threshold_mode", "source") if name in plain}
     xi = values.pop("xi")
-    own = None if np.all(np.isnan(xi)) else xi
+    own = None if np.isnan(xi).all() else xi
     return Admittance(**values, xi=own, period=float(plain["period"]), **words)
 
 

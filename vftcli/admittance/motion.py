@@ -104,7 +104,7 @@ class Recursion:
         self.v = np.array(np.broadcast_to(np.zeros(6) if v is None else v, shape))
         self.clipped = np.zeros(shape, dtype=bool)
         self.turn = exp_quaternion(self.x[:, 3:])
-        self.turns = bool(np.any(self.x[:, 3:]) or np.any(self.v[:, 3:]))
+        self.turns = bool(self.x[:, 3:].any() or self.v[:, 3:].any())
 
     def step(self, force: Array, dragged: Mask) -> None:
         """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
@@ -146,7 +146,7 @@ def run(
         for k in range(len(force)):
             state.step(force[k], dragged[k])
             xs[k + 1], vs[k + 1], clips[k + 1] = state.x, state.v, state.clipped
-    t = np.arange(len(xs), dtype=np.float64) * state.period
+    t = np.arange(len(xs), dtype=float) * state.period
     return AxisMotion(t=t, x=xs, v=vs, clipped=clips)
 
 
@@ -170,7 +170,7 @@ class Drag(NamedTuple):
 
 def drags_of(phases: Phases, period: float) -> tuple[Drag, ...]:
     """The drags of every axis along a record of T forces (rows 0 … T of the motion)."""
-    found, t = list[Drag](), np.arange(len(phases.dragged), dtype=np.float64) * period
+    found, t = list[Drag](), np.arange(len(phases.dragged), dtype=float) * period
     for axis, dragged in enumerate(phases.dragged.T):
         # From the last dragged sample of one to the first of the next; stamps are rounded.
         spans = intervals(t, dragged, gap=PAUSE + period - 1e-9)
@@ -215,7 +215,7 @@ def row_of(
     axis, t = drag.axis, motion.t
     x, v = motion.x[:, n, axis], motion.v[:, n, axis]
     sizes = np.nan_to_num(np.abs(x[drag.begin : drag.end]), nan=np.inf)
-    top = drag.begin + int(np.argmax(sizes))
+    top = drag.begin + int(sizes.argmax())
     returns = {name: return_time(t, x, drag, share) for name, share in SHARES.items()}
     back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
     # Row k + 1 is what the force of row k made of row k.
@@ -264,7 +264,7 @@ def overshoot(x: Array, drag: Drag) -> float | None:
 def recovery_of(x: Array, drag: Drag) -> Array:
     """Deviations from a drag's release on; none where they escape or the release is at zero."""
     after = x[drag.release : drag.end]
-    return after if np.all(np.isfinite(after)) and after[0] != 0.0 else after[:0]
+    return after if np.isfinite(after).all() and after[0] != 0.0 else after[:0]
 
 
 def finite(value: float) -> float | None:

@@ -147,7 +147,7 @@ def replay(
     start = solver.check_start(q[0])
     split = phases(force, parameters)
     motion = run(controllers, split.force, split.dragged)
-    unknown = int(np.count_nonzero(~np.all(np.isfinite(wrench.known), axis=1)))
+    unknown = int(np.count_nonzero(~np.isfinite(wrench.known).all(axis=1)))
     missing = (caution("force-unknown", samples=unknown),) if unknown else ()
     return Replay(
         robot=robot,
@@ -176,7 +176,7 @@ def replay_release(
 
     It is watched for `duration` [s], None for as long as it takes; else as `replay`.
     """
-    if not np.any(x):
+    if not x.any():
         raise ParameterError(
             "a release needs a deviation, as --release x=0.3 [m] or --release rz=0.5 [rad]"
         )
@@ -220,7 +220,7 @@ def settling(controllers: Sequence[Controller], x: Array) -> float:
         omega = controller.alpha * np.sqrt(p.stiffness / p.mass)
         xi = np.maximum(controller.xi, 1e-3)
         rate = omega * np.where(xi > 1.0, xi - np.sqrt(np.maximum(xi**2 - 1.0, 0.0)), xi)
-        slowest = min(slowest, float(np.min(rate[x != 0.0])))
+        slowest = min(slowest, float(rate[x != 0.0].min()))
     return float(min(max(6.0 / slowest, 1.0), LONGEST))
 
 
@@ -229,7 +229,7 @@ def on_control_clock(t: Array, values: Sequence[Array], period: float) -> tuple[
     count = int(np.floor((t[-1] - t[0]) / period + 1e-6)) + 1
     clock = t[0] + np.arange(count) * period
     # Half a microsecond of slack: a log's stamps are printed, and equal clocks must stay in step.
-    newest = np.clip(np.searchsorted(t, clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
+    newest = np.clip(t.searchsorted(clock + 5e-7 + 1e-3 * period, side="right") - 1, 0, None)
     return clock, [column[newest] for column in values]
 
 
@@ -243,7 +243,7 @@ def deviation_of(solver: FlangeSolver, start: Array, q: Array) -> Array:
 
 def count_rises(W: Array, recovering: Mask) -> int:
     """Steps in which W (T+1, 6) rises while its axes recover through the whole step (T, 6)."""
-    together = np.all(recovering[:, 3:], axis=1, keepdims=True)
+    together = recovering[:, 3:].all(axis=1, keepdims=True)
     columns = np.column_stack([W[:, :3], W[:, 3:].sum(axis=1)])
     inside = np.column_stack([recovering[:, :3], together])
     rises = 0
@@ -259,10 +259,10 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
     if (logged := found.logged) is None:
         return
     if not found.drags and len(found.wrench):
-        largest = np.max(np.abs(np.nan_to_num(found.wrench)), axis=0)
+        largest = np.abs(np.nan_to_num(found.wrench)).max(axis=0)
         threshold = found.parameters.threshold
         share = largest / np.maximum(threshold, 1e-12)
-        k = int(np.argmax(share))
+        k = int(share.argmax())
         least = float(threshold[k])
         yield caution("no-drag", axis=AXES[k], share=float(share[k]), threshold=least)
     longest: dict[str, int] = {}
@@ -273,7 +273,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
             continue
         apart = np.linalg.norm(part[long:] - part[:-long], axis=1)
         # Round trips bring a moving arm back to where it was, so one coincidence is not rest.
-        held = np.max(np.linalg.norm(part - part.mean(axis=0), axis=1))
+        held = np.linalg.norm(part - part.mean(axis=0), axis=1).max()
         if np.any(apart < near) and (held < near or np.median(apart) < near):
             axis = AXES[drag.axis]
             longest[axis] = max(longest.get(axis, 0), len(part))
@@ -290,12 +290,12 @@ def trouble(found: Replay) -> Iterator[Remark]:
     for n, controller in enumerate(found.controllers):
         where = Where(controller.name)
         if motion.escaped[n]:
-            k = int(np.argmin(np.all(np.isfinite(motion.x[:, n]), axis=1)))
+            k = int(np.isfinite(motion.x[:, n]).all(axis=1).argmin())
             yield warning("motion-escaped", where, time_s=float(motion.t[k]))
-        if acted := int(np.count_nonzero(np.any(motion.clipped[:, n], axis=1))):
+        if acted := int(np.count_nonzero(motion.clipped[:, n].any(axis=1))):
             yield fact("speed-limit-acted", where, periods=acted)
         if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = float(motion.t[int(np.argmin(path.reached[:, n]))])
+            first = float(motion.t[int(path.reached[:, n].argmin())])
             rows = {"lost": lost, "poses": len(motion.t)}
             yield caution("poses-out-of-reach", where, **rows, first_s=first)
             way = np.linalg.norm(motion.x[:, n, :3], axis=1)

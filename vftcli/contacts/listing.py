@@ -194,7 +194,7 @@ def measured_rows(free: FreeStatistics, measurement: ContactMeasurement) -> list
 def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
     """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
-    first, last = np.searchsorted(run.t, [t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
+    first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
     speed = np.abs(run.dq[first:last])
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
@@ -218,7 +218,7 @@ def fine_rows(
     blocks = disturbance_blocks(fine.log.terms, fine.log.q, seconds)
     edges = found.log.blocks.t - 0.5 * found.log.blocks.length
     edges = np.append(edges, edges[-1] + found.log.blocks.length[-1])
-    spans = [(int(a), int(b)) for a, b in np.searchsorted(blocks.t, edges[np.array(found.runs)])]
+    spans = [(int(a), int(b)) for a, b in blocks.t.searchsorted(edges[np.array(found.runs)])]
     others = [span for k, span in enumerate(spans) if k not in brief]
     process = error_process(fine.noise, blocks).hiding(covered(others, len(blocks.t), 1))
     some = found.kept(brief)._replace(
@@ -283,7 +283,7 @@ def without_list(run: Run) -> ContactList:
     unknown = np.full(run.robot.joints, np.nan)
     torque = np.abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
-    k, j = np.unravel_index(np.argmax(torque), torque.shape)
+    k, j = np.unravel_index(torque.argmax(), torque.shape)
     model = ContactModel(
         prior=None, noise_sd=unknown, error_sd=unknown, error_time=unknown, block=np.nan
     )

@@ -172,7 +172,7 @@ class ContactMeasurement:
         """Where a contact is."""
         run, blocks = self.found.runs[number], self.log.blocks
         size = self.wrenches[number].within(run).size
-        peak = run[0] + int(np.argmax(size))
+        peak = run[0] + int(size.argmax())
         core = np.arange(*run)[size >= CORE * size.max()]
         core = core[np.abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
         core = core[blocks.known[core]] if blocks.known[core].any() else core
@@ -194,7 +194,7 @@ class ContactMeasurement:
         """One row of the list."""
         run, blocks = self.found.runs[number], self.log.blocks
         inside = course.within(run)
-        k = int(np.argmax(inside.size))
+        k = int(inside.size.argmax())
         peak = run[0] + k
         values, factor = inside.values[k], WIDENED * self.test.widening
         # What the drives' constants and the blocks' length may hide, as in the wrench of `best`.
@@ -261,7 +261,7 @@ class ContactMeasurement:
             part = names[place.link]
             best[part] = max(best.get(part, -np.inf), float(nats))
         fitting = location.parts
-        where: ArmPart = fitting[0] if len(fitting) == 1 else "cannot tell"
+        where = fitting[0] if len(fitting) == 1 else "cannot tell"
         named = where if where in best else max(best, key=lambda part: best[part])
         return where, named, best[named] - max(v for part, v in best.items() if part != named)
 
@@ -274,7 +274,7 @@ def quiet_error(d: Array, process: ErrorProcess, hidden: Mask) -> tuple[Array, A
 
 def force_course(t: Array, force: Array, covariance: Array) -> ForceCourse:
     """|F| over a contact with its band along the force (K, 3) [N], of covariance (K, 3, 3)."""
-    size: Array = np.linalg.norm(force, axis=1)
+    size = np.linalg.norm(force, axis=1)
     u = force / np.maximum(size, 1e-12)[:, None]
     variance = np.einsum("ki,kij,kj->k", u, covariance, u)
     return ForceCourse(t, size, NORMAL * np.sqrt(variance))

@@ -116,7 +116,7 @@ def search(run: Run, noise: TorqueNoise, level: Array, seconds: float) -> Candid
     for start, stop in runs_of(beyond_threshold(run, level)):
         # The observer lags by 1/gain.
         span = np.array([run.t[start], run.t[stop - 1]]) - 1.0 / GAIN
-        first, last = (int(k) for k in np.searchsorted(blocks.t, span))
+        first, last = (int(k) for k in blocks.t.searchsorted(span))
         last = min(max(last, first + 1), len(blocks.t))
         if first < last:
             beyond.append((first, last))
@@ -188,7 +188,7 @@ def two_state_odds(
     at = np.minimum(np.add.outer(begins, np.arange(length)), len(step) - 1)
     inputs = []
     for pair in zip(ahead, turned, strict=True):
-        each = np.repeat(np.stack([series[at] for series in pair]), many, axis=1)
+        each = np.stack([series[at] for series in pair]).repeat(many, axis=1)
         inputs.append(each.reshape(-1, *each.shape[2:]).swapaxes(0, 1))
     table = filtered_odds(*inputs).reshape(length, 2, len(begins), many)
     joined = np.concatenate([table[(warm if k else 0) :, :, i] for i, k in enumerate(begins)])
@@ -288,7 +288,7 @@ def imm_update(state: ImmState, d: Array, white: Array, often: tuple[Array, Arra
         np.stack([state.bb[0] * (1.0 - K0), b1 - K1 * cross]),
         state.bx - K1 * own,
         state.xx - Kx * own,
-        np.clip(odds, -MOST_ODDS, MOST_ODDS),
+        odds.clip(-MOST_ODDS, MOST_ODDS),
     )
 
 
@@ -319,10 +319,10 @@ def split_at_turns(t: Array, force: Array, torque: Array, piece: BlockSpan) -> l
     at, there, load = t[span], force[span], torque[span]
     size = np.linalg.norm(there, axis=1)
     inner = np.flatnonzero((at - at[0] >= APART) & (at[-1] - at >= APART))
-    for k in inner[np.argsort(size[inner])].tolist():
+    for k in inner[size[inner].argsort()].tolist():
         if not is_valley((size, load), k, k + 1, HALF):
             continue
-        i, j = int(np.argmax(size[:k])), k + int(np.argmax(size[k:]))
+        i, j = int(size[:k].argmax()), k + int(size[k:].argmax())
         if there[i] @ there[j] < TURNED * size[i] * size[j]:
             ends = (piece[0], piece[0] + k), (piece[0] + k, piece[1])
             return [part for end in ends for part in split_at_turns(t, force, torque, end)]

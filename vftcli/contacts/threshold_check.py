@@ -48,13 +48,13 @@ def compared_signals(run: Run) -> ComparedSignals:
     # The robot's own estimate asks for no model, which else would check.
     check_joints(run.recording, run.robot)
     recording, vendor = run.recording, run.recording.tau_ext
-    of_vendor = vendor is not None and bool(np.any(vendor))
+    of_vendor = vendor is not None and bool(vendor.any())
     if vendor is not None and of_vendor:
         torque = ExternalTorque(name="tau_ext", t=recording.t, tau=vendor)
     else:
         torque = MomentumObserver(gain=GAIN).estimate(run.terms)
     stated, own = recording.wrench_frame, recording.wrench
-    logged = own is not None and bool(np.any(own)) and stated is not None
+    logged = own is not None and bool(own.any()) and stated is not None
     if own is not None and stated is not None and logged and stated.axes != "sensor":
         wrench, frame = own, f"{stated.axes} axes at {POINTS.get(stated.point, stated.point)}"
     elif recording.joints >= 6:

@@ -68,7 +68,7 @@ class Tail(NamedTuple):
     @property
     def excess(self) -> float:
         """e: mean distance from `start` of the maxima beyond it. [the signal's unit]"""
-        return float(np.mean(self.maxima[: self.size])) - self.start
+        return float(self.maxima[: self.size].mean()) - self.start
 
     @property
     def hours(self) -> float:
@@ -100,7 +100,7 @@ class Tail(NamedTuple):
                 f"{most:.4g} can be told from maxima of {BLOCK:g} s"
             )
         ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
-        places = np.clip(np.rint(ranks).astype(np.intp), 1, len(self.maxima)) - 1
+        places = np.rint(ranks).astype(np.intp).clip(1, len(self.maxima)) - 1
         value, low, high = (float(x) for x in self.maxima[places])
         return value, (low, high)
 
@@ -360,7 +360,7 @@ def remarks_on(free: Sequence[ComparedSignals], joints: int, rate: float) -> lis
             remarks.append(caution("free-log-too-short", where, duration_s=duration))
         if not signals.frame:
             continue
-        if (share := float(np.mean(np.isfinite(signals.wrench[:, 0])))) < SELDOM:
+        if (share := float(np.isfinite(signals.wrench[:, 0]).mean())) < SELDOM:
             remarks.append(caution("wrench-seldom-known", where, share=share))
     return remarks
 

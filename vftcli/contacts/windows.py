@@ -111,7 +111,7 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     count with a prediction of zero, which is what tells the place.
     """
     poses, n = link_poses(chain, q[None]), chain.joints
-    links = np.repeat(np.arange(FIRST_LINK, n + 1), POINTS)
+    links = np.arange(FIRST_LINK, n + 1).repeat(POINTS)
     along = np.tile(np.arange(1, POINTS + 1) / POINTS, n + 1 - FIRST_LINK)
     points = points_on(poses, links, along[:, None])[0]
     axes, origins = poses.rotation[0, :-1, :, 2], poses.translation[0, :-1]
@@ -127,7 +127,7 @@ def point_fits(chain: Chain, q: Array, torque: Array, sd: Array) -> list[PointFi
     u = forces / sizes[:, None]
     bands = 1.96 * np.sqrt(np.einsum("pi,pij,pj->p", u, covariance, u))
     least = float(score.min()) + ALIKE
-    order = np.argsort(score, kind="stable")[: np.count_nonzero(score <= least)]
+    order = score.argsort(kind="stable")[: np.count_nonzero(score <= least)]
     columns = (x[order].tolist() for x in (links, along, misfit, score))
     return [PointFit(*each) for each in zip(*columns, forces[order], bands[order], strict=True)]
 
@@ -172,8 +172,8 @@ class WindowWrench(NamedTuple):
 
 def window_of(t: Array, run: BlockSpan, margin: float = MARGIN) -> BlockSpan:
     """The blocks within `margin` of a run of them."""
-    first = int(np.searchsorted(t, t[run[0]] - margin))
-    last = int(np.searchsorted(t, t[run[1] - 1] + margin, side="right"))
+    first = int(t.searchsorted(t[run[0]] - margin))
+    last = int(t.searchsorted(t[run[1] - 1] + margin, side="right"))
     return first, last
 
 
@@ -261,7 +261,7 @@ def learn_prior(
         priors = [prior._replace(time=time) for time in TIMES for _ in runs]
         each = [jacobian] * len(priors)
         lanes = contact_lanes(log, each, [*runs] * len(TIMES), priors, NEAR)
-        best = int(np.argmax(likelihoods(log, lanes).reshape(len(TIMES), -1).sum(axis=1)))
+        best = int(likelihoods(log, lanes).reshape(len(TIMES), -1).sum(axis=1).argmax())
         wrenches = smooth_lanes(log, lanes[best * len(runs) : (best + 1) * len(runs)])
         inside = [wrench.within(run) for wrench, run in zip(wrenches, runs, strict=True)]
         values = np.concatenate([wrench.values for wrench in inside])

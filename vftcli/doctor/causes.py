@@ -168,7 +168,7 @@ def readings(windows: Windows, robot: Robot, ignored: Sequence[int] = ()) -> Ite
         return
     mean, idle = windows.mean(value), list(ignored)
     mean[:, idle] = 0.0
-    if not np.any(mean) or not np.all(np.isfinite(mean)):
+    if not mean.any() or not np.isfinite(mean).all():
         return
     gravity, unit = windows.gravity[:, :, 2], np.ones(mean.shape[1])
     # The rest is relative to the whole torque, mostly gravity.
@@ -237,11 +237,11 @@ def rest_of(case: Case, i: int, j: int, sign: float = 1.0) -> float:
 
 def shifted(case: Case) -> Iterator[Cause]:
     """A constant on one joint's effort."""
-    rests = [np.mean(fit.rest[fit.kept], axis=0) for fit in (case.bare, case.loaded)]
+    rests = [fit.rest[fit.kept].mean(axis=0) for fit in (case.bare, case.loaded)]
     ways = case.windows.ways
     # With little motion to and fro an offset may be stiction.
     moves = (ways.min(axis=0) >= FORTH_AND_BACK) & (ways.sum(axis=0) >= BOTH)
-    tried = np.max(np.abs(rests), axis=0) / case.effort_sizes > OFFSET / 2
+    tried = np.abs(rests).max(axis=0) / case.effort_sizes > OFFSET / 2
     load, friction = case.windows.load, case.windows.friction
     for j in np.flatnonzero(tried & moves).tolist():
         column = np.zeros((*case.given.shape, 1))

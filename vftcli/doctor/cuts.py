@@ -103,7 +103,7 @@ def cut_findings(recording: Recording) -> Iterator[Remark]:
 def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     """Bad samples of a log, rule by rule."""
     dq, step, frozen = recording.require("dq"), recording.median_step, frozen_rows(recording)
-    yield Bad("frozen-rows", np.repeat(frozen[:, None], recording.joints, axis=1), None, MOST)
+    yield Bad("frozen-rows", frozen[:, None].repeat(recording.joints, axis=1), None, MOST)
     yield from position_jumps(recording, frozen)
     fast = FAST * np.nan_to_num(robot.limits.qd_max, nan=2.0)
     yield Bad("isolated-velocity", isolated(dq, fast, step), dq)
@@ -150,7 +150,7 @@ def blows(dq: Array, rows: Mask) -> Mask:
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
         trend = dq[before] - dq[max(before - 2, 0)] + dq[min(behind + 2, len(dq) - 1)] - dq[behind]
         bend = np.abs(dq[behind] - dq[before] - 0.5 * trend)
-        found[start:stop] = np.max(bend) > BLOW
+        found[start:stop] = bend.max() > BLOW
     return found
 
 
@@ -177,7 +177,7 @@ def frozen_rows(recording: Recording) -> Mask:
     first, last = edges_of(same)
     lengths, long = last - first, t[last] - t[first] >= FROZEN
     usual = np.median(lengths[~long]) if not long.all() else 1.0
-    moves = np.max(np.abs(dq[first]), axis=1) > REST
+    moves = np.abs(dq[first]).max(axis=1) > REST
     frozen = long & (lengths >= UNUSUAL * usual) & moves
     return covered(list(zip(first[frozen] + 1, last[frozen] + 1, strict=True)), len(t))
 
@@ -192,8 +192,8 @@ def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     large, noise = np.zeros(len(steps), dtype=bool), np.zeros(recording.joints)
     for j in range(recording.joints):  # all joints of a long log need too much room
         change = np.diff(q[:, j])
-        fastest = np.max(np.abs(dq[:, j])) * GAP_STEPS * usual
-        if np.max(np.abs(change)) + fastest > SLIPPED:
+        fastest = np.abs(dq[:, j]).max() * GAP_STEPS * usual
+        if np.abs(change).max() + fastest > SLIPPED:
             slip = np.abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
             large |= slip > SLIPPED
             noise[j] = FAR / 0.6745 * median(slip)
@@ -201,7 +201,7 @@ def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at, None]
     slips = q[at + 1] - q[at] - mean * dt
     around = np.clip(at[:, None] + np.arange(-1, 2), 0, len(steps) - 1)
-    off = np.max(np.abs(steps[around] - usual), axis=1, keepdims=True)
+    off = np.abs(steps[around] - usual).max(axis=1, keepdims=True)
     slack = 0.5 * np.abs(dq[at + 1] - dq[at]) * dt + np.abs(mean) * np.maximum(off + usual, LATE)
     return at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise)
 
@@ -216,10 +216,10 @@ def without_turns(recording: Recording) -> Recording:
         return recording
     shift = np.zeros(recording.q.shape)
     shift[steps + 1] = TURN * turns * whole
-    first = float(recording.t[steps[np.argmax(whole.any(axis=1))] + 1])
+    first = float(recording.t[steps[whole.any(axis=1).argmax()] + 1])
     remark = fact("turn-unwrapped", on_joints(np.any(whole, axis=0)), at_s=first)
     source = replace(recording.source, remarks=(*recording.source.remarks, remark))
-    return replace(recording, q=recording.q - np.cumsum(shift, axis=0), source=source)
+    return replace(recording, q=recording.q - shift.cumsum(axis=0), source=source)
 
 
 def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
@@ -234,15 +234,15 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     sizes = np.zeros(q.shape)
     for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
         first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1
-        joints, size = jumps[group].any(axis=0), np.max(np.abs(slips[group]), axis=0)
+        joints, size = jumps[group].any(axis=0), np.abs(slips[group]).max(axis=0)
         lasts, speeds = t[last] - t[first], dq[[first, last]]
         over = q[last] - q[first] - speeds.mean(axis=0) * lasts
         slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
         slack += np.abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
-        if last - first > 1 and np.all((np.abs(over) < slack)[joints]):
+        if last - first > 1 and (np.abs(over) < slack)[joints].all():
             span, into = slice(first + 1, last), rows  # the motion continues after a few bad rows
         else:
-            span, into = slice(*np.searchsorted(t, [t[first] - APART, t[last] + APART])), meets
+            span, into = slice(*t.searchsorted([t[first] - APART, t[last] + APART])), meets
         into[span, joints], sizes[span, joints] = True, size[joints]
     yield Bad("position-slip", rows, sizes)
     yield Bad("position-jump", meets, sizes, MOST)
@@ -268,4 +268,4 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     # The drives release and grip again somewhere in the windows beside.
     spans = [(start, start + length) for start in first[free].tolist()]
     off = covered(spans, recording.samples, length)
-    yield Bad("brakes", np.repeat(off[:, None], recording.joints, axis=1), None, MOST)
+    yield Bad("brakes", off[:, None].repeat(recording.joints, axis=1), None, MOST)

@@ -161,9 +161,9 @@ def maker_case(windows: Windows) -> tuple[str, Case | None]:
     """
     log = windows.recording
     target, torque, vendor = log.target_torque, log.torque, log.tau_ext
-    if target is not None and np.any(target):
+    if target is not None and target.any():
         evidence, windows = MAKER, replace(windows, motion=0.0 * windows.motion)
-    elif torque is not None and vendor is not None and np.any(vendor):
+    elif torque is not None and vendor is not None and vendor.any():
         evidence, target = RESIDUAL, torque + vendor
     else:
         return MEASURED, None
@@ -271,7 +271,7 @@ def of_unknown_arm(recording: Recording, ignored: Sequence[int]) -> ArmFindings:
         return ArmFindings(tuple(explained(robot, diagnosis, fits)), fits)
     if fits[0].fits:
         return ArmFindings(robots=fits)
-    still = float(np.max(np.ptp(recording.q, axis=0))) < 0.05
+    still = float(np.ptp(recording.q, axis=0).max()) < 0.05
     code = "no-robot-fits-at-rest" if still else "no-robot-fits-any"
     # Without an arm the work of its effort is all that tells its sign.
     remark = warning(code, ranked="; ".join(map(str, fits)))

@@ -72,10 +72,10 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
     if part is not None and (found := part.drift(known)) is not None:
         yield found
         return
-    best = int(np.argmin(together))
+    best = int(together.argmin())
     lag = float(lags[best])
-    better = float(np.exp(together[np.argmin(np.abs(lags))] - together[best]))
-    alike = agreed(lags[np.argmin(rest, axis=1)], lag, STEP)
+    better = float(np.exp(together[np.abs(lags).argmin()] - together[best]))
+    alike = agreed(lags[rest.argmin(axis=1)], lag, STEP)
     if abs(lag) > LATE and better > BETTER and alike.any():
         order = "later" if lag > 0 else "earlier"
         values = {"lag_ms": 1e3 * abs(lag), "order": order, "ratio": better}
@@ -85,7 +85,7 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
 def agreed(own: Array, best: float, step: float) -> Mask:
     """Joints with a lag near the best of all; none if they are few. (K,)"""
     near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
-    return np.asarray(near & (near.sum() >= ENOUGH) & (np.mean(near) >= AGREE))
+    return np.asarray(near & (near.sum() >= ENOUGH) & (near.mean() >= AGREE))
 
 
 class Lateness(NamedTuple):
@@ -121,14 +121,14 @@ class Lateness(NamedTuple):
         each = np.array([g for size in (0.0, *DRIFTS) for g in dict.fromkeys((size, -size))])
         rests = np.stack([self.rest(g / span)[known] for g in each])
         left = np.log(rests).mean(axis=1)
-        best = int(np.argmin(left.min(axis=1)))
+        best = int(left.min(axis=1).argmin())
         grown, least = float(each[best]), left[best].min()
-        alike = agreed(each[np.argmin(rests.min(axis=2), axis=0)], grown, DRIFTS[0])
-        better = np.exp(left[0, np.argmin(np.abs(self.lags))] - least)
+        alike = agreed(each[rests.min(axis=2).argmin(axis=0)], grown, DRIFTS[0])
+        better = np.exp(left[0, np.abs(self.lags).argmin()] - least)
         steadily = np.exp(left[0].min() - least)
         if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
-        first = float(self.lags[np.argmin(left[best])])
+        first = float(self.lags[left[best].argmin()])
         values = {"first_ms": 1e3 * first, "last_ms": 1e3 * (first + grown), "span_s": span}
         return warning(
             "effort-drift",
@@ -190,8 +190,7 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
     starts = starts[spread(len(starts), WINDOWS, BLOCK)]
     whole = t[starts + length + latest] - t[starts + earliest]
     usual = (length + latest - earliest) * median_step(t)
-    found: Indices = starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
-    return found
+    return starts[(whole > 0.8 * usual) & (whole < 1.2 * usual)]
 
 
 def rest_of(model: Array, effort: Array) -> Array:

@@ -58,7 +58,7 @@ def drive_constants(recording: Recording) -> Array:
             # Through the origin: no current, no torque.
             slope = i @ tau / (i @ i)
             # A joint that carries nothing has a target of zero and shows no constant.
-            if np.std(tau - slope * i) < 0.05 * max(np.std(tau), np.abs(tau).mean()):
+            if np.std(tau - slope * i) < 0.05 * max(tau.std(), np.abs(tau).mean()):
                 constants[j] = slope
     return constants
 
@@ -169,7 +169,7 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
     current, expected = recording.current, recording.target_current
     if current is None or expected is None or rest.sum() < 20:
         return
-    carried, wanted = np.mean(current[rest], axis=0), np.mean(expected[rest], axis=0)
+    carried, wanted = current[rest].mean(axis=0), expected[rest].mean(axis=0)
     torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
     # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint tell.
     heavy = np.flatnonzero(np.abs(torque[1:4]) > MISMATCH) + 1

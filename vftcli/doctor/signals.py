@@ -56,12 +56,12 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
     t = recording.t
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)
-    elif np.max(np.abs(t)) > FARTHEST:
+    elif np.abs(t).max() > FARTHEST:
         yield warning("absurd-clock", least_s=float(t[0]), largest_s=float(t[-1]))
     elif not STEPS[0] < recording.median_step < STEPS[1]:
         yield warning("absurd-steps", step_s=recording.median_step)
     for name in recording.signals:
-        largest = float(np.max(np.abs(getattr(recording, name)), initial=0.0))
+        largest = float(np.abs(getattr(recording, name)).max(initial=0.0))
         if largest > ABSURD:
             yield warning("absurd-values", signal=name, largest=largest)
 
@@ -73,7 +73,7 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
     if not efforts_of(recording):
         yield warning("no-effort")
     # Radians and ampere are never so large. The last joint of some arms turns without end.
-    largest = float(np.max(np.abs(recording.q[:, : max(1, recording.joints - 1)])))
+    largest = float(np.abs(recording.q[:, : max(1, recording.joints - 1)]).max())
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
@@ -119,9 +119,9 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     rows = thinly(recording, SOME)
     speed = recording.dq[rows]
     power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
-    gross = np.sum(np.abs(power), axis=0)
-    share = np.sum(power, axis=0) / np.where(gross > 0, gross, 1.0)
-    travel = np.sum(np.abs(np.diff(recording.q[rows], axis=0)), axis=0)
+    gross = np.abs(power).sum(axis=0)
+    share = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)
+    travel = np.abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
     # One way only, gravity alone can take or give work.
     reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
@@ -147,14 +147,14 @@ def inverted_effort(recording: Recording) -> Iterator[Remark]:
         turned = shares < ALONE
     if not turned.any():
         return
-    first = int(np.argmax(turned))
+    first = int(turned.argmax())
     forward = value[recording.dq[:, first] > NONZERO, first]
     yield warning(
         "effort-sign-by-work" if most else "effort-sign-of-some",
         on_joints(turned),
         signal=name,
         shares_percent=(100 * shares[turned]).tolist(),
-        mean=float(np.mean(forward)) if forward.size else float("nan"),
+        mean=float(forward.mean()) if forward.size else float("nan"),
         unit="A" if name == "current" else "N·m",
         first=first + 1,
         column="current" if name == "current" else "tau",
@@ -208,7 +208,7 @@ def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
 
 def edges_of(mask: Mask) -> tuple[Indices, Indices]:
     """First sample of each run of a mask, and the one behind its last. (R,) each"""
-    first, last = np.array(runs_of(mask), dtype=np.intp).reshape(-1, 2).T
+    first, last = np.array(runs_of(mask), dtype=int).reshape(-1, 2).T
     return first, last
 
 
@@ -229,7 +229,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
         way = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(time)))
         if name == "q":
             steps = np.abs(np.diff(column))
-            least = 3 * np.min(steps[steps > 0]) if steps.any() else 0.0
+            least = 3 * steps[steps > 0].min() if steps.any() else 0.0
             stuck = farthest(time, way) > max(WAY, least)
         elif name == "dq":
             stuck = farthest(time, turned - way) > WAY
@@ -238,7 +238,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
             slope = since @ speed / (since @ since)
             # An effort follows an acceleration that changes.
             bent = np.std(speed - slope * since) > max(BENT, 0.03 * np.ptp(speed))
-            varies = bool(np.any(column))  # zero throughout is a finding of its own
+            varies = bool(column.any())  # zero throughout is a finding of its own
             stuck = (
                 farthest(time, turned) > WAY and bent and not is_extreme(column, rows) and varies
             )
@@ -269,8 +269,8 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
 
 def farthest(t: Array, way: Array) -> float:
     """The longest way within half a second. [rad]"""
-    behind = np.searchsorted(t, t - LONG * (1 + 1e-9))
-    return float(np.max(np.abs(way - way[behind])))
+    behind = t.searchsorted(t - LONG * (1 + 1e-9))
+    return float(np.abs(way - way[behind]).max())
 
 
 def is_extreme(value: Array, rows: slice) -> bool:
@@ -299,7 +299,7 @@ def zero_signals(recording: Recording) -> Iterator[Remark]:
         # sensor are rougher than motion. Steps of white noise differ by √3 times their own size.
         steps = np.diff(value[:, ~zero], axis=0)
         rough = np.sum(np.diff(steps, axis=0) ** 2, axis=0) > 0.5 * np.sum(steps**2, axis=0)
-        measured = zero.all() or np.mean(rough) > 0.5
+        measured = zero.all() or rough.mean() > 0.5
         odd = zero if measured else zero & (travel_of(recording) >= TRAVEL)
         if odd.any():
             yield warning("zero-effort", on_joints(odd), signal=name)
@@ -322,7 +322,7 @@ def is_clipped(value: Array, position: Array, least: int) -> bool:
         if size == 0 or abs(extreme) < 0.5 * size or count < least:
             continue
         # The rounded top of a smooth effort of coarse resolution is wide on the next level too.
-        if np.count_nonzero(up == np.max(up[~at])) > 0.2 * count:
+        if np.count_nonzero(up == up[~at].max()) > 0.2 * count:
             continue
         long = (position[a:b] for a, b in runs_of(at) if b - a >= least)
         if any(np.ptp(way) > HELD for way in long):
@@ -338,7 +338,7 @@ def coarse_positions(recording: Recording) -> Iterator[Remark]:
         if steps.size < 20 or (size := float(steps.min())) < COARSE:
             continue
         whole = steps / size
-        if np.all(np.abs(whole - np.round(whole)) < 1e-3 * np.maximum(whole, 10)):
+        if np.all(np.abs(whole - whole.round()) < 1e-3 * np.maximum(whole, 10)):
             sizes[j] = 1e3 * size
     if sizes:
         yield fact("coarse-positions", on_joints(sizes), steps_mrad=list(sizes.values()))

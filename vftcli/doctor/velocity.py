@@ -253,7 +253,7 @@ def exchanged(fit: VelocityFit) -> list[int]:
     np.fill_diagonal(fits, 1.0)
     others = np.flatnonzero(fits.min(axis=1) < np.minimum(ANOTHER * own, OPEN))
     # A joint at rest has no velocity to recognise elsewhere.
-    written = np.argmin(fits[others], axis=1)
+    written = fits[others].argmin(axis=1)
     found = np.union1d(others, written[~close[written]]).tolist()
     return found if len(found) > 1 else []
 
@@ -338,6 +338,6 @@ def uneven_steps(recording: Recording) -> Iterator[Remark]:
     for cut in source.cuts:  # has a finding of its own
         gaps = gaps[(gaps[:, 1] > cut.start) | (gaps.sum(axis=1) < cut.start)]
     if len(gaps):
-        longest, begun = gaps[np.argmax(gaps[:, 0])].tolist()
+        longest, begun = gaps[gaps[:, 0].argmax()].tolist()
         level = warning if longest > LONG_GAP else fact
         yield level("gaps", gaps=len(gaps), steps=GAP_STEPS, longest_s=longest, at_s=begun)

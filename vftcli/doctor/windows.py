@@ -195,7 +195,7 @@ def means(t: Array, value: Array, first: Indices, last: Indices) -> Array:
     """Mean of a signal from some samples to others, by trapezoids. (W, n)"""
     steps = np.diff(t)[:, None]
     rise = (value[1:] + value[:-1]) / 2 * steps
-    area = np.vstack([np.zeros(value.shape[1]), np.cumsum(rise, axis=0)])
+    area = np.vstack([np.zeros(value.shape[1]), rise.cumsum(axis=0)])
     return np.asarray((area[last] - area[first]) / (t[last] - t[first])[:, None])
 
 

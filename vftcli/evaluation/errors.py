@@ -66,7 +66,7 @@ def rmse(estimate: Array, reference: Array) -> Array:
     known = np.isfinite(error)
     count = np.count_nonzero(known, axis=0)
     total = np.sum(np.where(known, error, 0.0) ** 2, axis=0)
-    return np.asarray(np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan)))
+    return np.sqrt(np.where(count > 0, total / np.maximum(count, 1), np.nan))
 
 
 def correlation(x: Array, y: Array) -> float:
@@ -199,8 +199,8 @@ def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFr
 def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object]]:
     """One row an observer on one joint."""
     error, lines = joint.error, list[dict[str, object]]()
-    best = int(np.argmin(np.mean(error**2, axis=0))) if len(error) else 0
-    share = float(np.mean(joint.moving)) if len(error) else 0.0
+    best = int(np.mean(error**2, axis=0).argmin()) if len(error) else 0
+    share = float(joint.moving.mean()) if len(error) else 0.0
     for k, name in enumerate(joint.names):
         here: dict[str, object] = {
             "recording": recording,
@@ -220,7 +220,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
                 "rmse_low_Nm": number(low),
                 "rmse_high_Nm": number(high),
                 "bias_Nm": number(x.mean()),
-                "max_Nm": number(np.max(np.abs(x))),
+                "max_Nm": number(np.abs(x).max()),
                 "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
                 "lag_s": number(joint.lag[k]),
                 "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
@@ -265,7 +265,7 @@ def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
 def together(parts: Sequence[Scored]) -> Scored:
     """One joint's samples of several logs as one series."""
     parts = [p for p in parts if len(p.reference)] or list(parts[:1])
-    weight = np.array([len(p.reference) for p in parts], dtype=np.float64)
+    weight = np.array([len(p.reference) for p in parts], dtype=float)
     share = weight / max(weight.sum(), 1.0)
     lag = np.array([p.lag for p in parts])
     # A log in which no lag fits says nothing of it: the others' shares are weighed anew.

@@ -61,7 +61,7 @@ def resample(squares: Array, length: int) -> Resampled:
     starts = np.random.default_rng(SEED).integers(0, samples, (REPETITIONS, blocks))
     picked = np.zeros((REPETITIONS, squares.shape[1]))
     for column, x in enumerate(squares.T):
-        total = np.cumsum(np.concatenate([[0.0], x, x[: length - 1]]))
+        total = np.concatenate([[0.0], x, x[: length - 1]]).cumsum()
         sums = total[length:] - total[:-length]
         picked[:, column] = sums[starts].sum(axis=1) / (blocks * length)
     return Resampled(picked, blocks)
@@ -73,7 +73,7 @@ def block_lengths(squares: Array) -> NDArray[np.intp]:
     longest = max(1, samples // LEAST_BLOCKS)
     shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
     wanted = np.ceil(MEMORY * correlation_time(squares)).astype(np.intp)
-    return np.clip(wanted, shortest, longest)
+    return wanted.clip(shortest, longest)
 
 
 def correlation_time(x: Array) -> Array:
@@ -94,7 +94,7 @@ def correlation_time(x: Array) -> Array:
             break
     end = np.where(fallen.any(axis=0), fallen.argmax(axis=0), count)
     inside = np.arange(count)[:, None] < end
-    time: Array = 2.0 * np.sum(np.where(inside, rho, 0.0), axis=0) - 1.0
+    time: Array = 2.0 * np.where(inside, rho, 0.0).sum(axis=0) - 1.0
     return np.maximum(time, 1.0)
 
 
@@ -109,7 +109,7 @@ def interval(mean_square: float, draws: Array, blocks: int) -> tuple[float, floa
     if not mean_square > 0 or blocks < 2:
         return float("nan"), float("nan")
     quantile = student_quantile(0.5 + 0.5 * LEVEL, blocks - 1) * np.sqrt(blocks / (blocks - 1.0))
-    half = min(quantile * float(np.std(draws)) / mean_square, WIDEST)
+    half = min(quantile * float(draws.std()) / mean_square, WIDEST)
     return float(np.sqrt(mean_square * np.exp(-half))), float(np.sqrt(mean_square / (1.0 - half)))
 
 
@@ -162,8 +162,8 @@ def p_value(first: Array, second: Array) -> float:
 
     At least one over the number of draws; 1 where both numbers are equal.
     """
-    size = max(float(np.mean(np.abs(first))), float(np.mean(np.abs(second))), 1e-300)
-    if np.max(np.abs(first - second)) <= SAME * size:
+    size = max(float(np.abs(first).mean()), float(np.abs(second).mean()), 1e-300)
+    if np.abs(first - second).max() <= SAME * size:
         return 1.0
     above = float(np.mean(first > second))
     return float(np.clip(2.0 * min(above, 1.0 - above), 1.0 / len(first), 1.0))

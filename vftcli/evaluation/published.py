@@ -79,7 +79,7 @@ class Comparison:
         printed = np.array([self.printed(name) for name in self.names])
         ours = np.array([self.ours[name] for name in self.names])
         # Of a joint on which no observer is known the first is named.
-        here = np.argmin(np.where(np.isfinite(ours), ours, np.inf), axis=0)
+        here = np.where(np.isfinite(ours), ours, np.inf).argmin(axis=0)
         pairs = zip(printed.argmin(axis=0), here, strict=True)
         other = [
             f"J{j} ({self.names[theirs]} in print, {self.names[own]} here)"
@@ -205,10 +205,10 @@ def facts(
         gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
         one = Facts(
             name=observer.name,
-            response=float(np.max(step_response(observer, step, len(noise)))),
-            delay=float(np.max(tuning.delay)),
+            response=float(step_response(observer, step, len(noise)).max()),
+            delay=float(tuning.delay.max()),
             noise=float(np.mean(noise * np.sqrt(gain.mean(axis=0)))),
-            passed=float(np.mean(np.sqrt(gain[fast].mean(axis=0)))),
+            passed=float(np.sqrt(gain[fast].mean(axis=0)).mean()),
             rmse=means.get(observer.name, float("nan")),
             parameter_count=tuning.parameter_count,
         )
@@ -219,9 +219,9 @@ def facts(
 def step_response(observer: Observer, step: float, joints: int) -> Array:
     """Time of a unit step's estimate to 90 %, NaN if never. (n,) [s]"""
     t = np.arange(0.0, STEP_TIME, step)
-    p = np.repeat(t[:, None], joints, axis=1)
+    p = t[:, None].repeat(joints, axis=1)
     seen = observer.estimate(DynamicsTerms(t=t, p=p, mu=np.zeros_like(p))).tau >= REACHED
-    return np.asarray(np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan))
+    return np.where(seen.any(axis=0), t[seen.argmax(axis=0)], np.nan)
 
 
 #: Use of an observer, the deciding number in words, its name in `Facts`, and the paper's advice.

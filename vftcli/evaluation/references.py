@@ -195,7 +195,7 @@ def on_the_logs_clock(t: Array, columns: Array, recording: Recording, path: Path
     # Half a sample more at either end: stamps of one clock, written by two programs, round apart.
     slack = 0.5 * recording.median_step
     inside = (recording.t >= t[0] - slack) & (recording.t <= t[-1] + slack)
-    if not np.any(inside):
+    if not inside.any():
         start = recording.source.t0
         raise ReferenceTorqueError(
             f"{path}: its clock ({t[0] + start:g} to {t[-1] + start:g} s) does not overlap the "

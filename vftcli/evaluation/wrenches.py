@@ -59,14 +59,14 @@ def evaluate_wrenches(
             if len(error):
                 row |= {
                     f"bias_{unit}": number(error.mean()),
-                    f"max_{unit}": number(np.max(np.abs(error))),
+                    f"max_{unit}": number(np.abs(error).max()),
                     "correlation": number(correlation(x, y)),
                     "missing": float(np.mean(~answered[known, k])),
                 }
                 if wrench.sd is not None:
                     # An error of NaN lies in no band.
                     inside = np.abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
-                    row["band_share"] = float(np.mean(inside))
+                    row["band_share"] = float(inside.mean())
             rows.append(row)
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)
 

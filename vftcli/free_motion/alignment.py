@@ -76,7 +76,7 @@ def align(recording: Recording, free: Recording) -> Alignment:
 
 def is_same_path(recording: Recording, found: Alignment) -> bool:
     """Whether the overlap at a rate is one path, not two small motions nearby."""
-    spread = np.sqrt(np.mean(np.var(recording.q[found.overlap], axis=0)))
+    spread = np.sqrt(recording.q[found.overlap].var(axis=0).mean())
     return bool(found.deviation <= SAME_PATH * spread)
 
 
@@ -119,8 +119,8 @@ def pace(recording: Recording) -> float | None:
         return None
     t = recording.t
     steps = 0.5 * (recording.dq[1:] + recording.dq[:-1]) * np.diff(t)[:, None]
-    summed = np.vstack([np.zeros(recording.joints), np.cumsum(steps, axis=0)])
-    ends = np.searchsorted(t, np.arange(t[0], t[-1], TRAVEL))
+    summed = np.vstack([np.zeros(recording.joints), steps.cumsum(axis=0)])
+    ends = t.searchsorted(np.arange(t[0], t[-1], TRAVEL))
     by_position, by_velocity = (np.diff(x[ends], axis=0) for x in (recording.q, summed))
     power = float(np.sum(by_position**2))
     along = float(np.sum(by_position * by_velocity))
@@ -149,11 +149,11 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
-    path = np.append(np.max(np.abs(np.diff(q, axis=0)), axis=1), 0.0)
+    path = np.append(np.abs(np.diff(q, axis=0)).max(axis=1), 0.0)
     span = recording.duration + free.duration
     shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, max(0.02, span / 5000.0))
     shared = [float(np.sum(path * near(t + shift, q, free))) for shift in shifts]
-    if max(shared) < LEAST_OVERLAP * float(np.sum(path)):
+    if max(shared) < LEAST_OVERLAP * float(path.sum()):
         return None
     shift, rate = refined(recording, free, float(shifts[int(np.argmax(shared))]), 1.0)
     matched = near(rate * recording.t + shift, recording.q, free)
@@ -169,7 +169,7 @@ def apart(t: Array, q: Array, free: Recording) -> Array:
 
 def near(t: Array, q: Array, free: Recording) -> Mask:
     """Whether the free run is within `SAME_TRAJECTORY` of q at its instants t. (T,)"""
-    return np.asarray(np.max(np.abs(apart(t, q, free)), axis=1) <= SAME_TRAJECTORY)
+    return np.asarray(np.abs(apart(t, q, free)).max(axis=1) <= SAME_TRAJECTORY)
 
 
 def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None:
@@ -201,7 +201,7 @@ def best_fit(recording: Recording, free: Recording) -> tuple[float, float]:
     fit = lag_fit(q, uniform(recording, step), LEAST_OVERLAP)
     # Start from equal clocks; the steps below converge anyway.
     best = refined(recording, free, fit.closest * step + offset, 1.0)
-    spread = float(np.sqrt(np.sum(np.var(q, axis=0))))
+    spread = float(np.sqrt(q.var(axis=0).sum()))
     limit = max(ALIKE * distance_moving(recording, free, *best), LEAST_ALIKE * spread)
     for lag in fit.rivals((SHORTLIST * spread) ** 2)[:RIVALS]:
         rival = refined(recording, free, lag * step + offset, 1.0)

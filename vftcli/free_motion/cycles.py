@@ -124,7 +124,7 @@ def moving_part(recording: Recording) -> tuple[Array, Array]:
             "or to compare with a free run; record a longer log"
         )
     dq = recording.dq if recording.dq is not None else np.gradient(q, t, axis=0)
-    moving = np.flatnonzero(~np.all(standing(t, dq), axis=1))
+    moving = np.flatnonzero(~standing(t, dq).all(axis=1))
     if len(moving) < 8 or np.ptp(q[moving], axis=0).max() < 0.01:
         raise ReferenceTorqueError(
             f"{recording.name}: the arm does not move, so it repeats nothing; the two-cycle "
@@ -154,8 +154,8 @@ def valleys(distance: Array, step: float, stated: float | None) -> list[float]:
     before, here, after = distance[lags - 1], distance[lags], distance[lags + 1]
     found = lags[(here <= before) & (here <= after)]
     if stated is not None and len(lags) and not len(found):
-        found = lags[[int(np.argmin(here))]]
-    deep = np.sort(found[np.argsort(distance[found])[:CANDIDATES]])
+        found = lags[[int(here.argmin())]]
+    deep = np.sort(found[distance[found].argsort()[:CANDIDATES]])
     bend = distance[deep - 1] - 2.0 * distance[deep] + distance[deep + 1]
     tilt = 0.5 * (distance[deep - 1] - distance[deep + 1])
     return [float(x) for x in deep + np.clip(tilt / np.where(bend > 0, bend, np.inf), -0.5, 0.5)]
@@ -257,8 +257,8 @@ def comes_back(t: Array, q: Array, shift: float) -> Mask:
 
 def settled(t: Array, on_path: Mask, seconds: float) -> float:
     """First instant with three quarters of the next cycle on the path. [s]"""
-    count = np.concatenate([[0], np.cumsum(on_path)])
-    stop = np.searchsorted(t, t + seconds)
+    count = np.concatenate([[0], on_path.cumsum()])
+    stop = t.searchsorted(t + seconds)
     here = np.arange(len(t))
     share = (count[stop] - count[here]) / np.maximum(stop - here, 1)
     good = np.flatnonzero(on_path & (share >= 0.75))
@@ -320,9 +320,9 @@ def find_free_cycles(motion: Run, cycles: Cycles) -> FreeCycles:
             "run with --free"
         )
     residual = residuals(motion, cycles)
-    freest = int(np.argmin(residual))
+    freest = int(residual.argmin())
     times = pair_with_cycle(motion, cycles, freest, cycles.period).times
-    first, last = np.searchsorted(motion.t, np.add(cycles.span(freest), (-SETTLES, SETTLES)))
+    first, last = motion.t.searchsorted(np.add(cycles.span(freest), (-SETTLES, SETTLES)))
     free = motion.part(slice(int(first), int(last)))
     also = []
     for cycle in np.flatnonzero(np.isfinite(residual)).tolist():

@@ -52,7 +52,7 @@ class ErrorModel(NamedTuple):
     def trusted_joints(self) -> Mask:
         """Joints with motion enough to cancel friction; all if none has. (n,)"""
         trusted = np.asarray(self.standing_share <= 1.0 - TRUSTED_SHARE)
-        return trusted if np.any(trusted) else np.ones_like(trusted)
+        return trusted if trusted.any() else np.ones_like(trusted)
 
     @property
     def floor(self) -> Array:
@@ -74,7 +74,7 @@ class ErrorModel(NamedTuple):
     def floor_standing(self) -> Array:
         """Root mean square of `sd` at rest, NaN if never at rest. (n,) [N·m]"""
         standing = self.standing[self.known]
-        return np.where(np.any(standing, axis=0), rms(self.sd[self.known], standing), np.nan)
+        return np.where(standing.any(axis=0), rms(self.sd[self.known], standing), np.nan)
 
 
 class Rung(NamedTuple):
@@ -178,7 +178,7 @@ def most_certain(made: Iterable[Difference]) -> tuple[Difference, list[Remark]]:
     floors = [chosen.floor_remark()]
     for candidate in steps:
         floors.append(candidate.floor_remark())
-        share = float(np.mean((candidate.error.floor_moving / lowest)[trusted]))
+        share = float((candidate.error.floor_moving / lowest)[trusted].mean())
         if share < WORTH * least:
             chosen, least = candidate, share
         del candidate  # it has no room beside the next
@@ -296,8 +296,8 @@ def off_line(x: Array, size: int) -> Array:
 @cache
 def white_when_quiet(size: int, step: float, cutoff: float | None) -> float:
     """Square of `noise_when_quiet` for white noise over its variance, drawn once."""
-    noise: Array = np.random.default_rng(SEED).standard_normal((400 * size, 1))
-    clock = step * np.arange(len(noise), dtype=np.float64)
+    noise = np.random.default_rng(SEED).standard_normal((400 * size, 1))
+    clock = step * np.arange(len(noise), dtype=float)
     smooth = noise if cutoff is None else low_pass(clock, noise, cutoff)
     return float(np.quantile(off_line(smooth, size), QUIET) / np.mean(smooth**2))
 
@@ -306,7 +306,7 @@ def rms(x: Array, where: Mask) -> Array:
     """Root mean square per column over chosen samples, over all if none. (n,)"""
     # Column by column: copies of a long log take longer.
     chosen = (c[w] if w.any() else c for c, w in zip(x.T, where.T, strict=True))
-    return np.asarray(np.sqrt([np.dot(column, column) / len(column) for column in chosen]))
+    return np.sqrt([np.dot(column, column) / len(column) for column in chosen])
 
 
 def local_rms(x: Array, step: float) -> Array:

@@ -262,7 +262,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
         return None
     robot = pieces[0].run.robot
     d, A = (np.concatenate(each) for each in zip(*parts, strict=True))
-    if len(d) < 2 * A.shape[2] or not np.any(d):
+    if len(d) < 2 * A.shape[2] or not d.any():
         return None
     friction = pieces[0].run.dry_friction
     prior = np.concatenate([WIDE, 0.2 * friction + 0.05, 0.15 * friction + 0.02])
@@ -327,5 +327,5 @@ def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
         covariance = np.linalg.inv(gram)
         weights = covariance @ right
         left = np.sqrt(np.mean((d - A @ weights) ** 2, axis=0))
-        spread = np.maximum(left, 1e-3 * np.max(left) + 1e-6)
+        spread = np.maximum(left, 1e-3 * left.max() + 1e-6)
     return weights, np.sqrt(np.diag(covariance)), left

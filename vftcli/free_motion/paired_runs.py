@@ -53,7 +53,7 @@ def pair_with_run(t: Array, free: Run, shift: float, rate: float = 1.0) -> Pairi
 def in_gap(clock: Array, times: Array) -> Mask:
     """Whether an instant lies in a gap of a clock. (T,)"""
     steps = np.diff(clock)
-    at = np.clip(np.searchsorted(clock, times) - 1, 0, len(steps) - 1)
+    at = np.clip(clock.searchsorted(times) - 1, 0, len(steps) - 1)
     return np.asarray(steps[at] > GAP * np.median(steps))
 
 
@@ -68,13 +68,13 @@ def by_phase(motion: Run, pairing: Pairing) -> Pairing:
         return pairing
     times, q, speed = pairing.times[known], motion.q[known], free.smooth_dq
     shift, ends = np.zeros(len(times)), (times.min(), times.max())
-    damping = 0.01 * float(np.mean(np.sum(speed**2, axis=1))) + 1e-6
+    damping = 0.01 * float(np.sum(speed**2, axis=1).mean()) + 1e-6
     for _ in range(4):
         at = np.clip(times + shift, *ends)
         path = resample_columns(at, free.t, speed)
         distance = resample_columns(at, free.t, free.q) - q
         shift -= np.sum(distance * path, axis=1) / (np.sum(path**2, axis=1) + damping)
-        shift = np.clip(shift, -FARTHEST, FARTHEST)
+        shift = shift.clip(-FARTHEST, FARTHEST)
     cutoff = min(PHASE_CUTOFF, 0.2 / motion.step)
     smooth = low_pass(motion.t[known], shift[:, None], cutoff)[:, 0]
     moved = pairing.times.copy()
@@ -147,19 +147,19 @@ class PairedRuns:
             np.minimum(shortest, there, out=shortest)
         alike = shortest / np.maximum(longest, 1e-9)
         share = np.minimum(longest / STUCK, 1.0) * (1.0 - REPEATED * alike)
-        return np.asarray(np.maximum(share, self.standing))
+        return np.maximum(share, self.standing)
 
     @cached_property
     def misfit(self) -> Array:
         """Share of torque variation missed by the model in the free run, ≤ 1. (n,)"""
         missed = total = np.zeros(self.motion.drive_torque.shape[1])
         for p in self.pairings:
-            used = np.searchsorted(p.free.t, p.times[p.known])
+            used = p.free.t.searchsorted(p.times[p.known])
             used = np.unique(used.clip(0, len(p.free.t) - 1))
             # Of an hour with one free cycle that cycle, and what the filter hears of the rest.
             pad = round(HEARD / p.free.step)
             first = max(0, int(used[0]) - pad)
             free, used = p.free.part(slice(first, int(used[-1]) + pad + 1)), used - first
-            missed = missed + np.var(free.smooth_gap[used], axis=0)
-            total = total + np.var(free.smooth_model[used], axis=0)
-        return np.asarray(np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0)))
+            missed = missed + free.smooth_gap[used].var(axis=0)
+            total = total + free.smooth_model[used].var(axis=0)
+        return np.sqrt(np.minimum(missed / np.maximum(total, 1e-12), 1.0))

@@ -191,7 +191,7 @@ def error_ratio(found: Difference, where: Mask) -> Array:
     moving = ~found.error.standing[where]
     expected = rms(found.error.sd[where], moving)
     shown = rms(found.tau[where], moving)
-    return np.asarray(np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0))
+    return np.clip(shown / np.maximum(expected, 1e-12), 0.3, 3.0)
 
 
 def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
@@ -212,9 +212,9 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
         means = total[count > 0] / count[count > 0]
         if len(means) < 5:
             continue
-        spread = float(np.std(means, ddof=1)) / np.sqrt(len(means))
-        if abs(float(np.mean(means))) > SURE * spread:
-            change[j] = float(np.mean(along))
+        spread = float(means.std(ddof=1)) / np.sqrt(len(means))
+        if abs(float(means.mean())) > SURE * spread:
+            change[j] = float(along.mean())
     return change
 
 

@@ -74,7 +74,7 @@ def fit_without_contacts(data: Training, strict: bool) -> CleanFit:
     remarks += warm_up_remarks(data, fits)
     doubts = model_doubts(data, fits)
     if strict and any(doubt.code == "unexplained-torque" for doubt in doubts):
-        ratio = float(np.max(links_explain(data, fits), initial=0.0))
+        ratio = float(links_explain(data, fits).max(initial=0.0))
         if ratio > OTHER_LINKS:
             raise IdentificationError(
                 f"{doubts[0]}. Choose another --robot, find the load with --method payload, or "
@@ -113,7 +113,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     z = excess * usable / np.maximum(sd, 1e-9)
     found: list[ContactSpan] = []
     for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
-        k, j = np.unravel_index(int(np.argmax(z[start:stop])), (stop - start, z.shape[1]))
+        k, j = np.unravel_index(int(z[start:stop].argmax()), (stop - start, z.shape[1]))
         begin, end = float(motion.t[start]), float(motion.t[stop - 1])
         contact = ContactSpan(begin, end, int(j) + 1, float(residual[start + k, j]))
         if found and begin - found[-1].stop < 2 * TOUCH_MARGIN:
@@ -154,21 +154,20 @@ def links_explain(data: Training, fits: Sequence[JointFit | None]) -> Array:
     x = NormalEquations(*(sum(sums) for sums in zip(*parts, strict=True))).solution()
     freed = weighted_rms(data, [residuals(layout, log, x) for log in logs])
     heavy = heavy_joints(data)
-    share: Array = before[heavy] / np.maximum(freed[heavy], 1e-12)
-    return share
+    return before[heavy] / np.maximum(freed[heavy], 1e-12)
 
 
 def weighted_rms(data: Training, residual: Sequence[Array]) -> Array:
     """Weighted RMS of each joint over all logs; 0 without weight. (n,) [N·m]"""
     weights = np.concatenate([log.weights for log in data.logs])
     square = np.sum(weights * np.concatenate(residual) ** 2, axis=0)
-    value: Array = np.sqrt(square / np.maximum(np.sum(weights, axis=0), 1e-12))
+    value: Array = np.sqrt(square / np.maximum(weights.sum(axis=0), 1e-12))
     return value
 
 
 def heavy_joints(data: Training) -> Mask:
     """Joints that move and carry the arm's weight. (n,)"""
-    spread = np.std(np.concatenate([log.load for log in data.logs]), axis=0)
+    spread = np.concatenate([log.load for log in data.logs]).std(axis=0)
     heavy: Mask = (spread > HEAVY * spread.max()) & (spread > LIGHT) & data.moves
     return heavy
 
@@ -186,9 +185,9 @@ def model_doubts(data: Training, fits: Sequence[JointFit | None]) -> list[Remark
             load = {"mass_kg": mass, "robot": robot.name, "share_percent": 100.0 * explained}
             doubts.append(warning("unknown-load", Where(name), **load))
         left = np.where(log.weights > 0, residual, 0.0)[:, heavy]
-        shares = 1.0 - np.mean(left**2, axis=0) / np.maximum(np.var(tau[:, heavy], axis=0), 1e-12)
-        if (worst := np.min(shares, initial=1.0)) < WRONG:
-            where = Where(name, (int(heavy[np.argmin(shares)]) + 1,))
+        shares = 1.0 - np.mean(left**2, axis=0) / np.maximum(tau[:, heavy].var(axis=0), 1e-12)
+        if (worst := shares.min(initial=1.0)) < WRONG:
+            where = Where(name, (int(heavy[shares.argmin()]) + 1,))
             share = 100.0 * max(float(worst), 0.0)
             doubts.append(
                 warning("unexplained-torque", where, robot=robot.name, share_percent=share)
@@ -206,7 +205,7 @@ def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Rem
         more = np.array(
             [
                 np.sum(sign[part] * residual[part], axis=0)
-                / np.maximum(np.sum(np.abs(sign[part]), axis=0), 1e-9)
+                / np.maximum(np.abs(sign[part]).sum(axis=0), 1e-9)
                 for part in folds(log.samples, THIRDS)
             ]
         )

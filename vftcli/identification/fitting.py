@@ -82,8 +82,7 @@ class Trace(NamedTuple):
     @property
     def residual(self) -> Array:
         """Measured less predicted. (M, n) [N·m]"""
-        difference: Array = self.measured - self.predicted
-        return difference
+        return self.measured - self.predicted
 
     @property
     def rms(self) -> Array:
@@ -137,7 +136,7 @@ def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
     held_out = [trace for trace in traces if trace.role == "held-out"]
     remarks = []
     for trace in traces:
-        left, before = float(np.mean(trace.rms)), float(np.mean(trace.before))
+        left, before = float(trace.rms.mean()), float(trace.before.mean())
         if left > BEHIND * before > 0.0:
             where = Where(trace.motion.recording.name)
             remarks.append(
@@ -154,7 +153,7 @@ def score_remarks(traces: Sequence[Trace]) -> list[Remark]:
     level = np.mean([trace.rms for trace in train], axis=0)
     for test in held_out:
         remarks += held_out_remarks(test, level)
-    return [*remarks, fact("training-residual", mean_Nm=float(np.mean(level)))]
+    return [*remarks, fact("training-residual", mean_Nm=float(level.mean()))]
 
 
 def held_out_remarks(trace: Trace, trained: Array) -> list[Remark]:
@@ -216,7 +215,7 @@ def repeated_share(train: PreparedLog, test: PreparedLog) -> float:
     index = np.arange(0, len(path) - 1 + 1e-9, 0.25)
     tree = cKDTree(resample_columns(index, np.arange(float(len(path))), path))
     distance, _ = tree.query(points, p=np.inf, distance_upper_bound=NEAR)
-    return float(np.mean(np.isfinite(distance)))
+    return float(np.isfinite(distance).mean())
 
 
 def identify(

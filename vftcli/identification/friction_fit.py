@@ -175,7 +175,7 @@ def fit_joint(data: Training, j: int, presliding: PreslidingScore, constant: boo
     shape, scores = choose_shape(given, presliding.length)
     fit, errors = given.fit(shape), (np.nan, np.nan)
     if given.profile is not None and scores:
-        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / np.sum(fit.weights))
+        miss = float(np.sum(fit.weights * (given.y - given.profile) ** 2) / fit.weights.sum())
         errors = (scores[shape], float(np.sqrt(miss)))
     return JointFit(shape, fit, scores, constant, presliding, errors)
 

@@ -73,8 +73,7 @@ class Triangles(NamedTuple):
 
 def triangle(rows: Array) -> Array:
     """R of the QR decomposition of stacked equations."""
-    R: Array = np.asarray(np.linalg.qr(rows, mode="r"))
-    return R
+    return np.asarray(np.linalg.qr(rows, mode="r"))
 
 
 def residuals(layout: ParameterColumns, log: PreparedLog, x: Array) -> Array:
@@ -159,8 +158,7 @@ class Grouping(NamedTuple):
 
     def values(self, x: Array) -> Array:
         """Base parameters of a full parameter vector: x₁ + β x₂. (b,)"""
-        base: Array = x[list(self.independent)] + self.carried @ x[list(self.dependent)]
-        return base
+        return x[list(self.independent)] + self.carried @ x[list(self.dependent)]
 
     def sums(self, names: tuple[str, ...]) -> list[str]:
         """Base parameters as sums, such as "Izz1 + 0.25 m2 + Iyy2"."""
@@ -192,9 +190,9 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
     R, order = qr(A.reshape(-1, A.shape[2]), mode="r", pivoting=True)
     diagonal = np.abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
-    beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=np.float64)
+    beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=float)
     beta[np.abs(beta) < 1e-9] = 0.0  # rounding would enter the names
-    first, friction = np.argsort(order[:rank]), range(layout.rotor_places.stop, layout.size)
+    first, friction = order[:rank].argsort(), range(layout.rotor_places.stop, layout.size)
     independent = (*order[:rank][first].tolist(), *friction)
     carried = np.vstack([beta[first], np.zeros((len(friction), beta.shape[1]))])
     return Grouping(independent, tuple(order[rank:].tolist()), carried)
@@ -278,8 +276,8 @@ class Problem(NamedTuple):
             return float("inf")
         P, P0 = pseudo_inertias(x[:n]), pseudo_inertias(self.start[:n])
         ratio = np.linalg.solve(P0, P)
-        distance = float(np.sum(np.trace(ratio, axis1=1, axis2=2)) - 4 * len(P))
-        distance -= float(np.sum(np.linalg.slogdet(ratio)[1]))
+        distance = float(np.trace(ratio, axis1=1, axis2=2).sum() - 4 * len(P))
+        distance -= float(np.linalg.slogdet(ratio)[1].sum())
         distance += float(np.sum(J / J0 - np.log(J / J0) - 1.0))
         misfit = self.R @ x - self.z
         return 0.5 * float(misfit @ misfit) + self.weight * distance

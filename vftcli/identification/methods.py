@@ -210,7 +210,7 @@ def identified_friction(
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    speed = max(float(np.max(np.abs(log.dq[:, j]))) for log in data.logs)
+    speed = max(float(np.abs(log.dq[:, j]).max()) for log in data.logs)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction comes out on either side of zero.
@@ -378,10 +378,10 @@ def chosen_method(data: Training) -> MethodResult:
     fitted = fit_without_contacts(data, strict=True)
     kept = friction_method(data, fitted)
     free, fits = fitted.data, fitted.fits
-    spread = np.std(np.concatenate([log.tau for log in free.logs]), axis=0)
+    spread = np.concatenate([log.tau for log in free.logs]).std(axis=0)
     much = weighted_rms(free, all_residuals(free, fits)) > MATTERS * spread
     ratios = links_explain(free, fits)[much[heavy_joints(free)]]
-    ratio = float(np.max(ratios, initial=0.0))
+    ratio = float(ratios.max(initial=0.0))
     doubted = any(remark.level == "warning" for remark in fitted.remarks)
     if ratio <= OTHER_LINKS or doubted or data.fit_constants:
         return kept

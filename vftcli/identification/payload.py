@@ -151,7 +151,7 @@ class JointsFit(NamedTuple):
 
 def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
     """Least squares of columns A (N, n, k) to y (N, n), weights `usable` (N, n)."""
-    scale = np.std(y, axis=0)
+    scale = y.std(axis=0)
     for _ in range(PASSES):
         w = np.sqrt(usable) / np.maximum(scale, 1e-9)
         x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
@@ -259,7 +259,7 @@ def payload_from_poses(recordings: Sequence[Recording], robot: Robot) -> LoadFit
     logs = [log for log in logs if log.stop > log.start]
     if len(logs) > 1:
         covariance = covariance + fit.cluster_covariance(logs)
-    sd, left = np.sqrt(np.diag(covariance)), np.std(fit.left, axis=0)
+    sd, left = np.sqrt(np.diag(covariance)), fit.left.std(axis=0)
     origin = fact("load-from-poses", poses=len(q), different=different, logs=len(logs))
     return load_at_flange(fit.x, sd, left, robot, recordings, origin)
 
@@ -268,7 +268,7 @@ def different_poses(q: Array) -> int:
     """Number of poses (P, n) at least `APART` apart."""
     found: list[Array] = []
     for pose in q:
-        if not found or np.min(np.max(np.abs(np.array(found) - pose), axis=1)) > APART:
+        if not found or np.abs(np.array(found) - pose).max(axis=1).min() > APART:
             found.append(pose)
     return len(found)
 

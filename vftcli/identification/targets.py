@@ -211,14 +211,14 @@ def constant_at_rest(j: int, log: ControllerTargets) -> Estimate:
     i, m, steps = np.array(points).T
     value = float(i @ m / (i @ i))
     scatter = float(np.std(m - value * i)) if len(i) > 1 else 0.0
-    rounding = abs(value) * float(np.max(steps)) / np.sqrt(12.0)
+    rounding = abs(value) * float(steps.max()) / np.sqrt(12.0)
     sd = float(np.hypot(rounding, scatter) / np.sqrt(i @ i))
     return Estimate(value, sd, value > 0 and sd <= CONSTANT_KNOWN * value)
 
 
 def resolution(values: Array) -> float:
     """Smallest step between two values of a signal: its digits."""
-    steps = np.diff(np.unique(np.round(values, 9)))
+    steps = np.diff(np.unique(values.round(9)))
     return float(steps.min()) if steps.size else 0.0
 
 
@@ -252,7 +252,7 @@ def rotor_inertia(j: int, log: ControllerTargets) -> tuple[Estimate, Estimate]:
         signal[:, j] for signal in (log.ddq, log.gravity, log.lead, log.moment - log.rigid)
     )
     A = np.column_stack([ddq, gravity, np.ones(len(y)), lead])
-    if np.std(ddq) < 1e-2:
+    if ddq.std() < 1e-2:
         return UNKNOWN, UNKNOWN
     # Half of robustness's change joins the spread, for the model's error.
     fit, plain = fit_column(A, y, np.ones(len(y))), solve(A, y)
@@ -278,7 +278,7 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
     load = np.concatenate([motion.load[motion.kept, j] for motion in log.logs])
     line = bent(float(speed.max()))
     shapes = WRITTEN if line is None else (line,)
-    if np.std(load) >= LIGHT:
+    if load.std() >= LIGHT:
         shapes = (*shapes, *(s._replace(terms=(*s.terms, "load_coulomb")) for s in shapes))
     fits = {}
     for shape in shapes:
@@ -304,14 +304,14 @@ def refuse_guided(recording: Recording, log: ControllerTargets, robot: Robot) ->
     guided = False
     if recording.target_dq is not None:
         asked = np.any(recording.target_dq != 0.0, axis=1)
-        guided = bool(np.mean(asked[moves.any(axis=1)]) < UNASKED) if moves.any() else False
+        guided = bool(asked[moves.any(axis=1)].mean() < UNASKED) if moves.any() else False
     elif robot.torque_constant is not None and robot.friction:
         law = friction_torque(robot.friction, log.dq)
         fed = robot.torque_constant * log.current - log.moment
         used = np.where(faster(log.dq, SLIDES), law, 0.0)
         size = np.sum(used**2, axis=0)
         shares = np.sum(used * fed, axis=0)[size > 0] / size[size > 0]
-        guided = bool(np.min(shares, initial=1.0) < GUIDED)
+        guided = bool(shares.min(initial=1.0) < GUIDED)
     if guided:
         raise IdentificationError(
             f"{recording.name}: a hand led the arm, and the controller feeds less friction forward "

@@ -125,7 +125,7 @@ class PreparedLog:
     def predicted(self) -> Array:
         """Drive torque by the robot's model, friction filtered like the log. (M, n) [N·m]"""
         robot, log = self.robot, self.recording
-        torque: Array = self.rigid + robot.chain.rotor_inertia * self.ddq
+        torque = self.rigid + robot.chain.rotor_inertia * self.ddq
         if not robot.friction:
             return torque
         load, temperature = gravity_torque(robot, log.q), measured_temperature(log)
@@ -297,7 +297,7 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        fastest = max(float(np.max(np.abs(log.dq[:, j]))) for log in self.logs)
+        fastest = max(float(np.abs(log.dq[:, j]).max()) for log in self.logs)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 
@@ -334,7 +334,7 @@ def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
             ways = np.count_nonzero([motion.dq > MOVES, motion.dq < -MOVES], axis=1)
             times += median_step(motion.t) * ways
     moves = times.sum(axis=0) >= ENOUGH
-    if not np.any(moves):
+    if not moves.any():
         names = ", ".join(m.recording.name for m in motions)
         raise IdentificationError(
             f"{names}: no joint moves faster than {MOVES:g} rad/s for {ENOUGH:g} s; a log at rest "
@@ -342,4 +342,4 @@ def moving_joints(motions: Sequence[PreparedLog]) -> tuple[Mask, Mask]:
             "payload on static poses"
         )
     # A tenth of a second back is enough to tell the sign of friction from an offset.
-    return moves, np.min(times, axis=0) >= 0.1 * ENOUGH
+    return moves, times.min(axis=0) >= 0.1 * ENOUGH

@@ -84,7 +84,7 @@ def printed_steady(model: Discrete, d: Densities) -> Gains:
 def printed_dynamics_input(terms: DynamicsTerms, omega: float, *, begins: bool) -> Array:
     """Input of the FDO with printed k₃ and, at a log's begin, start. (T, n) [N·m·s]"""
     a = 0.5 * omega * terms.dt
-    d: Array = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
+    d = terms.d + a**2 / (1.0 + 2.0 * a) * (terms.p + one_sample_earlier(terms, "p"))
     if begins:
         d[0] = (1.0 + a[0]) * terms.p[0]  # which alone makes τ̂⁰ = ωp⁰
     return d

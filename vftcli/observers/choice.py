@@ -220,7 +220,7 @@ def estimate_from_rest(observer: "Observer", terms: "DynamicsTerms") -> "Externa
     step = terms.clock.step
     count = lead_samples(observer, step, terms.joints)
     before = terms.t[0] - step * np.arange(count, 0, -1)
-    p, mu = (np.vstack([np.repeat(x[:1], count, axis=0), x]) for x in (terms.p, terms.mu))
+    p, mu = (np.vstack([x[:1].repeat(count, axis=0), x]) for x in (terms.p, terms.mu))
     found = observer.estimate(DynamicsTerms(t=np.concatenate([before, terms.t]), p=p, mu=mu))
     sd = None if found.sd is None else found.sd[count:]
     return replace(found, t=terms.t, tau=found.tau[count:], sd=sd)
@@ -236,8 +236,8 @@ def settling_samples(observer: "Observer", step: float, joints: int) -> int:
     zero = np.zeros((samples, joints))
     terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
     answer = observer.estimate(terms).tau
-    left = np.max(np.abs(answer - answer[-1]), axis=1)
-    return int(np.flatnonzero(left > SETTLED * np.max(np.abs(answer[-1])))[-1]) + 1
+    left = np.abs(answer - answer[-1]).max(axis=1)
+    return int(np.flatnonzero(left > SETTLED * np.abs(answer[-1]).max())[-1]) + 1
 
 
 def lead_samples(observer: "Observer", step: float, joints: int) -> int:

@@ -237,7 +237,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
     before they know better. (n,)
     """
     blocks = model.r.shape[2]
-    starts = np.repeat(np.stack(guess)[..., None], blocks, axis=2)
+    starts = np.stack(guess)[..., None].repeat(blocks, axis=2)
     starts[..., 0] = entering
     if blocks > 1:
         guessed = starts.copy()
@@ -255,7 +255,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             new = (end + gained[(0, 0, 1), (0, 1, 1)])[..., :-1]
             change = np.abs(new - starts[..., 1:]) / np.maximum(np.abs(new), np.finfo(float).tiny)
             starts[..., 1:] = new
-            if np.max(change) <= SETTLED:
+            if change.max() <= SETTLED:
                 break
     each, P = list[Gains](), Covariance(*starts)
     for step in map(Discrete._make, zip(*model, strict=True)):

@@ -198,7 +198,7 @@ class MomentumObserver(FirstOrderObserver):
     def __post_init__(self) -> None:
         gain = numbers_of(self.gain, "gain", self.name)
         object.__setattr__(self, "gain", gain)
-        if not (np.all(np.isfinite(gain)) and np.all(gain > 0)):
+        if not (np.isfinite(gain).all() and np.all(gain > 0)):
             raise ParameterError(f"gmo.gain is {gain.tolist()} 1/s; every gain must be positive")
 
     def rates(self, joints: int) -> Array:
@@ -258,7 +258,7 @@ class KalmanObserver(BlockObserver):
             value = frozen(np.abs(value)) if name == "decay" else value
             object.__setattr__(self, name, value)
             least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
-            if not (np.all(np.isfinite(value)) and np.all(least_allowed)):
+            if not (np.isfinite(value).all() and least_allowed.all()):
                 raise ParameterError(
                     f"kfo.{name} is {value.tolist()}; R and Q_τ must be positive, Q_p and "
                     "decay must not be negative"
@@ -306,7 +306,7 @@ class KalmanObserver(BlockObserver):
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """Discrete model at one sample time, or at each as a column (T, 1). [s]"""
-        return self._discretise(np.asarray(step, dtype=np.float64), self.densities(joints))
+        return self._discretise(np.asarray(step, dtype=float), self.densities(joints))
 
     @property
     def _discretise(self) -> Callable[[Array, Densities], Discrete]:

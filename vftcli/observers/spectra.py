@@ -126,7 +126,7 @@ class Spectra:
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what lag and bandwidth leave out, of H (F, n). (n,) [(N·m)²]"""
         missed = np.abs(1.0 - response) ** 2 * self.external
-        return np.asarray(np.sum(missed, axis=0) * self.width)
+        return np.asarray(missed.sum(axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
         """∫|H|² S_n df, what of the noise comes through H (F, n). (n,) [(N·m)²]"""
@@ -138,7 +138,7 @@ def neighbour_mean(spectrum: Array) -> Array:
     bins = np.arange(len(spectrum))
     reach = (NEIGHBOURS * bins).astype(int)
     reach = np.minimum(reach, len(spectrum) - 1 - bins)
-    total = np.concatenate([np.zeros((1, spectrum.shape[1])), np.cumsum(spectrum, axis=0)])
+    total = np.concatenate([np.zeros((1, spectrum.shape[1])), spectrum.cumsum(axis=0)])
     mean: Array = (total[bins + reach + 1] - total[bins - reach]) / (2.0 * reach + 1.0)[:, None]
     return mean
 
@@ -161,12 +161,12 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
             f"a spectrum needs {LEAST_SEGMENT} samples in a row; the loaded part has "
             f"{longest[0]}, the free part {longest[1]}"
         )
-    thinned = float(np.mean(inside) / max(float(np.mean(loaded.inside)), 1.0 / len(t)))
+    thinned = float(inside.mean() / max(float(loaded.inside.mean()), 1.0 / len(t)))
     size -= size % 2
     (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
     both = noise + thinned * (both - noise) if thinned > 1.0 else both
     return Spectra(
-        frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=np.float64),
+        frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=float),
         free=handed_over(noise),
         loaded=handed_over(both),
         step=nominal,
@@ -210,7 +210,7 @@ def free_error(read: Array, resting: Mask, dry_friction: Array) -> FreeError:
     known = np.isfinite(read)
     kinds = np.array([known, known & ~resting, known & resting])
     square, counts = np.where(known, read, 0.0) ** 2, np.count_nonzero(kinds, axis=1)
-    means = np.sum(np.where(kinds, square, 0.0), axis=1) / np.maximum(counts, 1)
+    means = np.where(kinds, square, 0.0).sum(axis=1) / np.maximum(counts, 1)
     moving, still = np.where(counts[1:] < ENOUGH, means[0], means[1:])
     unseen = counts[1] < ENOUGH
     return FreeError(
@@ -228,7 +228,7 @@ def error_band(
     `missed` is `Spectra.missed` (n,) [(N·m)²], `resting` where a joint rests (T, n), and
     `correction_sd` the standard deviation of a correction of the model. (T, n) [N·m]
     """
-    variance: Array = np.where(resting, free.resting + missed, free.moving + missed)
+    variance = np.where(resting, free.resting + missed, free.moving + missed)
     if correction_sd is not None:
         variance += correction_sd**2
     return np.sqrt(variance, out=variance)

@@ -56,7 +56,7 @@ def momentum(rate: Array) -> Observer:
 
 def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
     """Kalman observer of ω_n at ζ = 1/√2: Q_τ = R ω_n⁴, Q_p = 0. (n,)"""
-    density = np.broadcast_to(np.asarray(r, dtype=np.float64), omega_n.shape)
+    density = np.broadcast_to(np.asarray(r, dtype=float), omega_n.shape)
     return KalmanObserver(
         discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
     )
@@ -88,7 +88,7 @@ class Curve(NamedTuple):
     @property
     def best(self) -> Array:
         """The best natural frequency. (n,) [rad/s]"""
-        return np.asarray(self.omega_n[np.argmin(self.rmse, axis=0)])
+        return np.asarray(self.omega_n[self.rmse.argmin(axis=0)])
 
     @property
     def least(self) -> Array:
@@ -98,7 +98,7 @@ class Curve(NamedTuple):
 
 def natural_frequencies(step: float, slowest: float = SLOWEST) -> Array:
     """Natural frequencies to try at a sample time. (G,) [rad/s]"""
-    found: Array = np.geomspace(SLOWEST, FASTEST / step, TRIED)
+    found = np.geomspace(SLOWEST, FASTEST / step, TRIED)
     return np.asarray(found[found >= min(slowest, found[-1])])
 
 
@@ -109,7 +109,7 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
     missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
     passed = (np.abs(response) ** 2).T @ spectra.noise
-    return Curve(omega_n, np.asarray(np.sqrt((missed + passed) * spectra.width)))
+    return Curve(omega_n, np.sqrt((missed + passed) * spectra.width))
 
 
 def bound_remarks(name: str, rate: Array, grid: Array) -> tuple[Remark, ...]:
@@ -201,7 +201,7 @@ def parse_goal(
         raise ParameterError(f"--gains {text!r} is not {forms}, a positive number")
     if threshold is not None:
         level = np.array(numbers(threshold) or [np.nan])
-        if not (np.all(np.isfinite(level)) and np.all(level > 0.0)):
+        if not (np.isfinite(level).all() and np.all(level > 0.0)):
             raise ParameterError(
                 f"alarm.threshold={threshold} is not a positive number or one a joint [N·m]"
             )
@@ -301,10 +301,10 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
         )
     first_order = rates(momentum, spectra, goal)
     # FDO has one rate for all joints: the smallest mean error, or what the slowest joint allows.
-    shared = float(np.min(first_order))
+    shared = float(first_order.min())
     if goal.name == "auto":
         curve = error_curve(momentum, spectra)
-        shared = float(curve.omega_n[np.argmin(curve.rmse.mean(axis=1))])
+        shared = float(curve.omega_n[curve.rmse.mean(axis=1).argmin()])
     lines: dict[str, tuple[Observer, Array, dict[str, Any]]] = {
         "fdo": (FilteredDynamicsObserver(omega=shared), np.full(n, shared), {"omega": shared}),
         "gmo": (momentum(first_order), first_order, {"gain": first_order.tolist()}),
@@ -346,8 +346,8 @@ def rates(kind: Kind, spectra: Spectra, goal: Goal) -> Array:
         curve = error_curve(kind, spectra)
         few = few_alarms(kind, curve.omega_n, spectra, goal.threshold, goal.value)
         # The fastest that still raises few alarms: of the run of rates that do, its last.
-        fastest = curve.omega_n[len(few) - 1 - np.argmax(few[::-1], axis=0)]
-        best_is_one = few[np.argmin(curve.rmse, axis=0), np.arange(n)]
+        fastest = curve.omega_n[len(few) - 1 - few[::-1].argmax(axis=0)]
+        best_is_one = few[curve.rmse.argmin(axis=0), np.arange(n)]
         return np.where(best_is_one, curve.best, fastest)
     if goal.name == "bandwidth" and kind is kalman_smoother:
         fraction = float(kalman_smoother(np.ones(1)).tuning(step, 1).bandwidth[0])
@@ -363,8 +363,8 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
     noise = spectra.noise * spectra.width
     powers = (np.abs(column[:, None]) ** 2 * noise for column in response.T)
     few = np.array([crossings(one, spectra.frequency, threshold) <= most for one in powers])
-    if len(never := np.flatnonzero(~np.any(few, axis=0))):
-        read = np.sqrt(np.sum(noise, axis=0))
+    if len(never := np.flatnonzero(~few.any(axis=0))):
+        read = np.sqrt(noise.sum(axis=0))
         listed = ", ".join(f"J{j + 1} ({read[j]:.2g} N·m rms)" for j in never)
         raise ParameterError(
             f"no gain keeps the false alarms at {most:g} an hour: the free part itself is "
@@ -384,7 +384,7 @@ def crossings(power: Array, frequency: Array, threshold: Array) -> Array:
         S. O. Rice, "Mathematical analysis of random noise", Bell Syst. Tech. J. 23–24, 1944–45.
     """
     offset = np.sqrt(power[0])
-    variance = np.maximum(np.sum(power[1:], axis=0), np.finfo(float).tiny)
+    variance = np.maximum(power[1:].sum(axis=0), np.finfo(float).tiny)
     moved = np.sum(power[1:] * frequency[1:, None] ** 2, axis=0)
     often = np.sqrt(moved / variance)
     sides = [np.exp(-((threshold - m) ** 2) / (2.0 * variance)) for m in (offset, -offset)]

@@ -67,7 +67,7 @@ def without_waits(t: Array) -> Array:
     longest = max(WAIT, GAP * median_step(t)) if len(t) > 1 else WAIT
     if not np.any(steps > longest):
         return t
-    return np.asarray(t[0] + np.concatenate([[0.0], np.cumsum(np.minimum(steps, longest))]))
+    return np.asarray(t[0] + np.concatenate([[0.0], np.minimum(steps, longest).cumsum()]))
 
 
 def rigid_torque(chain: Chain, t: Array, q: Array, dq: Array) -> tuple[Array, Array]:

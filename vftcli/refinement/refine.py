@@ -153,7 +153,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     f, step, n = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(f, step, n)
     read = reading.rms**2
-    share: Array = np.abs(response) ** 2
+    share = np.abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     velocity = np.concatenate([piece.run.dq[piece.inside] for piece in found.pieces])
     by_friction = (read - noise) * friction_share(velocity, reading.samples)
@@ -271,8 +271,7 @@ class SparedObserver(Shown):
             own, spare = (
                 o.frequency_response(frequency, step, joints) for o in (self.observer, self.spare)
             )
-        mixed: Complex = np.where(self.lost, spare, own)
-        return mixed
+        return np.where(self.lost, spare, own)
 
 
 def with_spare(

@@ -189,7 +189,7 @@ class Rows:
         scales[:unknowns] = scale
         matrix = sums.gram * scales * scales[:, None]
         matrix.flat[:: len(matrix) + 1] += 1.0
-        factor = np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
+        factor = np.asarray(np.linalg.cholesky(matrix), dtype=float)
         z = forward_solved(factor, scales * sums.right)
         gained = np.concatenate([[0.0], np.cumsum(z**2)])
         loads = min(self.loads.sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
@@ -338,7 +338,7 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
                 residual = residual + fit.rows.modelled(found, inner)
             held = np.minimum(np.abs(residual[free]) / fit.scale, LARGEST)
             squares[k] += np.sum(held**2 * judged[inner][free], axis=0)
-    best = int(np.argmin(squares.mean(axis=1)))
+    best = int(squares.mean(axis=1).argmin())
     share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))
     if not SCALES[best]:
         return Guarded(None, share, np.zeros_like(share), fit.rows.solution(whole).loads)
@@ -348,4 +348,4 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
 
 def faded(value: Array, full: float, none: float) -> Array:
     """Part in use: 1 up to a value, 0 from another on, straight between."""
-    return np.asarray(np.clip((none - value) / (none - full), 0.0, 1.0))
+    return np.clip((none - value) / (none - full), 0.0, 1.0)

@@ -128,7 +128,7 @@ def whole_log_bias(run: Run) -> WholeLogBias:
             found = bias_of(run, motion, expected, fit, tried, stride)
         except np.linalg.LinAlgError:
             return untouched(terms, caution("whole-log-without-solution"))
-    if not (np.all(np.isfinite(found.bias)) and np.all(np.isfinite(found.sd))):
+    if not (np.isfinite(found.bias).all() and np.isfinite(found.sd).all()):
         return untouched(terms, caution("whole-log-without-solution"))
     if span >= LEAST_MOTION:
         return found
@@ -144,8 +144,8 @@ def weight_of_friction(fit: WholeLogFit, tried: Guarded) -> Array:
     if tried.solution is None:
         return tried.weight
     found = np.mean(fit.rows.modelled(tried.solution.model) ** 2, axis=0)
-    usual = np.array([np.mean(np.sum(column**2, axis=1)) for column in fit.rows.columns])
-    worst = np.max(np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)))
+    usual = np.array([np.sum(column**2, axis=1).mean() for column in fit.rows.columns])
+    worst = np.sqrt(found / np.maximum(usual, np.finfo(float).tiny)).max()
     return faded(worst, USUAL, LED) * faded(tried.share, CLEAR, UNCLEAR)
 
 

@@ -119,7 +119,7 @@ def return_values(found: Replay, held: Sequence[Latency]) -> dict[str, float | N
 def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     """Time from the release until an axis no longer goes on away from its target. [s]"""
     t, axis = found.motion.t, AXES.index(str(row["axis"]))
-    start = int(np.searchsorted(t, float(str(row["release_s"])) - 1e-9))
+    start = int(t.searchsorted(float(str(row["release_s"])) - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
     return float(t[start + int(np.argmax(outward <= 0.0))] - t[start])
 
@@ -135,7 +135,7 @@ def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:
     omega = np.sqrt(parameters.stiffness / parameters.mass)
     zeta = parameters.damping / (2.0 * parameters.mass * omega)
     latest = np.arccos(zeta) / (omega * np.sqrt(1.0 - zeta**2))
-    places = np.repeat(np.arange(0.0, FARTHEST_RELEASE, 0.01), len(laws))
+    places = np.arange(0.0, FARTHEST_RELEASE, 0.01).repeat(len(laws))
     many = [law for _ in range(len(places) // len(laws)) for law in laws]
     for axis in (0, 3):
         x, v = np.zeros((2, len(places), 6))

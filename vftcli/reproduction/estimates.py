@@ -195,7 +195,7 @@ def put_motion(result: RunResult, variant: str, found: Replay, knocked: Sequence
         own = [row for row in found.rows if row["controller"] == controller.kind]
         guided = max((row for row in own if row["axis"] == "x"), key=lambda row: abs(row["peak"]))
         # Noise beyond the threshold begins drags of its own, which are no end of this one's return.
-        begin, end = np.searchsorted(t, (guided["release_s"] - 1e-9, start)).tolist()
+        begin, end = t.searchsorted((guided["release_s"] - 1e-9, start)).tolist()
         led = Drag(axis=0, number=1, begin=begin, release=begin, end=end)
         before = x[t <= start][-1]
         moved = np.linalg.norm(x[(t > start) & (t < stop)] - before, axis=1)

@@ -137,7 +137,7 @@ def merge_bodies(bodies: Sequence[Body]) -> Body:
     mass = float(sum(body.mass for body in bodies))
     if mass == 0.0:
         return Body(0.0, np.zeros(3), np.sum([body.inertia for body in bodies], axis=0))
-    com: Array = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
+    com = np.sum([body.mass * body.com for body in bodies], axis=0) / mass
     inertia = np.zeros((3, 3))
     for m, c, tensor in bodies:
         inertia += tensor + m * point_tensor(c - com)
@@ -177,7 +177,7 @@ def improper(mass: float, inertia: Array) -> str:
     """Why these are no mass and no tensor at all, or ""."""
     if not np.isfinite(mass) or mass < 0:
         return f"mass is {mass:g} kg; it must be zero or positive"
-    if not np.all(np.isfinite(inertia)):
+    if not np.isfinite(inertia).all():
         return "inertia is not finite"
     low = float(np.linalg.eigvalsh(inertia)[0])
     if low < -slack_of(inertia):
@@ -187,7 +187,7 @@ def improper(mass: float, inertia: Array) -> str:
 
 def slack_of(inertia: Array) -> float:
     """How far a rounded tensor may be beyond what a body can have. [kg·m²]"""
-    return 1e-6 * max(float(np.max(np.abs(np.linalg.eigvalsh(inertia)))), 1e-12)
+    return 1e-6 * max(float(np.abs(np.linalg.eigvalsh(inertia)).max()), 1e-12)
 
 
 def nearest_tensor(inertia: Array) -> Array:

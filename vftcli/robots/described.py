@@ -115,7 +115,7 @@ def load_described(path: Path, tip: str, arguments: Sequence[str]) -> Robot:
 def robot_of(lumped: LumpedArm, file: Section) -> Robot:
     """The robot of an arm: its chain and limits, the rest from the TOML beside it."""
     chain = lumped.chain
-    if why := weightless(float(np.sum(chain.mass))):
+    if why := weightless(float(chain.mass.sum())):
         raise RobotError(f"{lumped.tree.path}: {why}, or take the maker's dynamic description")
     joints = matched_joints(file, chain, lumped.tree)
     rotor = column(joints, "rotor_inertia")
@@ -198,7 +198,7 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         yield caution("links-without-mass", Where(joints=bare))
     # What the nearest tensors that a body can have differ by, zero where the tensor was right.
     changes = chain.inertia - np.array([body.inertia for _, body in lumped.turned])
-    if changed := tuple(j + 1 for j, change in enumerate(changes) if np.any(change)):
+    if changed := tuple(j + 1 for j, change in enumerate(changes) if change.any()):
         links = [lumped.joints[j - 1].child for j in changed]
         parameters = np.zeros((chain.joints, LINK))
         parameters[:, 4:] = np.stack([changes[:, row, col] for row, col in TENSOR], axis=1)
@@ -206,12 +206,12 @@ def inertia_remarks(lumped: LumpedArm, chain: Chain) -> Iterator[Remark]:
         q = rng.uniform(-np.pi, np.pi, (POSES, chain.joints))
         sign = rng.choice([-1.0, 1.0], (2, *q.shape))
         regressor = torque_regressor(chain, q, SPEED * sign[0], ACCELERATION * sign[1])
-        worst = float(np.max(np.abs(regressor @ parameters.ravel())))
+        worst = float(np.abs(regressor @ parameters.ravel()).max())
         yield caution("tensors-changed", Where(joints=changed), links=links, worst_Nm=worst)
     if bare:
         n = chain.joints
         q = np.random.default_rng(0).uniform(-np.pi, np.pi, (8, n))
-        M = momentum_terms(chain, np.repeat(q, n, axis=0), np.tile(np.eye(n), (8, 1))).p
+        M = momentum_terms(chain, q.repeat(n, axis=0), np.tile(np.eye(n), (8, 1))).p
         M = M.reshape(8, n, n)
         values = np.linalg.eigvalsh(M + M.swapaxes(1, 2))
         if np.any(values[:, 0] <= 1e-12 * values[:, -1]):

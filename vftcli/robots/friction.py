@@ -56,7 +56,7 @@ def coulomb_viscous(
     with f_l the growth with the torque that the gear carries [1] (`load`, the joint's gravity
     torque [N·m], like `dq`), f_s dry torque at breakaway above f_c [N·m], which fades over v_s.
     """
-    torque: Array = dq * (1.0 / smoothing)
+    torque = dq * (1.0 / smoothing)
     np.tanh(torque, out=torque)
     dry: Array | float = coulomb
     if load is not None and load_coulomb:
@@ -107,7 +107,7 @@ def sigmoid(dq: Array, amplitude: float, slope: float, shift: float) -> Array:
         C. Gaz et al., "Dynamic identification of the Franka Emika Panda robot with retrieval of
         feasible parameters using penalty-based optimization", IEEE RA-L 2019, Sec. II.
     """
-    torque: Array = -slope * dq
+    torque = -slope * dq
     torque -= slope * shift
     with np.errstate(over="ignore"):  # far below zero: A/∞ is 0, as it should be
         np.exp(torque, out=torque)
@@ -137,10 +137,10 @@ def bent_line(
     ]
     # sign(v) max(|v| − v_k, 0) is v − clip(v, ±v_k), and the changes add up to the last slope.
     torque = coulomb_viscous(dq, torques[0], **others)
-    part: Array = dq * slopes[-1]
+    part = dq * slopes[-1]
     torque += part
     for speed, slope, before in zip(speeds, slopes, [0.0, *slopes], strict=False):
-        np.clip(dq, -speed, speed, out=part)
+        dq.clip(-speed, speed, out=part)
         part *= slope - before
         torque -= part
     return torque
@@ -188,9 +188,8 @@ FRICTION_MODELS = {
 def warmth(law: Sequence[float], temperature: Array | float) -> Array:
     """s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T), T in °C. Like `temperature` [1]"""
     p1, p2, p3, p4 = law
-    T = np.asarray(temperature, dtype=np.float64)
-    share: Array = p1 * np.exp(p2 * T) + p3 * np.exp(p4 * T)
-    return share
+    T = np.asarray(temperature, dtype=float)
+    return p1 * np.exp(p2 * T) + p3 * np.exp(p4 * T)
 
 
 def lawless(law: Sequence[float]) -> str:
@@ -199,7 +198,7 @@ def lawless(law: Sequence[float]) -> str:
         return ""
     with np.errstate(over="ignore", invalid="ignore"):
         share = warmth(law, np.linspace(COLDEST, WARMEST, 100))
-        least, most = float(np.min(share)), float(np.max(share))
+        least, most = float(share.min()), float(share.max())
     if np.isfinite(most) and least > 0.0 and most < 1e3 * least:
         return ""
     return (
@@ -292,7 +291,7 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
     dq = np.linspace(-limit, limit, 1001)
     torque = steady_torque(friction, dq)
     # A hundred-thousandth of the torque is rounding, at a sigmoid's flat ends too.
-    falls = np.diff(torque) < -1e-5 * np.max(np.abs(torque))
+    falls = np.diff(torque) < -1e-5 * np.abs(torque).max()
     ends = np.minimum(np.abs(dq[:-1]), np.abs(dq[1:]))
     return float(ends[falls].min()) if falls.any() else float("nan")
 

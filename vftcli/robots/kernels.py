@@ -280,8 +280,7 @@ def load_wrench(chain: Chain, q: Array) -> Array:
 
 def load_regressor(chain: Chain, q: Array) -> Array:
     """External joint torque of `load_wrench`, by the same four numbers. (N, n, 4)"""
-    torque: Array = flange_jacobian(chain, q).transpose(0, 2, 1) @ load_wrench(chain, q)
-    return torque
+    return flange_jacobian(chain, q).transpose(0, 2, 1) @ load_wrench(chain, q)
 
 
 def chain_parameters(chain: Chain) -> Array:

@@ -88,7 +88,7 @@ class Run(Shown):
 
         It is ṗ − Cᵀq̇ + g + F_f, with ṗ by central differences.
         """
-        change: Array = np.gradient(self.terms.p, self.t, axis=0)
+        change = np.gradient(self.terms.p, self.t, axis=0)
         return change - self.terms.mu + self.drive_torque
 
     @cached_property
@@ -203,7 +203,7 @@ def white_noise(x: Array) -> Array:
     if len(x) < 3:
         return np.full(x.shape[1], np.nan)
     curvature = (column[:-2] - 2.0 * column[1:-1] + column[2:] for column in x.T)
-    return np.asarray(np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature]))
+    return np.sqrt([np.mean(bend**2) / 6.0 for bend in curvature])
 
 
 def paired(recording: Recording, robot: Robot) -> Recording:

@@ -46,13 +46,13 @@ def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
     centre c before the first sample it starts undeflected, c = q⁰, wrong by at most the whole
     deflection until the joint has moved 2 s₀.
     """
-    reach = np.asarray(length, dtype=np.float64)
+    reach = np.asarray(length, dtype=float)
     if not len(q):
         return Play(np.zeros_like(q), np.zeros(q.shape[1:]) if centre is None else centre)
     start = q[0] if centre is None else centre
     centres = follow(q - reach, q + reach, start)
-    state: Array = (q - centres) / reach
-    return Play(np.clip(state, -1.0, 1.0, out=state), centres[-1])
+    state = (q - centres) / reach
+    return Play(state.clip(-1.0, 1.0, out=state), centres[-1])
 
 
 def follow(low: Array, high: Array, start: Array) -> Array:
@@ -76,13 +76,12 @@ def follow(low: Array, high: Array, start: Array) -> Array:
 
 def clipped(value: Array, low: Array, high: Array) -> Array:
     """`numpy.clip` without its checks, which cost more than a row of a block."""
-    result: Array = np.minimum(np.maximum(value, low), high)
-    return result
+    return np.minimum(np.maximum(value, low), high)
 
 
 def in_blocks(limits: Array, blocks: int) -> Array:
     """Samples as position in block × block × joint, the last one filled up."""
-    padded = np.concatenate([limits, np.repeat(limits[-1:], blocks * BLOCK - len(limits), axis=0)])
+    padded = np.concatenate([limits, limits[-1:].repeat(blocks * BLOCK - len(limits), axis=0)])
     shaped = padded.reshape(blocks, BLOCK, -1)
     return np.ascontiguousarray(shaped.swapaxes(0, 1))
 

@@ -205,7 +205,7 @@ def disturbance_impulse(terms: DynamicsTerms) -> Array:
     A difference of two of its values over the time between them is the mean of d there.
     """
     gained = raw_disturbance(terms) * np.diff(terms.t)[:, None]
-    return np.concatenate([np.zeros((1, terms.joints)), np.cumsum(gained, axis=0)])
+    return np.concatenate([np.zeros((1, terms.joints)), gained.cumsum(axis=0)])
 
 
 class Blocks(NamedTuple):
@@ -287,7 +287,7 @@ def disturbance_stretches(terms: DynamicsTerms, inside: Mask, step: float) -> li
     for start, stop in runs_of(whole):
         clock = t[start : stop + 1]
         total = np.concatenate([np.zeros((1, d.shape[1])), d[start:stop] * np.diff(clock)[:, None]])
-        np.cumsum(total, axis=0, out=total)
+        total.cumsum(axis=0, out=total)
         even = np.arange(clock[0], clock[-1], step)
         stretches.append(np.diff(resample_columns(even, clock, total), axis=0) / step)
     return stretches

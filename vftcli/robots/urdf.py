@@ -136,7 +136,7 @@ class UrdfPart(NamedTuple):
             return np.array([1.0, 0.0, 0.0])
         vector = np.array(self.numbers(axis, "xyz", 3))
         # An axis is normalised: shorter, it is rounding, longer, its square overflows.
-        if not 1e-9 < np.max(np.abs(vector)) < 1e9:
+        if not 1e-9 < np.abs(vector).max() < 1e9:
             self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
         unit: Array = vector / np.linalg.norm(vector)
         return unit
@@ -292,7 +292,7 @@ class MjcfJoint(NamedTuple):
         self.pin.computeJointJacobians(model, data, self.pin.neutral(model))
         local = self.pin.getJointJacobian(model, data, k, self.pin.ReferenceFrame.LOCAL)
         column, rotor = np.array(local).reshape(6, model.nv)[:, v], float(model.armature[v])
-        axis = column[3:] if np.any(column[3:]) else column[:3]
+        axis = column[3:] if column[3:].any() else column[:3]
         if not np.isclose(np.linalg.norm(axis), 1.0):
             self.refuse("its axis points nowhere")
         if why := BOUNDS["rotor_inertia"].broken("armature", [rotor]):

@@ -20,7 +20,7 @@ def frozen(value: ArrayLike) -> Array:
     """A read-only float64 array that nobody else can write to; not copied where it is one."""
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
         return value
-    copy = np.array(value, dtype=np.float64, order="K")
+    copy = np.array(value, dtype=float, order="K")
     copy.setflags(write=False)
     return copy
 
@@ -83,7 +83,7 @@ def seal(owner: object, *names: str, shape: tuple[int, ...] = (), called: str = 
 def seal_mask(owner: object, name: str) -> None:
     """Make a mask of a frozen dataclass read-only, non-zero true; None stays None."""
     if (value := getattr(owner, name)) is not None:
-        copy = np.array(value, dtype=np.bool_)
+        copy = np.array(value, dtype=bool)
         copy.setflags(write=False)
         object.__setattr__(owner, name, copy)
 
@@ -106,10 +106,10 @@ def check_clock(t: Array, what: str) -> None:
     if np.ndim(t) != 1:
         raise ShapeError(f"the clock of {what} has shape {np.shape(t)}; it must be one-dimensional")
     # Between two finite ends a clock that always increases is finite.
-    if not len(t) or (np.all(np.isfinite(t[[0, -1]])) and np.all(t[1:] > t[:-1])):
+    if not len(t) or (np.isfinite(t[[0, -1]]).all() and np.all(t[1:] > t[:-1])):
         return
-    if not np.all(np.isfinite(t)):
-        k = int(np.argmin(np.isfinite(t)))
+    if not np.isfinite(t).all():
+        k = int(np.isfinite(t).argmin())
         raise ClockError(f"the clock of {what} is not finite at sample {k}")
     k = int(np.argmax(np.diff(t) <= 0))
     raise ClockError(
@@ -144,7 +144,7 @@ def is_uniform(t: Array, tolerance: float = EVEN) -> bool:
     steps = np.diff(t)
     if steps.size == 0:
         return True
-    least, most = np.min(steps), np.max(steps)
+    least, most = steps.min(), steps.max()
     if least > 0.0 and most - least <= tolerance * least:
         return True  # wherever between them the median is
     usual = median(steps)

@@ -62,7 +62,7 @@ def zero_phase(t: Array, signals: Array, cutoff: float) -> Array:
 
 def derivative(t: Array, signals: Array) -> Array:
     """Central differences, of second order also on uneven clocks. (T, m)"""
-    return np.asarray(np.gradient(signals, t, axis=0, edge_order=2))
+    return np.gradient(signals, t, axis=0, edge_order=2)
 
 
 def band_pass(t: Array, x: Array, low: float, high: float) -> Array:
@@ -99,7 +99,7 @@ def cascade(sections: Array, x: Array) -> Array:
         g = np.array([b1 - a1 * b0, b2 - a2 * b0])
         settled = np.linalg.solve(np.eye(2) - F, g)[:, None] * x[0]
         n = x.shape[1]
-        turned = np.repeat(F[:, :, None], n, axis=2), np.repeat(g[:, None], n, axis=1)
+        turned = F[:, :, None].repeat(n, axis=2), g[:, None].repeat(n, axis=1)
         state = steady_filter(*turned, x[:-1], settled, np.array([[1.0], [0.0]]))[0]
         x = b0 * x + np.concatenate([settled[:1], state])
     return x
@@ -108,7 +108,7 @@ def cascade(sections: Array, x: Array) -> Array:
 def refuse_mostly_gap(t: Array, step: float) -> None:
     """Raise a ClockError if a clock of some step [s] is nearly all gap."""
     if float(t[-1] - t[0]) > MOSTLY_GAP * len(t) * step:
-        after = int(np.argmax(np.diff(t)))
+        after = int(np.diff(t).argmax())
         raise ClockError(
             f"the log waits {t[after + 1] - t[after]:.4g} s after t = {t[after]:.3f} s, over "
             f"{MOSTLY_GAP} times what it holds; take the part before or behind with --interval"
@@ -157,7 +157,7 @@ def noise_passed(step: float, cutoff: float | tuple[float, float], slope: int = 
     gain = np.abs(response) ** 4
     if slope:
         gain = gain * (np.sin(omega) / step) ** 2
-    return float(np.mean(gain))
+    return float(gain.mean())
 
 
 def welch(stretches: Sequence[Array], size: int, step: float) -> tuple[Array, int]:

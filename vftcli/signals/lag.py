@@ -83,7 +83,7 @@ def sliding(later: Array, earlier: Array, at: Indices) -> Array:
 
 def centred(signals: Array, known: Mask) -> Array:
     """Signals without their mean over the known samples, zero elsewhere. (m, T)"""
-    centre: Array = np.where(known, signals, 0.0)
+    centre = np.where(known, signals, 0.0)
     centre -= centre.sum(axis=1, keepdims=True) / max(np.count_nonzero(known), 1)
     centre[:, ~known] = 0.0
     return centre
@@ -91,7 +91,7 @@ def centred(signals: Array, known: Mask) -> Array:
 
 def peak(fit: Array) -> float:
     """Position of the largest inner value, between samples; NaN if none stands out."""
-    k = 1 + int(np.argmax(fit[1:-1]))
+    k = 1 + int(fit[1:-1].argmax())
     before, here, after = fit[k - 1], fit[k], fit[k + 1]
     if not here >= LEAST_FIT or here < max(before, after):
         return float("nan")
@@ -138,7 +138,7 @@ def time_offset(t: Array, late: Array, early: Array) -> Offset:
     cross = sliding(x.T, y.T, at).sum(axis=0)
     energy = overlap_energy(x, at, count) * overlap_energy(y, -at, count)
     value = cross / np.sqrt(np.maximum(energy, np.finfo(np.float64).tiny))
-    best = int(np.argmax(value))
+    best = int(value.argmax())
     inside = 0 < best < len(at) - 1
     shift = parabola(*value[best - 1 : best + 2]) if inside else 0.0
     return Offset(lag=float((at[best] + shift) * step), correlation=float(value[best]))
@@ -156,11 +156,11 @@ class LagFit(NamedTuple):
     @property
     def closest(self) -> float:
         """The lag with the smallest difference. [samples]"""
-        return float(self.lag[int(np.argmin(self.difference))])
+        return float(self.lag[int(self.difference.argmin())])
 
     def rivals(self, most: float) -> list[float]:
         """Lags of valleys with a longer overlap than the closest, longest first."""
-        inner, best = self.difference[1:-1], int(np.argmin(self.difference))
+        inner, best = self.difference[1:-1], int(self.difference.argmin())
         valley = (inner <= self.difference[:-2]) & (inner <= self.difference[2:]) & (inner <= most)
         found = 1 + np.flatnonzero(valley & (self.overlap[1:-1] > self.overlap[best]))
         return [float(k) for k in self.lag[found[np.argsort(-self.overlap[found])]]]
@@ -188,6 +188,6 @@ def overlap_energy(series: Array, lags: Indices, other: int) -> Array:
 
     Without it a fit would favour small lags, which overlap longer.
     """
-    total = np.concatenate([[0.0], np.cumsum(np.sum(series**2, axis=1))])
+    total = np.concatenate([[0.0], np.sum(series**2, axis=1).cumsum()])
     energy: Array = total[np.minimum(len(series), other + lags)] - total[np.maximum(0, lags)]
     return energy

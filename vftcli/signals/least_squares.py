@@ -63,8 +63,7 @@ class NormalEquations(NamedTuple):
     def solution(self) -> Array:
         """Least squares with scaled columns; what the data leaves free stays zero. (k,)"""
         values, V = shown_directions(self.gram, NULL)
-        x: Array = V @ ((V.T @ self.right) / values)
-        return x
+        return V @ ((V.T @ self.right) / values)
 
     def misfit(self, x: Array) -> float:
         """Sum of squares ‖A x − y‖² that a solution x (k,) leaves."""
@@ -86,15 +85,14 @@ def shown_directions(gram: Array, null: float) -> tuple[Array, Array]:
     scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
     scale[scale == 0.0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(scale, scale))
-    keep = values > null * np.max(values, initial=0.0)
+    keep = values > null * values.max(initial=0.0)
     return values[keep], vectors[:, keep] / scale[:, None]
 
 
 def inverse_of(gram: Array) -> Array:
     """(AᵀWA)⁻¹, zero in directions that the data does not show. (k, k)"""
     values, V = shown_directions(gram, NULL_OF_INVERSE)
-    inverse: Array = (V / values) @ V.T
-    return inverse
+    return (V / values) @ V.T
 
 
 def solve(A: Array, y: Array) -> Array:
@@ -104,8 +102,7 @@ def solve(A: Array, y: Array) -> Array:
 
 def huber(z: Array) -> Array:
     """Weights of residuals in standard deviations: 1 up to `HUBER`."""
-    weights: Array = HUBER / np.maximum(np.abs(z), HUBER)
-    return weights
+    return HUBER / np.maximum(np.abs(z), HUBER)
 
 
 def robust_sd(residual: Array) -> Array:
@@ -119,13 +116,13 @@ def correlation_time(residual: Array) -> float:
     """Samples that count as one: 1 + 2 Σ ρ_k up to the first ρ_k ≤ 0. At least 1."""
     x = residual - residual.mean()
     size = len(x)
-    if size < 4 or not np.any(x):
+    if size < 4 or not x.any():
         return 1.0
     spectrum = np.fft.rfft(x, 2 * size)
     rho = np.fft.irfft(np.abs(spectrum) ** 2)[: size // 2]
     rho /= rho[0]
     end = int(np.argmax(rho <= 0.0)) or len(rho)
-    return max(1.0, 1.0 + 2.0 * float(np.sum(rho[1:end])))
+    return max(1.0, 1.0 + 2.0 * float(rho[1:end].sum()))
 
 
 def deviations(A: Array, residual: Array, weights: Array) -> Array:
@@ -166,5 +163,5 @@ def cross_validated(A: Array, y: Array, weights: Array, parts: Sequence[Array]) 
     for rows in parts:
         part = normal_equations(A[rows], y[rows], weights[rows])
         total += part.misfit(whole.minus(part).solution())
-        count += float(np.sum(weights[rows]))
+        count += float(weights[rows].sum())
     return float(np.sqrt(total / count)) if count > 0 else float("nan")

@@ -130,7 +130,7 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
         far = np.maximum(limit[rows - 1], peak * three)
         beyond = np.zeros(x.shape)
         beyond[rows] = np.maximum(np.abs(made[rows] - near[:, NEAR]) - far, 0.0)
-        worst = np.max(beyond[rows[:, None] + around], axis=1)
+        worst = beyond[rows[:, None] + around].max(axis=1)
         drawn = drawn_to(near[:, NEAR], others, made[rows], far)
         made[rows] = np.where(beyond[rows] >= worst, drawn, made[rows])
     return made, np.abs(made - x) > 0.0

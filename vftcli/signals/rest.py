@@ -56,11 +56,11 @@ def resting(t: Array, dq: Array) -> Mask:
 
     Unlike `standing` it knows no shortest stop: it tells friction at rest from friction in motion.
     """
-    first = np.searchsorted(t, t - AROUND, side="left")
-    last = np.searchsorted(t, t + AROUND, side="right")
-    rests, count = np.zeros(dq.shape, dtype=bool), np.zeros(len(t) + 1, dtype=np.intp)
+    first = t.searchsorted(t - AROUND, side="left")
+    last = t.searchsorted(t + AROUND, side="right")
+    rests, count = np.zeros(dq.shape, dtype=bool), np.zeros(len(t) + 1, dtype=int)
     for j, slow in enumerate(slower(dq).T):
-        np.cumsum(slow, out=count[1:])
+        slow.cumsum(out=count[1:])
         rests[:, j] = 2 * (count[last] - count[first]) > last - first
     return rests
 

@@ -39,7 +39,7 @@ def median_step(t: Array) -> float:
 def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
     """Samples after which a clock waits longer than `steps` steps. (G,)"""
     if len(t) < 2:
-        return np.zeros(0, dtype=np.intp)
+        return np.zeros(0, dtype=int)
     taken = np.diff(t)
     return np.flatnonzero(taken > steps * median(taken))
 
@@ -84,14 +84,14 @@ def grown(t: Array, mask: Mask, margin: float) -> Mask:
     """A mask with `margin` before and after each of its runs [s]. (T,)"""
     found = mask.copy()
     for start, stop in runs_of(mask):
-        first = np.searchsorted(t, t[start] - margin)
-        found[first : np.searchsorted(t, t[stop - 1] + margin, side="right")] = True
+        first = t.searchsorted(t[start] - margin)
+        found[first : t.searchsorted(t[stop - 1] + margin, side="right")] = True
     return found
 
 
 def near(mask: Mask, count: int) -> Mask:
     """Samples within `count` samples of a true one, column by column. (T, n)"""
-    total = np.vstack([np.zeros((1, mask.shape[1])), np.cumsum(mask, axis=0)])
+    total = np.vstack([np.zeros((1, mask.shape[1])), mask.cumsum(axis=0)])
     k = np.arange(len(mask))
     first, last = np.maximum(k - count, 0), np.minimum(k + count + 1, len(mask))
     found: Mask = total[last] - total[first] > 0.0

@@ -202,6 +202,5 @@ class Wrench(TimeSeries):
 
     def between(self, start: float, stop: float) -> Array:
         """The known samples with start ≤ t ≤ stop. (k, 6) [N, N·m]"""
-        inside = (self.t >= start) & (self.t <= stop) & np.all(np.isfinite(self.known), axis=1)
-        rows: Array = self.values[inside]
-        return rows
+        inside = (self.t >= start) & (self.t <= stop) & np.isfinite(self.known).all(axis=1)
+        return self.values[inside]

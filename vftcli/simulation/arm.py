@@ -191,7 +191,7 @@ class Arm:
         rest = np.zeros_like(q_d)
         dq_d, ddq_d = rest if dq_d is None else dq_d, rest if ddq_d is None else ddq_d
         if forward is None:
-            q_d = np.clip(q_d, self.servo.q_min, self.servo.q_max)
+            q_d = q_d.clip(self.servo.q_min, self.servo.q_max)
             reference = Reference(q_d[None], dq_d[None], ddq_d[None])
             forward = self.servo.feed_forward(reference)[0]
         history, plant, k = self.history, self.plant, self.made
@@ -218,7 +218,7 @@ class Arm:
 
     def check_motion(self) -> None:
         """Raise a ParameterError if the loop has become unstable."""
-        fastest = float(np.max(np.abs(self.plant.v)))
+        fastest = float(np.abs(self.plant.v).max())
         if not fastest < RUNAWAY:
             raise ParameterError(
                 f"the arm runs away at {self.t:.3f} s: servo or contacts are too stiff for a step "
@@ -256,7 +256,7 @@ class Arm:
 
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
     """Normal deviates of standard deviation `size`, cut at two standard deviations."""
-    return np.asarray(size * np.clip(rng.standard_normal(shape), -2.0, 2.0))
+    return np.asarray(size * rng.standard_normal(shape).clip(-2.0, 2.0))
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:

@@ -217,7 +217,7 @@ def draw_walk(
     walk = np.cumsum(rng.standard_normal((steps, joints)) * sizes, axis=0)
     walk += spec.initial * rng.standard_normal(joints)
     late = np.arange(steps) * step >= spec.begin
-    begun = walk - (walk[np.argmax(late)] if spec.begin > 0 else 0.0)
+    begun = walk - (walk[late.argmax()] if spec.begin > 0 else 0.0)
     return np.asarray(begun * late[:, None])
 
 

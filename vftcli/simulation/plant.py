@@ -72,7 +72,7 @@ class TrueFriction:
         """
         dry = self.coulomb
         if self.stribeck != 0.0:
-            fade: Array = np.exp(-((dq / self.stribeck_velocity) ** 2))
+            fade = np.exp(-((dq / self.stribeck_velocity) ** 2))
             dry = dry * (1.0 + self.stribeck * fade)
         if load is not None:
             dry = dry + self.load_coulomb * np.abs(load)
@@ -312,7 +312,7 @@ def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Arra
         for j in range(len(v)):
             slip = free[j] - A[j] @ friction
             friction[j] = np.clip(friction[j] + slip / A[j, j], -limit[j], limit[j])
-        if np.max(np.abs(friction - before)) <= 1e-14 * (1.0 + np.max(np.abs(friction))):
+        if np.abs(friction - before).max() <= 1e-14 * (1.0 + np.abs(friction).max()):
             break
     after = free - A @ friction
     after[np.abs(friction) < limit] = 0.0

@@ -123,7 +123,7 @@ def measure_run(arm: Arm, samples: Samples, wrench: Array) -> Measured:
     draw = spec.jitter * rng.standard_normal(count)
     if spec.jitter and count > 1:
         bound = 0.45 * (stamp[1] - stamp[0])
-        stamp = stamp + np.clip(draw, -bound, bound)
+        stamp = stamp + draw.clip(-bound, bound)
     # The first and the last row always hold their own samples.
     lost, again = rng.random(count) < spec.dropped, rng.random(count) < spec.repeated
     inner = np.arange(count) > 0

@@ -74,7 +74,7 @@ class Stretches:
         from numpy.polynomial import chebyshev
 
         t = np.asarray(t, dtype=float)
-        which = np.clip(np.searchsorted(self.times[:, 0], t, side="right") - 1, 0, None)
+        which = np.clip(self.times[:, 0].searchsorted(t, side="right") - 1, 0, None)
         n = self.paths[0].shape[1]
         out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
         for k, path in enumerate(self.paths):
@@ -133,7 +133,7 @@ class CircleSpec:
         ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
         q = follow(robot, home.rotation, centre + ring[[*range(count), 0]], start, "the circle")
         closure = np.outer(np.arange(count) / count, q[-1] - q[0])
-        if np.max(np.abs(closure)) > 1.0:
+        if np.abs(closure).max() > 1.0:
             raise ParameterError("the circle winds a joint up; choose another start or radius")
         mean, *series = np.fft.rfft(q[:-1], axis=0)[: HARMONICS + 1] / count
         cosine, sine = 2.0 * np.real(series), -2.0 * np.imag(series)
@@ -262,7 +262,7 @@ class JointwiseSpec:
         t, times, paths = self.rest, [], []
         for axis, speed in product(self.amplitude * np.eye(robot.joints), self.speeds):
             for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
-                length = max(float(np.sum(np.abs(b - a))) / speed, 0.2)
+                length = max(float(np.abs(b - a).sum()) / speed, 0.2)
                 times.append((t, t + length))
                 paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
                 t += length
@@ -354,7 +354,7 @@ def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str
     for k, point in enumerate(points):
         found = reach(robot.model, pin.SE3(rotation, point), q)
         # A jump of a radian is another branch of the inverse kinematics.
-        if found is None or np.max(np.abs(found - q)) > 1.0:
+        if found is None or np.abs(found - q).max() > 1.0:
             place = ", ".join(f"{value:.3f}" for value in point)
             raise ParameterError(
                 f"{what}: the flange of {robot.name!r} cannot reach ({place}) m (point {k + 1} of "
@@ -374,7 +374,7 @@ def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
                 f"{what}: joint {j} of {robot.name!r} would move over {place.min():.3f} to "
                 f"{place.max():.3f} rad; its limits are {low:.3f} to {high:.3f}"
             )
-        if (fastest := np.max(np.abs(speed))) > most:
+        if (fastest := np.abs(speed).max()) > most:
             raise ParameterError(
                 f"{what}: joint {j} of {robot.name!r} would move at {fastest:.2f} rad/s; "
                 f"its limit is {most:.2f}"

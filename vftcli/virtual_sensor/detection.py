@@ -75,11 +75,11 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     The band is the median of what is read untouched (S, k) ± `BAND` × its largest departure, at
     least so much.
     """
-    inside = quiet[np.all(np.isfinite(quiet), axis=1)]
+    inside = quiet[np.isfinite(quiet).all(axis=1)]
     if len(inside) == 0:
         raise ParameterError("the free part holds no sample in which the wrench is known")
     centre = np.median(inside, axis=0)
-    half = np.maximum(BAND * np.max(np.abs(inside - centre), axis=0), least)
+    half = np.maximum(BAND * np.abs(inside - centre).max(axis=0), least)
     return np.asarray(np.nan_to_num(np.abs(values - centre) / half, nan=0.0).max(axis=1))
 
 

@@ -86,7 +86,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     if check_frame(frame) == "base":
         # A wrench in base axes needs no pose at all, not even the tool's.
         return np.broadcast_to(np.eye(6), (len(flange), 6, 6))
-    turned = np.swapaxes(flange, 1, 2)
+    turned = flange.swapaxes(1, 2)
     X = np.zeros((len(flange), 6, 6))
     X[:, :3, :3] = X[:, 3:, 3:] = turned
     if frame == "flange":
@@ -96,10 +96,10 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
     """A pose whose rotation is one."""
-    R, p = np.asarray(rotation, dtype=np.float64), np.asarray(translation, dtype=np.float64)
+    R, p = np.asarray(rotation, dtype=float), np.asarray(translation, dtype=float)
     if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
         raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
-    error = float(np.max(np.abs(R.T @ R - np.eye(3))))
+    error = float(np.abs(R.T @ R - np.eye(3)).max())
     if error > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         why = f"RᵀR differs from the identity by {error:.3g}"
         if error <= ROTATION_TOLERANCE:
@@ -144,7 +144,7 @@ SURE = 4.5
 
 def logged_wrench(recording: Recording, chain: Chain, mounting: Mounting) -> Wrench:
     """The log's own wrench as force on the robot, in base axes about the flange point."""
-    if not np.any(recording.require("wrench")):
+    if not recording.require("wrench").any():
         raise MissingSignalError(
             f"{recording.name}: the log's wrench is zero in every sample, so it measures nothing"
         )
@@ -209,7 +209,7 @@ def controller_point(
     """
     if recording.current is None or recording.target_current is None:
         return "flange", (caution("controller-point-without-currents"),)
-    if tool is None or not np.any(tool):
+    if tool is None or not tool.any():
         return "flange", (caution("controller-point-without-tool"),)
     beyond = recording.current - recording.target_current
     force, moment = np.hsplit(recording.require("wrench"), 2)
@@ -220,11 +220,9 @@ def controller_point(
         point: unexplained(beyond, np.einsum("tij,ti->tj", J, np.hstack([force, turned])))
         for point, turned in about.items()
     }
-    values: dict[str, Any] = {
-        point: float(np.sqrt(np.mean(share))) for point, share in left.items()
-    }
+    values: dict[str, Any] = {point: float(np.sqrt(share.mean())) for point, share in left.items()}
     pieces = recording.duration / PIECE
-    evidence = 0.5 * pieces * float(np.sum(np.log(left["flange"] / left["tool"])))
+    evidence = 0.5 * pieces * float(np.log(left["flange"] / left["tool"]).sum())
     if abs(evidence) <= SURE:
         return "flange", (caution("controller-point-open", **values),)
     point = "tool" if evidence > 0.0 else "flange"

@@ -173,7 +173,7 @@ def learn_noise(free: Sequence[Blocks], dry: Array) -> TorqueNoise | None:
         ]
     )
     each = [np.quantile(squares, share, axis=0) / value for share, value in QUANTILES]
-    factor: Array = np.maximum(np.max(each, axis=0), 1.0)
+    factor = np.maximum(np.max(each, axis=0), 1.0)
     return replace(noise, white=noise.white * factor, variance=noise.variance * factor)
 
 
@@ -267,9 +267,9 @@ def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[fl
         shape = (1.0 - a * a) / (1.0 - 2.0 * a * cosine + a * a)
         S = 1.0 + np.exp(ratios)[None, :, None] * shape[:, None, :]
         levels = np.mean(P / S, axis=2) / seconds
-        cost = np.sum(np.log(S), axis=2) + len(f) * np.log(np.maximum(levels, LEAST_NOISE**2))
+        cost = np.log(S).sum(axis=2) + len(f) * np.log(np.maximum(levels, LEAST_NOISE**2))
         cost += 0.5 * ((times[:, None] - np.log(USUAL_TIME)) / TIME_SPREAD) ** 2
-        i, j = np.unravel_index(np.argmin(cost), cost.shape)
+        i, j = np.unravel_index(cost.argmin(), cost.shape)
         best, level = np.array([times[i], ratios[j]]), float(levels[i, j])
         reach = (high - low) / (count - 1)
         low, high = np.maximum(low, best - reach), np.minimum(high, best + reach)

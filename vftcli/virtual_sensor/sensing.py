@@ -172,7 +172,7 @@ def smoothed_wrench(
         X = from_base(sensor.frame, flange, sensor.mounting)
         there, covariance = smoothed.at(t[span])
         values[span] = np.squeeze(X @ there[:, :, None], axis=2)
-        sd[span] = deviations(X @ covariance @ np.swapaxes(X, 1, 2))
+        sd[span] = deviations(X @ covariance @ X.swapaxes(1, 2))
     return replace(
         wrench,
         values=handed_over(values),
@@ -253,7 +253,7 @@ def mask_remark(hidden: Mask, sigma: Array | None) -> tuple[Remark, ...]:
     if not count or sigma is None:
         return ()
     values: dict[str, Any] = {"masked": count, "samples": len(hidden), "share": count / len(hidden)}
-    return (caution("pose-hides-wrench", **values, sigma_min_m=float(np.min(sigma))),)
+    return (caution("pose-hides-wrench", **values, sigma_min_m=float(sigma.min())),)
 
 
 OWN = "own"  #: The word for the observers' own covariance as the torque error.

@@ -110,7 +110,7 @@ class AxesFit(NamedTuple):
     @property
     def words(self) -> str:
         """Where each of their axes lies in ours, as "+x +z −y"."""
-        places = np.argmax(np.abs(self.matrix), axis=1)
+        places = np.abs(self.matrix).argmax(axis=1)
         signs = np.where(self.matrix.sum(axis=1) > 0, "+", "−")
         return " ".join(f"{sign}{'xyz'[k]}" for sign, k in zip(signs, places, strict=True))
 
@@ -141,8 +141,8 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     theirs = recording.wrench
     if theirs is None:
         return []
-    empty = ~np.any(theirs, axis=1)
-    share, remarks = float(np.mean(empty)), []
+    empty = ~theirs.any(axis=1)
+    share, remarks = float(empty.mean()), []
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
     force = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
     if share == 1.0:

@@ -98,7 +98,7 @@ class SensorReading(Shown):
     @property
     def masked_share(self) -> float:
         """Share of the samples in which the pose cannot tell the wrench."""
-        return float(np.mean(self.masked))
+        return float(self.masked.mean())
 
     @property
     def null_space_limit(self) -> float | None:
@@ -213,7 +213,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     `STEPS`. A load that hangs from the first sample on cannot be told from drift.
     """
     t = wrench.t - wrench.t[0]
-    known = np.all(np.isfinite(wrench.known), axis=1)
+    known = np.isfinite(wrench.known).all(axis=1)
     first = known & (t >= SETTLING) & (t <= SETTLING + LEAST_SPAN)
     if np.count_nonzero(first) < 3:
         return None
@@ -224,7 +224,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     last = len(t) - 1
     runs = [(a, b) for a, b in runs_of(away & known) if t[min(b, last)] - t[a] >= 0.1]
     loaded = covered(runs, len(t)) & (t >= SETTLING)
-    stop = float(t[np.argmax(loaded)]) - BACK if loaded.any() else float(t[-1])
+    stop = float(t[loaded.argmax()]) - BACK if loaded.any() else float(t[-1])
     if stop - SETTLING < LEAST_SPAN:
         return None
     start = float(wrench.t[0])

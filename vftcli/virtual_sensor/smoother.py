@@ -205,7 +205,7 @@ def deviations(covariance: Array) -> Array:
     """Standard deviations of covariances. (T, k)"""
     # A model error that is known has no variance, which rounding may leave on either side.
     variances = np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)
-    return np.asarray(np.sqrt(variances))
+    return np.sqrt(variances)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -334,7 +334,7 @@ def prior_of(
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
     model = block_model(run, free, gate, block_length(run.t, fine=False))
-    return GRID[int(np.argmax(log_likelihood(model.under(GRID))))]
+    return GRID[int(log_likelihood(model.under(GRID)).argmax())]
 
 
 def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
@@ -371,7 +371,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     known = 1.0 / coasted(quiet, v, kept, half) + 1.0 / behind - 1.0 / nothing
     first = np.maximum(np.arange(count) - half, 0)
     last = np.minimum(np.arange(count) + half + 1, count)
-    total = np.vstack([np.zeros(known.shape[1]), np.cumsum(known, axis=0)])
+    total = np.vstack([np.zeros(known.shape[1]), known.cumsum(axis=0)])
     known = (total[last] - total[first]) / (last - first)[:, None]
     # In a gap of the clock nothing would be known of it.
     weight = blocks.known[:, None] / (1.0 / known + R * min(length / UNLISTED, 1.0))

@@ -41,7 +41,7 @@ class Decomposition(NamedTuple):
     @property
     def sigma_min(self) -> Array:
         """Smallest singular value of J_s. (T,) [m]"""
-        return np.asarray(np.sqrt(np.maximum(self.squares[:, 0], 0.0)))
+        return np.sqrt(np.maximum(self.squares[:, 0], 0.0))
 
 
 def decompose(jacobian: Array) -> Decomposition:
@@ -54,7 +54,7 @@ def decompose(jacobian: Array) -> Decomposition:
         )
     scaled = SCALE[:, None] * jacobian
     # The 6×6 product is cheaper to decompose than the 6×n factor, and only the squares are needed.
-    squares, U = np.linalg.eigh(scaled @ np.swapaxes(scaled, 1, 2))
+    squares, U = np.linalg.eigh(scaled @ scaled.swapaxes(1, 2))
     return Decomposition(scaled, U, squares)
 
 
@@ -73,10 +73,7 @@ def least_squares_gain(parts: Decomposition, left_out: float = 0.0) -> Array:
     if left_out:
         inverse = np.where(parts.squares > left_out**2, inverse, 0.0)
     U = parts.U
-    gain: Array = SCALE[:, None] * (
-        (U * inverse[:, None, :]) @ (np.swapaxes(U, 1, 2) @ parts.scaled)
-    )
-    return gain
+    return SCALE[:, None] * ((U * inverse[:, None, :]) @ (U.swapaxes(1, 2) @ parts.scaled))
 
 
 #: Standard deviations of joint torques (T, n) [N·m] → the estimate for them.
@@ -101,13 +98,11 @@ def maximum_a_posteriori(parts: Decomposition, X: Array) -> Solver:
 
     def solve(sd: Array) -> Solution:
         weighted = parts.scaled / sd[:, None, :]
-        information = weighted @ np.swapaxes(weighted, 1, 2) + np.diag(PRIOR**-2)
+        information = weighted @ weighted.swapaxes(1, 2) + np.diag(PRIOR**-2)
         root = np.linalg.inv(np.linalg.cholesky(information))  # C = rootᵀ root
-        C = np.swapaxes(root, 1, 2) @ root
+        C = root.swapaxes(1, 2) @ root
         scaled = X * SCALE
-        return Solution(
-            scaled @ (C @ (weighted / sd[:, None, :])), scaled @ np.swapaxes(root, 1, 2)
-        )
+        return Solution(scaled @ (C @ (weighted / sd[:, None, :])), scaled @ root.swapaxes(1, 2))
 
     return solve
 
@@ -128,9 +123,9 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
     model, does not. Singular directions count as explained by nothing.
     """
     # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
-    tall = np.swapaxes(parts.scaled, 1, 2) @ parts.U
+    tall = parts.scaled.swapaxes(1, 2) @ parts.U
     share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
-    return np.asarray(tau - tall @ (share[:, :, None] * (np.swapaxes(tall, 1, 2) @ tau)))
+    return np.asarray(tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau)))
 
 
 class FlangeWrench(NamedTuple):

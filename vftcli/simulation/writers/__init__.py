@@ -167,7 +167,7 @@ class VendorTable(NamedTuple):
                     values = np.concatenate([values[1:], values[-1:]])
                 values = (-values if content.startswith("-") else values)[rows]
                 if self.decimals is not None:
-                    values = np.round(values, self.decimals)
+                    values = values.round(self.decimals)
                 columns = (values + values.dtype.type(0)).reshape(len(rows), -1).T.tolist()
             else:
                 columns = [[value] * len(rows) for value in content]
