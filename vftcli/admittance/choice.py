@@ -126,7 +126,7 @@ class ControlChoice(Choice):
                 f"{robot.name} has no admittance.start; give the start pose with "
                 f"--set admittance.start=q1,…,q{robot.joints} [rad]"
             )
-        return np.array(start, dtype=float)
+        return np.array(start, float)
 
     def controllers(self, robot: "Robot") -> "tuple[Controller, ...]":
         """The controllers that are compared, the traditional one first.

@@ -145,7 +145,7 @@ class Loop:
         self.start = self.solver.check_start(arm.q.copy())
         self.rotation, self.translation = self.solver.pose(self.start)
         self.law = Recursion([controller])
-        self.dragged = np.zeros(6, dtype=bool)
+        self.dragged = np.zeros(6, bool)
         self.q_measured = self.q_command = self.q_before = self.start
         speed = np.fmin(arm.robot.limits.qd_max, np.inf)
         self.reach_step = speed * controller.parameters.period
@@ -182,7 +182,7 @@ class Loop:
 
     def control(self, wrench: Array) -> None:
         """One control period of Algorithm 1 under a wrench. (6,) [N, N·m]"""
-        p, size = self.controller.parameters, np.abs(wrench)
+        p, size = self.controller.parameters, abs(wrench)
         self.dragged = (size > p.threshold) | (self.dragged & (size > p.release_threshold))
         x, v, turn = self.law.x.copy(), self.law.v.copy(), self.law.turn.copy()
         self.law.step(entering_force(wrench, self.dragged, p), self.dragged)
@@ -200,7 +200,7 @@ class Loop:
         goal = exp_matrix(x[3:]) @ self.rotation
         guess = 2.0 * self.q_command - self.q_before
         q, good = self.solver.reach(goal, self.translation + x[:3], guess)
-        fastest = np.max(np.abs(q - self.q_command) / self.reach_step)
+        fastest = np.max(abs(q - self.q_command) / self.reach_step)
         return q, bool(good and fastest <= 1.0)
 
     @property
@@ -246,7 +246,7 @@ def run_closed_loop(
             log.append(loop.act(zero))
             reference = loop.reference
             forward = arm.servo.feed_forward(reference)[0]
-            x, fastest = loop.law.x[0], np.abs(arm.v).max()
+            x, fastest = loop.law.x[0], abs(arm.v).max()
             near = np.isfinite(x).all() and np.linalg.norm(x[:3]) <= FARTHEST
             if not near or fastest > 50.0:  # the arm has run away
                 break
@@ -323,7 +323,7 @@ class Latency:
 def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
     """One entry for each application of a force above a threshold."""
     threshold = run.controller.parameters.threshold
-    rows = np.flatnonzero(np.any(np.abs(run.truth) > threshold, axis=1))
+    rows = np.flatnonzero(np.any(abs(run.truth) > threshold, axis=1))
     quiet = max(round(REST / run.controller.parameters.period), 1)
     first = rows[np.diff(rows, prepend=-quiet) >= quiet]
     return tuple(latency_of(run, k, threshold) for k in first.tolist())
@@ -331,9 +331,9 @@ def latencies(run: ClosedLoop) -> tuple[Latency, ...]:
 
 def latency_of(run: ClosedLoop, k: int, threshold: Array) -> Latency:
     """The latencies of the contact whose force first passes a threshold in row `k`."""
-    axis = int(np.argmax(np.abs(run.truth[k]) / threshold))
+    axis = int(np.argmax(abs(run.truth[k]) / threshold))
     limit, t = threshold[axis], run.t
-    felt, there = np.abs(run.estimate[:, axis]) > limit, np.abs(run.truth[:, axis]) > limit
+    felt, there = abs(run.estimate[:, axis]) > limit, abs(run.truth[:, axis]) > limit
     rotates = axis >= 3
     moved = run.moved[:, 3:] if rotates else run.moved[:, :3]
     start = TURNED if rotates else STARTED

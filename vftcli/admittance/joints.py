@@ -41,13 +41,13 @@ class FlangeSolver:
 
     def pose(self, q: Array) -> tuple[Array, Array]:
         """Orientation (3, 3) and origin (3,) [m] of the flange in the base at `q` (n,) [rad]."""
-        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, dtype=float))
+        self.pin.framesForwardKinematics(self.model, self.data, np.asarray(q, float))
         place = self.data.oMf[self.frame]
         return np.array(place.rotation), np.array(place.translation)
 
     def check_start(self, q: Array) -> Array:
         """Return a start pose."""
-        q = np.asarray(q, dtype=float)
+        q = np.asarray(q, float)
         if q.shape != (self.robot.joints,):
             raise ParameterError(
                 f"the start pose has {q.size} joints; {self.robot.name} has {self.robot.joints}"
@@ -83,7 +83,7 @@ class FlangeSolver:
             normal.flat[::7] += DAMPING * min(size, 1.0) ** 2
             _, weights, _ = self.solve(normal, error)
             step = J.T @ weights
-            step *= LARGEST_STEP / max(float(np.abs(step).max()), LARGEST_STEP)
+            step *= LARGEST_STEP / max(float(abs(step).max()), LARGEST_STEP)
             q = np.minimum(np.maximum(q + step, self.lower), self.upper)
         return q, False
 
@@ -104,7 +104,7 @@ def follow(solver: FlangeSolver, start: Array, x: Array, period: float) -> Joint
     Deviations are in base axes, rotation vectors last, a `period` [s] apart.
     """
     rotation, translation = solver.pose(start)
-    q, reached = np.empty((*x.shape[:2], len(start))), np.zeros(x.shape[:2], dtype=bool)
+    q, reached = np.empty((*x.shape[:2], len(start))), np.zeros(x.shape[:2], bool)
     for i in range(x.shape[1]):
         goals, points = exp_matrix(x[:, i, 3:]) @ rotation, translation + x[:, i, :3]
         same = np.all(x[1:, i] == x[:-1, i], axis=1)
@@ -129,14 +129,14 @@ def try_pose(
     if not np.isfinite(point).all():
         return last, False
     found, good = solver.reach(rotation, point, guess)
-    if good and np.abs(found - last).max() <= LARGEST_STEP:
+    if good and abs(found - last).max() <= LARGEST_STEP:
         return found, True
     return solver.reach(rotation, point, last)
 
 
 def largest_speed(robot: Robot, q: Array, reached: Mask, period: float) -> Array:
     """Largest joint speed between reached samples as a share of the limit. (N,)"""
-    share = np.abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
+    share = abs(np.diff(q, axis=0)) / period / robot.limits.qd_max
     both = (reached[1:] & reached[:-1])[:, :, None] & np.isfinite(share)
     largest = np.where(both, share, -1.0).max(axis=(0, 2), initial=-1.0)
     return np.where(largest >= 0.0, largest, np.nan)

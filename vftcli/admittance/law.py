@@ -143,7 +143,7 @@ def from_table(
     groups = [(name, table.get(name, {})) for name in ("position", "rotation")]
     # What has a default begins with it; ξ, which has none of its own, and all else with NaN.
     values: dict[str, Any] = {
-        name: np.full(6, getattr(Admittance, name, None), np.float64) for name in PER_AXIS
+        name: np.full(6, getattr(Admittance, name, None), float) for name in PER_AXIS
     }
     for section, entries in (*groups, *settings.items()):
         axes = list(GROUPS[section])
@@ -318,14 +318,14 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     p, varies = controller.parameters, controller.rate > 0.0
     # The traditional controller has no speed scale; its branch below does not use the quotient.
     rate = np.where(varies, controller.rate, 1.0)
-    shape = np.where(varies, kinetic_shape(np.abs(v) * rate) / rate**2, 0.5 * v**2)
+    shape = np.where(varies, kinetic_shape(abs(v) * rate) / rate**2, 0.5 * v**2)
     return np.asarray(0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2)
 
 
 def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
     """V = ½M_dva v² + ½K_dva x² of (52), axis by axis: its proof drops Ṁ and K̇. (…, 6) [J]"""
     p = controller.parameters
-    swell = np.exp(np.abs(v) * controller.rate)
+    swell = np.exp(abs(v) * controller.rate)
     kinetic = 0.5 * p.mass / (controller.alpha * swell) * v**2
     return np.asarray(kinetic + 0.5 * controller.alpha * p.stiffness * swell * x**2)
 
@@ -374,7 +374,7 @@ def check_stable(
     An axis that starts a release (6,) [m, rad] inside the escape bound needs no speed limit.
     """
     # Under a hand any deviation can come about; only a release has a size.
-    size = np.inf if release is None else np.abs(release)
+    size = np.inf if release is None else abs(release)
     grave = [remark for controller in controllers for remark in controller.complaints(size)]
     if grave and not anyway:
         more = f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""

@@ -34,7 +34,7 @@ def phases(wrench: Array, parameters: Admittance) -> Phases:
     force counts as none.
     """
     wrench = np.nan_to_num(wrench, nan=0.0)
-    size = np.abs(wrench)
+    size = abs(wrench)
     on, off = size > parameters.threshold, size <= parameters.release_threshold
     # The last row at which anything was switched tells the state: no loop over samples.
     rows = np.arange(len(on))[:, None]
@@ -52,7 +52,7 @@ def entering_force(wrench: Array, dragged: Mask, parameters: Admittance) -> Arra
     if parameters.threshold_mode == "literal":
         return wrench
     soft = parameters.threshold_mode == "soft"
-    over = np.abs(wrench) - (parameters.threshold if soft else 0.0)
+    over = abs(wrench) - (parameters.threshold if soft else 0.0)
     return np.where(dragged, np.sign(wrench) * np.maximum(over, 0.0), 0.0)
 
 
@@ -102,14 +102,14 @@ class Recursion:
         )
         self.x = np.array(np.broadcast_to(np.zeros(6) if x is None else x, shape))
         self.v = np.array(np.broadcast_to(np.zeros(6) if v is None else v, shape))
-        self.clipped = np.zeros(shape, dtype=bool)
+        self.clipped = np.zeros(shape, bool)
         self.turn = exp_quaternion(self.x[:, 3:])
         self.turns = bool(self.x[:, 3:].any() or self.v[:, 3:].any())
 
     def step(self, force: Array, dragged: Mask) -> None:
         """Move on under the force that enters (6,) [N, N·m]; axes are `dragged` (6,) or not."""
         x, v, period = self.x, self.v, self.period
-        swell = np.exp(np.abs(v) * self.rate)
+        swell = np.exp(abs(v) * self.rate)
         swell *= self.alpha
         swell[:, dragged] = 1.0
         damping = np.where(dragged, self.damping, self.recovery)
@@ -140,7 +140,7 @@ def run(
     """
     state = Recursion(controllers, x, v)
     shape = (len(force) + 1, len(controllers), 6)
-    xs, vs, clips = np.empty(shape), np.empty(shape), np.zeros(shape, dtype=bool)
+    xs, vs, clips = np.empty(shape), np.empty(shape), np.zeros(shape, bool)
     xs[0], vs[0] = state.x, state.v
     with np.errstate(over="ignore", invalid="ignore"):
         for k in range(len(force)):
@@ -155,7 +155,7 @@ def release(
 ) -> AxisMotion:
     """Let go at deviation `x`, at rest unless `v` is given, and watch for `duration` [s]."""
     steps = int(np.ceil(duration / controllers[0].parameters.period - 1e-9))
-    return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), dtype=bool), x, v)
+    return run(controllers, np.zeros((steps, 6)), np.zeros((steps, 6), bool), x, v)
 
 
 class Drag(NamedTuple):
@@ -214,7 +214,7 @@ def row_of(
     """One controller's figures for one drag of one axis."""
     axis, t = drag.axis, motion.t
     x, v = motion.x[:, n, axis], motion.v[:, n, axis]
-    sizes = np.nan_to_num(np.abs(x[drag.begin : drag.end]), nan=np.inf)
+    sizes = np.nan_to_num(abs(x[drag.begin : drag.end]), nan=np.inf)
     top = drag.begin + int(sizes.argmax())
     returns = {name: return_time(t, x, drag, share) for name, share in SHARES.items()}
     back, start, released = returns["return_2_s"], float(t[drag.begin]), float(t[drag.release])
@@ -245,7 +245,7 @@ def return_time(t: Array, x: Array, drag: Drag, share: float) -> float | None:
 
     None if the axis is still outside when the record ends or the next drag begins.
     """
-    after = np.abs(recovery_of(x, drag))
+    after = abs(recovery_of(x, drag))
     if not len(after):
         return None
     outside = np.flatnonzero(after > share * after[0])

@@ -188,7 +188,7 @@ def replay_release(
         controllers=tuple(controllers),
         start=FlangeSolver(robot).check_start(start),
         wrench=force,
-        phases=Phases(np.zeros_like(force, dtype=bool), force),
+        phases=Phases(np.zeros_like(force, bool), force),
         motion=motion,
         drags=releases_of(x, len(motion.t)),
         force_remarks=complaints,
@@ -259,7 +259,7 @@ def drag_remarks(found: Replay) -> Iterator[Remark]:
     if (logged := found.logged) is None:
         return
     if not found.drags and len(found.wrench):
-        largest = np.abs(np.nan_to_num(found.wrench)).max(axis=0)
+        largest = abs(np.nan_to_num(found.wrench)).max(axis=0)
         threshold = found.parameters.threshold
         share = largest / np.maximum(threshold, 1e-12)
         k = int(share.argmax())
@@ -295,7 +295,7 @@ def trouble(found: Replay) -> Iterator[Remark]:
         if acted := int(np.count_nonzero(motion.clipped[:, n].any(axis=1))):
             yield fact("speed-limit-acted", where, periods=acted)
         if lost := int(np.count_nonzero(~path.reached[:, n])):
-            first = float(motion.t[int(path.reached[:, n].argmin())])
+            first = float(motion.t[path.reached[:, n].argmin()])
             rows = {"lost": lost, "poses": len(motion.t)}
             yield caution("poses-out-of-reach", where, **rows, first_s=first)
             way = np.linalg.norm(motion.x[:, n, :3], axis=1)

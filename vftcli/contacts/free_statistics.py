@@ -79,7 +79,7 @@ def block_length(t: Array) -> float:
     if len(t) < 3:
         return BLOCK
     usual, steps = median_step(t), np.diff(t)
-    uneven = float(np.quantile(np.abs(steps - usual), 0.9)) > UNEVEN * usual
+    uneven = float(np.quantile(abs(steps - usual), 0.9)) > UNEVEN * usual
     return max(BLOCK, SAMPLES * usual) if uneven else BLOCK
 
 
@@ -128,7 +128,7 @@ def inferred_statistics(log: Run, bias: WholeLogBias, seconds: float) -> FreeSta
         basis="whole log" if bias.fitted else "friction",
         noise=found[0],
         level=np.sqrt(found[0].variance + observer_noise(corrected) ** 2),
-        own=np.zeros(log.recording.samples, dtype=bool),
+        own=np.zeros(log.recording.samples, bool),
         log=corrected,
         runs=(),
         free=free,
@@ -185,7 +185,7 @@ def beyond_threshold(run: Run, level: Array | None) -> Mask:
     None without any.
     """
     t = run.t
-    above = np.any(np.abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
+    above = np.any(abs(observed(run)) > LEVEL * expected_torque(run, level), axis=1)
     settled: Mask = t >= t[0] + SETTLED
     return covered(intervals(t, above, least=LASTING, gap=NEAR), len(t)) & settled
 
@@ -210,7 +210,7 @@ def observer_noise(run: Run) -> Array:
 def torque_level(pieces: Sequence[RunSamples]) -> Array:
     """q95|τ|/1.96 of each joint over the free samples in which it moves. (n,) [N·m]"""
     uses = [(run, inside & (run.t >= run.t[0] + SETTLED)) for run, inside in pieces]
-    torque = np.abs(np.concatenate([observed(run)[use] for run, use in uses]))
+    torque = abs(np.concatenate([observed(run)[use] for run, use in uses]))
     moving = np.concatenate([faster(run.dq[use], REST) for run, use in uses])
     found = np.empty(torque.shape[1])
     for j, column in enumerate(torque.T):
@@ -255,7 +255,7 @@ def self_test(free: FreeStatistics, prior: WrenchPrior) -> PseudoContactTest:
         for run, wrench in zip(made_up, smooth_lanes(log, lanes), strict=True):
             inside = wrench.within(run)
             sd = np.sqrt(np.diagonal(inside.covariance, axis1=1, axis2=2))
-            shares.append(np.abs(inside.values) / np.maximum(sd, 1e-12))
+            shares.append(abs(inside.values) / np.maximum(sd, 1e-12))
             forces.append(inside.size)
     if not forces:
         return PseudoContactTest(np.ones(6), float("nan"))

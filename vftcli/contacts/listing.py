@@ -125,7 +125,7 @@ def by_smoother(free: FreeStatistics, seconds: float, *, proven: bool) -> Contac
     at_rest = np.array([rests_around(run, found, span) for span in found.runs], bool)
     passed = found.best > np.where(at_rest | named, least, LEAST_IN_MOTION)
     if not named:
-        passed |= at_rest & np.array(found.beyond, dtype=bool)
+        passed |= at_rest & np.array(found.beyond, bool)
     seen = np.flatnonzero(passed | (found.best > LEAST_EVIDENCE)).tolist()
     halted = [k for k in seen if is_stop(run, found, k, seconds)]
     stops = tuple(float(t[found.runs[k][0]]) for k in halted if passed[k])
@@ -195,7 +195,7 @@ def rests_around(run: Run, found: Candidates, span: BlockSpan) -> bool:
     """Whether the arm rests during a candidate, and for `AROUND` before and after it."""
     t = found.log.blocks.t
     first, last = run.t.searchsorted([t[span[0]] - AROUND, t[span[1] - 1] + AROUND])
-    speed = np.abs(run.dq[first:last])
+    speed = abs(run.dq[first:last])
     return bool(len(speed) and np.quantile(speed, 0.95, axis=0).max() < MOVES)
 
 
@@ -273,7 +273,7 @@ def felt_by(run: Run, torque: Array) -> float:
     Each joint may hide 1.96 standard deviations of its torque (n,) [N·m].
     """
     some = slice(None, None, -(-len(run.q) // POSES))
-    J = np.abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
+    J = abs(flange_jacobian(run.robot.loaded_chain, run.q[some])[:, :3])
     each = np.min(NORMAL * torque / np.maximum(J, 1e-9), axis=2)
     return float(np.median(each.min(axis=1)))
 
@@ -281,7 +281,7 @@ def felt_by(run: Run, torque: Array) -> float:
 def without_list(run: Run) -> ContactList:
     """A list without rows, where nothing tells a contact from an error of the model."""
     unknown = np.full(run.robot.joints, np.nan)
-    torque = np.abs(observed(run))
+    torque = abs(observed(run))
     torque[run.t < run.t[0] + SETTLED] = 0.0
     k, j = np.unravel_index(torque.argmax(), torque.shape)
     model = ContactModel(
@@ -327,7 +327,7 @@ def is_load(recording: Recording, contacts: Sequence[Contact]) -> bool:
     if lasts.sum() <= SHARE * (float(t[-1]) - first):
         return False
     for edge in (contacts[0].start, contacts[-1].stop):
-        near = np.abs(t - edge) < EDGE
+        near = abs(t - edge) < EDGE
         if t[0] + EDGE < edge < t[-1] - EDGE and not moving[near].any():
             return False
     forces = np.array([contact.mean_force for contact in contacts]) * lasts[:, None]
@@ -378,7 +378,7 @@ def follows_stop(recording: Recording, start: float, stop: float, block: float) 
     """Whether a row [s] begins where all joints come to rest at once, and is brief."""
     if stop - start > BRIEF + block:
         return False
-    t, speed = recording.t - start, np.abs(recording.require("dq"))
+    t, speed = recording.t - start, abs(recording.require("dq"))
     before, around, after = (
         speed[(t >= first) & (t <= last)]
         for first, last in (BEFORE, AT_STOP, (AFTER[0] + block, AFTER[1]))

@@ -174,7 +174,7 @@ class ContactMeasurement:
         size = self.wrenches[number].within(run).size
         peak = run[0] + int(size.argmax())
         core = np.arange(*run)[size >= CORE * size.max()]
-        core = core[np.abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
+        core = core[abs(blocks.t[core] - blocks.t[peak]) <= CORE_TIME]
         core = core[blocks.known[core]] if blocks.known[core].any() else core
         mean, variance = (series[core] for series in self.quiet)
         torque = (blocks.d[core] - mean).mean(axis=0)

@@ -161,7 +161,7 @@ def filtered_contacts(
     """
     size = np.sqrt(np.einsum("kij,i->kj", J**2, PUSH**2))
     sure, likely = (np.log(p / (1.0 - p)) for p in (SURE, LIKELY))
-    inside = np.zeros(len(blocks.t), dtype=bool)
+    inside = np.zeros(len(blocks.t), bool)
     for forward, backward in two_state_odds(blocks, processes, size):
         high, low = np.maximum(forward, backward), np.minimum(forward, backward)
         seed = (high > sure) & (low > likely)

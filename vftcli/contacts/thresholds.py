@@ -41,9 +41,9 @@ def block_maxima(t: Array, level: Array) -> Array:
     if np.count_nonzero(used) < 2:
         return np.zeros(0)
     t, level = t[used], level[used]
-    number = np.floor((t - t[0]) / BLOCK).astype(np.intp)
+    number = np.floor((t - t[0]) / BLOCK).astype(int)
     first = np.flatnonzero(np.diff(number, prepend=-1))
-    known = np.add.reduceat(np.isfinite(level).astype(np.intp), first)
+    known = np.add.reduceat(np.isfinite(level).astype(int), first)
     maxima = np.maximum.reduceat(np.where(np.isfinite(level), level, -np.inf), first)
     return np.asarray(maxima[known * median_step(t) >= KNOWN * BLOCK])
 
@@ -100,7 +100,7 @@ class Tail(NamedTuple):
                 f"{most:.4g} can be told from maxima of {BLOCK:g} s"
             )
         ranks = due + np.array([0.0, 1.0, -1.0]) * NORMAL * np.sqrt(due)
-        places = np.rint(ranks).astype(np.intp).clip(1, len(self.maxima)) - 1
+        places = np.rint(ranks).astype(int).clip(1, len(self.maxima)) - 1
         value, low, high = (float(x) for x in self.maxima[places])
         return value, (low, high)
 
@@ -258,7 +258,7 @@ class Thresholds(Shown):
         # An axis without a threshold raises no alarm.
         limits = np.nan_to_num(values, nan=np.inf)
         # A signal that never moved has the threshold zero: whatever it reads then is an alarm.
-        return np.asarray(np.abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST))
+        return np.asarray(abs(getattr(signals, SETS[name])) / np.maximum(limits, LEAST))
 
 
 def find_thresholds(free: Sequence[ComparedSignals], rate: float) -> Thresholds:
@@ -303,7 +303,7 @@ def thresholds_of_set(
 ) -> tuple[SignalThreshold, ...]:
     """The threshold of every signal of a set, none if no log tells one; see `find_thresholds`."""
     maxima = {
-        log.recording.name: [block_maxima(log.t, x) for x in np.abs(getattr(log, field)).T]
+        log.recording.name: [block_maxima(log.t, x) for x in abs(getattr(log, field)).T]
         for log in free
     }
     count = getattr(free[0], field).shape[1]

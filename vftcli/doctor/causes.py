@@ -271,7 +271,7 @@ def scaled(case: Case) -> Iterator[Cause]:
         yield Cause("drive-scale", healed, tuple(range(n)), {"factor": factor, "sd": sd})
     fit = solve(case.given, Terms(needed * np.eye(n)), friction)
     factors, sds = fit.values[:n], fit.sd[:n]
-    off = np.abs(factors - 1)
+    off = abs(factors - 1)
     (wrong,) = np.nonzero((off > ALONE + SURE * sds) & (sds < KNOWN))
     others = np.delete(off < np.maximum(OTHERS, SURE * sds), wrong)
     if wrong.size == 1 and others.all() and LEAST < factors[wrong[0]] < MOST:
@@ -338,12 +338,12 @@ def is_modelled(case: Case, robot: Robot) -> bool:
         return False
     typical = np.sqrt(np.mean(case.windows.motion[:, 1] ** 2, axis=0))
     pairs = zip(robot.friction, typical[:, None], strict=True)
-    stated = np.abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
+    stated = abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)
     if moving.sum() < WITHOUT:
         return False
     # A joint without information has the model's torque as its effort.
-    tells = np.abs(case.given - case.needed).max(axis=0) > 1e-9 * case.size
+    tells = abs(case.given - case.needed).max(axis=0) > 1e-9 * case.size
     static = solve((case.given - case.gravity) * tells, case.windows.friction)
     for fit in (case.bare, static):
         rubs = fit.values[:n] + fit.values[n:] * typical + SURE * fit.sd[:n]

@@ -64,7 +64,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
     if recording.joints != robot.joints or recording.dq is None or recording.samples < 20:
         return recording
     log = without_turns(recording)
-    rows = np.zeros(log.samples, dtype=bool)
+    rows = np.zeros(log.samples, bool)
     cuts = list[Cut]()
     for bad in rules(log, robot):
         samples = bad.samples & ~rows[:, None]
@@ -76,7 +76,7 @@ def without_bad_samples(recording: Recording, robot: Robot) -> Recording:
             here, (first, last) = samples[start:stop], log.t[[start, stop - 1]].tolist()
             joints, size = on_joints(np.any(here, axis=0)).joints, last - first
             if bad.sizes is not None:
-                size = float(np.max(np.abs(bad.sizes[start:stop][here])))
+                size = float(np.max(abs(bad.sizes[start:stop][here])))
             cuts.append(Cut(bad.code, first, last, stop - start, joints, size))
     return log.without(rows, cuts) if cuts and np.count_nonzero(~rows) > 2 else log
 
@@ -113,7 +113,7 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
     if effort is None or constant is None:
         return
     torque, limit = effort * constant, np.nan_to_num(robot.limits.tau_max, nan=np.inf)
-    beyond = np.abs(torque) > BEYOND * limit
+    beyond = abs(torque) > BEYOND * limit
     yield Bad("effort-beyond-drive", beyond, torque)
     alone = isolated(torque, AWAY * limit, step) & ~beyond
     yield Bad("isolated-effort", alone & ~blows(dq, np.asarray(alone.any(axis=1)))[:, None], torque)
@@ -124,9 +124,9 @@ def rules(recording: Recording, robot: Robot) -> Iterator[Bad]:
 
 def isolated(x: Array, away: Array, step: float) -> Mask:
     """A few samples (T, n) in a row farther than `away` (n,) from the median of nine around."""
-    found = np.zeros(x.shape, dtype=bool)
+    found = np.zeros(x.shape, bool)
     for j, column in enumerate(x.T):
-        change = np.abs(np.diff(column))
+        change = abs(np.diff(column))
         # A far sample needs a step of half the distance.
         steps = np.flatnonzero(change > 0.5 * away[j])
         if not steps.size:
@@ -135,7 +135,7 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
         near = near[(near >= 0) & (near < len(x))]
         around = np.clip(near[:, None] + np.arange(-4, 5), 0, len(x) - 1)
         noise = FAR * median(change) / (0.6745 * np.sqrt(2.0))
-        off = np.abs(column[near] - np.median(column[around], axis=1))
+        off = abs(column[near] - np.median(column[around], axis=1))
         found[near[off > max(away[j], noise)], j] = True
         for start, stop in runs_of(found[:, j]):
             if stop - start > FEW or (stop - start) * step > BRIEF:
@@ -145,11 +145,11 @@ def isolated(x: Array, away: Array, step: float) -> Mask:
 
 def blows(dq: Array, rows: Mask) -> Mask:
     """Samples across which a joint's speed bends as in a blow. (T,)"""
-    found = np.zeros(len(dq), dtype=bool)
+    found = np.zeros(len(dq), bool)
     for start, stop in runs_of(rows):
         before, behind = max(start - 1, 0), min(stop, len(dq) - 1)
         trend = dq[before] - dq[max(before - 2, 0)] + dq[min(behind + 2, len(dq) - 1)] - dq[behind]
-        bend = np.abs(dq[behind] - dq[before] - 0.5 * trend)
+        bend = abs(dq[behind] - dq[before] - 0.5 * trend)
         found[start:stop] = bend.max() > BLOW
     return found
 
@@ -160,24 +160,24 @@ def zero_bursts(torque: Array, least: Array) -> Mask:
     Of one joint three samples in a row, of all joints at once any.
     """
     zero = torque == 0.0
-    every, found = zero.all(axis=1), np.zeros(zero.shape, dtype=bool)
+    every, found = zero.all(axis=1), np.zeros(zero.shape, bool)
     for j in np.flatnonzero(zero.any(axis=0)):
         for start, stop in runs_of(zero[:, j]):
             enough = stop - start >= FEW or every[start:stop].all()
             if start and stop < len(zero) and enough:
-                found[start:stop, j] = np.abs(torque[[start - 1, stop], j]).min() > least[j]
+                found[start:stop, j] = abs(torque[[start - 1, stop], j]).min() > least[j]
     return found
 
 
 def frozen_rows(recording: Recording) -> Mask:
     """Rows of a moving arm that repeat all measured values. (T,)"""
     t, dq = recording.t, recording.require("dq")
-    same = np.zeros(recording.samples - 1, dtype=bool)
+    same = np.zeros(recording.samples - 1, bool)
     same[repeated_rows(recording, ("q", "dq", *EFFORTS))] = True
     first, last = edges_of(same)
     lengths, long = last - first, t[last] - t[first] >= FROZEN
     usual = np.median(lengths[~long]) if not long.all() else 1.0
-    moves = np.abs(dq[first]).max(axis=1) > REST
+    moves = abs(dq[first]).max(axis=1) > REST
     frozen = long & (lengths >= UNUSUAL * usual) & moves
     return covered(list(zip(first[frozen] + 1, last[frozen] + 1, strict=True)), len(t))
 
@@ -189,29 +189,29 @@ def slips_of(recording: Recording) -> tuple[Indices, Array, Mask]:
     """
     q, dq = recording.q, recording.require("dq")
     steps, usual = np.diff(recording.t), recording.median_step
-    large, noise = np.zeros(len(steps), dtype=bool), np.zeros(recording.joints)
+    large, noise = np.zeros(len(steps), bool), np.zeros(recording.joints)
     for j in range(recording.joints):  # all joints of a long log need too much room
         change = np.diff(q[:, j])
-        fastest = np.abs(dq[:, j]).max() * GAP_STEPS * usual
-        if np.abs(change).max() + fastest > SLIPPED:
-            slip = np.abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
+        fastest = abs(dq[:, j]).max() * GAP_STEPS * usual
+        if abs(change).max() + fastest > SLIPPED:
+            slip = abs(change - 0.5 * (dq[1:, j] + dq[:-1, j]) * steps)
             large |= slip > SLIPPED
             noise[j] = FAR / 0.6745 * median(slip)
     at = np.flatnonzero(large & (steps <= GAP_STEPS * usual))
     mean, dt = 0.5 * (dq[at + 1] + dq[at]), steps[at, None]
     slips = q[at + 1] - q[at] - mean * dt
     around = np.clip(at[:, None] + np.arange(-1, 2), 0, len(steps) - 1)
-    off = np.abs(steps[around] - usual).max(axis=1, keepdims=True)
-    slack = 0.5 * np.abs(dq[at + 1] - dq[at]) * dt + np.abs(mean) * np.maximum(off + usual, LATE)
-    return at, slips, np.abs(slips) > np.maximum(SLIPPED + slack, noise)
+    off = abs(steps[around] - usual).max(axis=1, keepdims=True)
+    slack = 0.5 * abs(dq[at + 1] - dq[at]) * dt + abs(mean) * np.maximum(off + usual, LATE)
+    return at, slips, abs(slips) > np.maximum(SLIPPED + slack, noise)
 
 
 def without_turns(recording: Recording) -> Recording:
     """The recording with whole turns unwrapped, and a remark on them."""
     steps, sizes, jumps = slips_of(recording)
     turns = np.round(sizes / TURN)
-    whole = jumps & (np.abs(sizes - TURN * turns) < NEAR)
-    whole &= (turns != 0) & (np.abs(turns) <= TURNS)
+    whole = jumps & (abs(sizes - TURN * turns) < NEAR)
+    whole &= (turns != 0) & (abs(turns) <= TURNS)
     if not whole.any() or len(steps) > SHARE * recording.samples:
         return recording
     shift = np.zeros(recording.q.shape)
@@ -230,16 +230,16 @@ def position_jumps(recording: Recording, frozen: Mask) -> Iterator[Bad]:
     if not steps.size or steps.size > max(2.0, SHARE * recording.samples):
         return
     t, q, dq = recording.t, recording.q, recording.require("dq")
-    rows, meets = np.zeros((2, *q.shape), dtype=bool)
+    rows, meets = np.zeros((2, *q.shape), bool)
     sizes = np.zeros(q.shape)
     for group in np.split(np.arange(len(steps)), np.flatnonzero(np.diff(steps) > FEW) + 1):
         first, last = int(steps[group[0]]), int(steps[group[-1]]) + 1
-        joints, size = jumps[group].any(axis=0), np.abs(slips[group]).max(axis=0)
+        joints, size = jumps[group].any(axis=0), abs(slips[group]).max(axis=0)
         lasts, speeds = t[last] - t[first], dq[[first, last]]
         over = q[last] - q[first] - speeds.mean(axis=0) * lasts
         slack = SLIPPED + np.ptp(speeds, axis=0) * lasts
-        slack += np.abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
-        if last - first > 1 and (np.abs(over) < slack)[joints].all():
+        slack += abs(speeds).sum(axis=0) * max(recording.median_step, LATE)
+        if last - first > 1 and (abs(over) < slack)[joints].all():
             span, into = slice(first + 1, last), rows  # the motion continues after a few bad rows
         else:
             span, into = slice(*t.searchsorted([t[first] - APART, t[last] + APART])), meets
@@ -260,9 +260,9 @@ def braked(recording: Recording, robot: Robot, torque: Array) -> Iterator[Bad]:
     rows = slice(len(first) * length)
     given = torque[rows].reshape(len(first), length, -1).mean(axis=1)
     share = np.sum(given * gravity, axis=1) / np.maximum(weight, 1e-12)
-    speed = np.abs(recording.require("dq")[rows]).reshape(len(first), -1).max(axis=1)
+    speed = abs(recording.require("dq")[rows]).reshape(len(first), -1).max(axis=1)
     heavy = weight > HEAVY**2
-    free = heavy & (speed < REST) & (np.abs(share) < LET_GO)
+    free = heavy & (speed < REST) & (abs(share) < LET_GO)
     if not free.any() or np.count_nonzero(heavy & (share > HELD)) <= np.count_nonzero(free):
         return
     # The drives release and grip again somewhere in the windows beside.

@@ -127,8 +127,8 @@ def is_judgeable(recording: Recording) -> bool:
     """Whether a log is long enough, and its numbers are those of an arm."""
     if recording.dq is None or recording.samples < 10 or not 1e-2 < recording.duration < 1e9:
         return False
-    sizes = [np.abs(x).max() for _, x in efforts_of(recording)]
-    motion = max(np.abs(recording.q).max(), np.abs(recording.dq).max())
+    sizes = [abs(x).max() for _, x in efforts_of(recording)]
+    motion = max(abs(recording.q).max(), abs(recording.dq).max())
     return bool(motion < 1e4 and all(1e-9 < size < 1e9 for size in sizes))
 
 
@@ -282,7 +282,7 @@ def cause_remark(diagnosis: Diagnosis, cause: Cause) -> Remark:
     """The finding on the cause that explains a log."""
     recording, rival = diagnosis.case.windows.recording, diagnosis.rival
     if cause.code == "milliamperes":
-        typical = float(np.percentile(np.abs(recording.require("current")), 99))
+        typical = float(np.percentile(abs(recording.require("current")), 99))
         return warning(cause.code, typical_A=typical)
     joints = [f"J{j + 1}" for j in rival.joints] if rival is not None else []
     by_current = recording.current is not None and bool(np.any(cause.case.constant != 1))

@@ -74,7 +74,7 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
         return
     best = int(together.argmin())
     lag = float(lags[best])
-    better = float(np.exp(together[np.abs(lags).argmin()] - together[best]))
+    better = float(np.exp(together[abs(lags).argmin()] - together[best]))
     alike = agreed(lags[rest.argmin(axis=1)], lag, STEP)
     if abs(lag) > LATE and better > BETTER and alike.any():
         order = "later" if lag > 0 else "earlier"
@@ -84,7 +84,7 @@ def effort_lag(recording: Recording, robot: Robot) -> Iterator[Remark]:
 
 def agreed(own: Array, best: float, step: float) -> Mask:
     """Joints with a lag near the best of all; none if they are few. (K,)"""
-    near = np.abs(own - best) < max(NEAR * abs(best), 1.5 * step)
+    near = abs(own - best) < max(NEAR * abs(best), 1.5 * step)
     return np.asarray(near & (near.sum() >= ENOUGH) & (near.mean() >= AGREE))
 
 
@@ -124,7 +124,7 @@ class Lateness(NamedTuple):
         best = int(left.min(axis=1).argmin())
         grown, least = float(each[best]), left[best].min()
         alike = agreed(each[rests.min(axis=2).argmin(axis=0)], grown, DRIFTS[0])
-        better = np.exp(left[0, np.abs(self.lags).argmin()] - least)
+        better = np.exp(left[0, abs(self.lags).argmin()] - least)
         steadily = np.exp(left[0].min() - least)
         if min(steadily / STEADY, better / BETTER) < 1 or not alike.any():
             return None
@@ -197,7 +197,7 @@ def rest_of(model: Array, effort: Array) -> Array:
     """Rest (L,) of an effort (W, L) at every lag by its parts (W, 4), of better samples."""
     size = np.sqrt(np.mean(model**2, axis=0))
     columns = model / np.where(size > 0, size, 1.0)
-    keep = np.ones(len(columns), dtype=bool)
+    keep = np.ones(len(columns), bool)
     for _ in range(2):
         solution = np.linalg.pinv(columns[keep], rcond=1e-8) @ effort[keep]
         rest = (effort - columns @ solution) ** 2

@@ -52,13 +52,13 @@ def drive_constants(recording: Recording) -> Array:
         return constants
     rest = resting(recording)
     for j in range(recording.joints):
-        use = rest & (np.abs(current[:, j]) > 0.02)
+        use = rest & (abs(current[:, j]) > 0.02)
         if use.sum() >= 10:
             i, tau = current[use, j], torque[use, j]
             # Through the origin: no current, no torque.
             slope = i @ tau / (i @ i)
             # A joint that carries nothing has a target of zero and shows no constant.
-            if np.std(tau - slope * i) < 0.05 * max(tau.std(), np.abs(tau).mean()):
+            if np.std(tau - slope * i) < 0.05 * max(tau.std(), abs(tau).mean()):
                 constants[j] = slope
     return constants
 
@@ -66,7 +66,7 @@ def drive_constants(recording: Recording) -> Array:
 def resting(recording: Recording) -> Mask:
     """Samples in which no joint moves. (T,)"""
     if recording.dq is None:
-        return np.zeros(recording.samples, dtype=bool)
+        return np.zeros(recording.samples, bool)
     speed = recording.dq if recording.target_dq is None else recording.target_dq
     return np.asarray((slower(speed, COMMANDED) & slower(recording.dq)).all(axis=1))
 
@@ -147,8 +147,8 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
     profile = np.asarray(robot.torque_constant)
     ratio = constants / profile - 1
     # Freedrive and old controllers follow other laws than K·i: a real joint's constant counts.
-    real = (np.abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
-    wrong = np.abs(ratio) > RATIO
+    real = (abs(constants[:, None] / JOINT_CONSTANTS - 1) < SAME).any(axis=1)
+    wrong = abs(ratio) > RATIO
     if wrong.any() and real[wrong].all():
         yield warning(
             "drive-constants",
@@ -156,7 +156,7 @@ def controller_findings(recording: Recording, robot: Robot | None) -> Iterator[R
             robot=robot.name,
             found_Nm_A=constants[wrong].tolist(),
             profile_Nm_A=profile[wrong].tolist(),
-            worst_percent=100 * float(np.nanmax(np.abs(ratio))),
+            worst_percent=100 * float(np.nanmax(abs(ratio))),
         )
 
 
@@ -172,7 +172,7 @@ def payload_mismatch(recording: Recording, constants: Array) -> Iterator[Remark]
     carried, wanted = current[rest].mean(axis=0), expected[rest].mean(axis=0)
     torque = (carried - wanted) * np.where(np.isfinite(constants), constants, USUAL_CONSTANT)
     # Of the base no load shows, of the wrist little: shoulder, elbow and the next joint tell.
-    heavy = np.flatnonzero(np.abs(torque[1:4]) > MISMATCH) + 1
+    heavy = np.flatnonzero(abs(torque[1:4]) > MISMATCH) + 1
     if heavy.size < 2:
         return
     yield warning(
@@ -200,7 +200,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
     if not robot.friction or recording.joints != robot.joints or recording.dq is None:
         return
     temperature = measured_temperature(recording)
-    lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], dtype=int)
+    lawful = np.array([j for j, joint in enumerate(robot.friction) if joint.temperature], int)
     reference = [robot.friction[j].reference_temperature for j in lawful]
     values: dict[str, Any] = {"reference_C": sorted(set(reference)), "robot": robot.name}
     if temperature is not None:
@@ -222,7 +222,7 @@ def temperature_findings(recording: Recording, robot: Robot) -> Iterator[Remark]
 def far_temperature(recording: Recording, robot: Robot, temperature: Array) -> Iterator[Remark]:
     """Joints with a temperature (T, n) [°C], NaN unknown, far from the model's."""
     far: dict[str, list[tuple[int, float, float, float]]] = {}
-    speeds = np.abs(recording.require("dq"))
+    speeds = abs(recording.require("dq"))
     for j, joint in enumerate(robot.friction):
         used = (speeds[:, j] > MOVES) & ~np.isnan(temperature[:, j])
         if joint.model == "none" or not used.any():

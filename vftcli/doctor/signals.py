@@ -56,12 +56,12 @@ def unusable_findings(recording: Recording) -> Iterator[Remark]:
     t = recording.t
     if recording.samples < 3:
         yield warning("too-short", samples=recording.samples)
-    elif np.abs(t).max() > FARTHEST:
+    elif abs(t).max() > FARTHEST:
         yield warning("absurd-clock", least_s=float(t[0]), largest_s=float(t[-1]))
     elif not STEPS[0] < recording.median_step < STEPS[1]:
         yield warning("absurd-steps", step_s=recording.median_step)
     for name in recording.signals:
-        largest = float(np.abs(getattr(recording, name)).max(initial=0.0))
+        largest = float(abs(getattr(recording, name)).max(initial=0.0))
         if largest > ABSURD:
             yield warning("absurd-values", signal=name, largest=largest)
 
@@ -73,11 +73,11 @@ def signal_findings(recording: Recording) -> Iterator[Remark]:
     if not efforts_of(recording):
         yield warning("no-effort")
     # Radians and ampere are never so large. The last joint of some arms turns without end.
-    largest = float(np.abs(recording.q[:, : max(1, recording.joints - 1)]).max())
+    largest = float(abs(recording.q[:, : max(1, recording.joints - 1)]).max())
     if largest > LARGE_ANGLE:
         yield warning("degrees", largest_rad=largest)
     if recording.current is not None:
-        typical = float(np.quantile(np.abs(recording.current[thinly(recording, SOME)]), 0.99))
+        typical = float(np.quantile(abs(recording.current[thinly(recording, SOME)]), 0.99))
         if typical > LARGE_CURRENT:
             yield warning("milliamperes", typical_A=typical)
     if (effort := effort_of(recording)) is not None:
@@ -103,7 +103,7 @@ def bends_of(t: Array, value: Array) -> tuple[float, Mask]:
     one. (T - 2,)
     """
     slope = np.diff(value, axis=0) / np.diff(t)[:, None]
-    bent = np.abs(np.diff(slope, axis=0)) > BEND * (np.abs(slope[1:]) + np.abs(slope[:-1]))
+    bent = abs(np.diff(slope, axis=0)) > BEND * (abs(slope[1:]) + abs(slope[:-1]))
     moves = (slope[1:] != 0) & (slope[:-1] != 0)
     enough = moves.sum() > MOVED * moves.size
     return float(np.mean(~bent[moves])) if enough else 0.0, (bent & moves).any(axis=1)
@@ -119,9 +119,9 @@ def work_shares(recording: Recording, effort: Array) -> Array:
     rows = thinly(recording, SOME)
     speed = recording.dq[rows]
     power = effort[rows] * speed * np.gradient(recording.t[rows])[:, None]
-    gross = np.abs(power).sum(axis=0)
+    gross = abs(power).sum(axis=0)
     share = power.sum(axis=0) / np.where(gross > 0, gross, 1.0)
-    travel = np.abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
+    travel = abs(np.diff(recording.q[rows], axis=0)).sum(axis=0)
     # One way only, gravity alone can take or give work.
     reversing = (speed.max(axis=0) > NONZERO) & (speed.min(axis=0) < -NONZERO)
     share[(travel < 0.3) | ~reversing | (gross == 0)] = np.nan
@@ -208,7 +208,7 @@ def repeated_rows(recording: Recording, names: Iterable[str]) -> Indices:
 
 def edges_of(mask: Mask) -> tuple[Indices, Indices]:
     """First sample of each run of a mask, and the one behind its last. (R,) each"""
-    first, last = np.array(runs_of(mask), dtype=int).reshape(-1, 2).T
+    first, last = np.array(runs_of(mask), int).reshape(-1, 2).T
     return first, last
 
 
@@ -228,7 +228,7 @@ def stuck_stretches(recording: Recording, name: str) -> list[tuple[int, int, int
         time, turned, speed = t[rows], recording.q[rows, j], dq[rows, j]
         way = np.append(0.0, np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(time)))
         if name == "q":
-            steps = np.abs(np.diff(column))
+            steps = abs(np.diff(column))
             least = 3 * steps[steps > 0].min() if steps.any() else 0.0
             stuck = farthest(time, way) > max(WAY, least)
         elif name == "dq":
@@ -270,7 +270,7 @@ def long_repeats(recording: Recording, name: str) -> Iterator[tuple[int, int, in
 def farthest(t: Array, way: Array) -> float:
     """The longest way within half a second. [rad]"""
     behind = t.searchsorted(t - LONG * (1 + 1e-9))
-    return float(np.abs(way - way[behind]).max())
+    return float(abs(way - way[behind]).max())
 
 
 def is_extreme(value: Array, rows: slice) -> bool:
@@ -338,7 +338,7 @@ def coarse_positions(recording: Recording) -> Iterator[Remark]:
         if steps.size < 20 or (size := float(steps.min())) < COARSE:
             continue
         whole = steps / size
-        if np.all(np.abs(whole - whole.round()) < 1e-3 * np.maximum(whole, 10)):
+        if np.all(abs(whole - whole.round()) < 1e-3 * np.maximum(whole, 10)):
             sizes[j] = 1e3 * size
     if sizes:
         yield fact("coarse-positions", on_joints(sizes), steps_mrad=list(sizes.values()))

@@ -180,7 +180,7 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
     judged = fit.known
     judged[[*swapped, *held, *stuck_joints(recording, "dq")]] = False
     gain, sure = fit.gain, SURE * fit.gain_error
-    surely = np.abs(fit.lag) - SURE * fit.lag_error
+    surely = abs(fit.lag) - SURE * fit.lag_error
     late = judged & (surely > max(LATE, recording.median_step)) & (gain > DAMPED_MOST)
     if late.any():
         # Of a squared motion of rate ω a first-order filter of time constant τ leaves
@@ -190,8 +190,8 @@ def velocity_findings(recording: Recording, fit: VelocityFit | None) -> Iterator
         damped = median(fit.lag[late]) > 0 and share > DAMPED and lost > share / 2
         code = "velocity-filtered" if damped else "velocity-lag"
         yield warning(code, on_joints(late), lags_ms=(1e3 * fit.lag[late]).tolist())
-    wrong = judged & ~late & (np.abs(gain - 1) - sure > GAIN)
-    turned = wrong & (np.abs(gain + 1) < 0.3)
+    wrong = judged & ~late & (abs(gain - 1) - sure > GAIN)
+    turned = wrong & (abs(gain + 1) < 0.3)
     beyond = wrong & ~turned & ((gain - sure > BEYOND) | (gain + sure < 1 / BEYOND))
     for code, mask in (("velocity-sign", turned), ("velocity-mismatch", wrong & ~turned & ~beyond)):
         if mask.any():
@@ -222,7 +222,7 @@ def common_cause(fit: VelocityFit | None) -> Remark | None:
         return None  # most follow another motion
     gains, errors = fit.gain[known], fit.gain_error[known]
     factor = median(gains)
-    if not np.all(np.abs(gains - factor) < GAIN * abs(factor) / 2 + SURE * errors):
+    if not np.all(abs(gains - factor) < GAIN * abs(factor) / 2 + SURE * errors):
         return None
     # A lag lowers the gain, as delay or filter: no clock's factor.
     lost = np.max((fit.rate * fit.lag)[known] ** 2) + SURE * median(errors)
@@ -246,9 +246,9 @@ def in_degrees(factor: float) -> bool:
 
 def exchanged(fit: VelocityFit) -> list[int]:
     """Joints with another joint's velocity, and those others."""
-    close = np.abs(fit.gain - 1) < ALIKE
+    close = abs(fit.gain - 1) < ALIKE
     own = np.where(close, fit.open, 1.0)
-    fits = np.where(np.abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
+    fits = np.where(abs(fit.factor - 1) < 2 * GAIN, fit.share, 1.0)
     fits[:, ~fit.known] = 1.0
     np.fill_diagonal(fits, 1.0)
     others = np.flatnonzero(fits.min(axis=1) < np.minimum(ANOTHER * own, OPEN))
@@ -265,7 +265,7 @@ def held_shares(recording: Recording) -> dict[int, float]:
     """
     t, q, dq = recording.t, recording.q, recording.require("dq")
     first = spread(recording.samples - 1, STEPS, BLOCK)
-    moves = np.abs(q[first + 1] - q[first]) > MOVES * (t[first + 1] - t[first])[:, None]
+    moves = abs(q[first + 1] - q[first]) > MOVES * (t[first + 1] - t[first])[:, None]
     count = moves.sum(axis=0)
     shares = (moves & (dq[first + 1] == dq[first])).sum(axis=0) / np.maximum(count, 1)
     judged = (shares > HELD) & (count >= 20) & (travel_of(recording) >= TRAVEL)
@@ -273,7 +273,7 @@ def held_shares(recording: Recording) -> dict[int, float]:
     found = {}
     for j in np.flatnonzero(judged).tolist():
         change = np.diff(dq[:, j])
-        same, jumps = change == 0, np.abs(change[change != 0])
+        same, jumps = change == 0, abs(change[change != 0])
         short = sum(stop - start for start, stop in runs_of(same) if stop - start <= longest)
         if jumps.size < 4 or short < HELD * same.sum():
             continue
@@ -316,7 +316,7 @@ def clock_findings(
     last = repeated_rows(part, JOINT_SIGNALS)
     share = len(last) / (part.samples - 1)
     # Nearly all rows alike is an arm at rest, and so are alike rows without velocity.
-    if part.dq is not None and STALE <= share <= 0.9 and np.abs(part.dq[last]).max() >= NONZERO:
+    if part.dq is not None and STALE <= share <= 0.9 and abs(part.dq[last]).max() >= NONZERO:
         yield fact("stale-rows", stale=len(last), share_percent=100 * share)
 
 

@@ -71,8 +71,8 @@ def solve(target: Array, *by: Terms) -> RobustFit:
     sizes = [np.full(count, part.prior) for part, count in zip(by, counts, strict=True)]
     across = columns.swapaxes(1, 2)
     gram, moment = across @ columns, (across @ target[:, :, None])[:, :, 0]
-    used = np.abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
-    kept = np.ones(len(target), dtype=bool)
+    used = abs(columns).max(axis=(0, 1), initial=0.0) > 1e-9
+    kept = np.ones(len(target), bool)
     prior = np.diag(np.concatenate(sizes) ** -2)
 
     def inverse() -> Array:

@@ -161,7 +161,7 @@ def scored(estimates: Sequence[ExternalTorque], reference: ExternalTorque) -> It
             names=names,
             joint=j + 1,
             estimates=x,
-            missing=np.count_nonzero(~answered, axis=0).astype(np.float64),
+            missing=np.count_nonzero(~answered, axis=0).astype(float),
             reference=y,
             moving=moving[known, j],
             floor=floor,
@@ -184,8 +184,8 @@ def covered_samples(estimate: ExternalTorque, reference: ExternalTorque) -> Arra
     for torque in (estimate, reference):
         if torque.moving is not None:
             counted &= torque.moving
-    within = np.abs(estimate.tau - reference.tau) <= COVERS * estimate.error_sd
-    return np.array([np.count_nonzero(x, axis=0) for x in (counted & within, counted)], np.float64)
+    within = abs(estimate.tau - reference.tau) <= COVERS * estimate.error_sd
+    return np.array([np.count_nonzero(x, axis=0) for x in (counted & within, counted)], float)
 
 
 def table(recording: str, reference: str, joints: Iterable[Scored]) -> pl.DataFrame:
@@ -220,7 +220,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
                 "rmse_low_Nm": number(low),
                 "rmse_high_Nm": number(high),
                 "bias_Nm": number(x.mean()),
-                "max_Nm": number(np.abs(x).max()),
+                "max_Nm": number(abs(x).max()),
                 "correlation": number(correlation(joint.estimates[:, k], joint.reference)),
                 "lag_s": number(joint.lag[k]),
                 "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
@@ -265,7 +265,7 @@ def evaluate_pooled(members: Sequence[PoolMember]) -> pl.DataFrame:
 def together(parts: Sequence[Scored]) -> Scored:
     """One joint's samples of several logs as one series."""
     parts = [p for p in parts if len(p.reference)] or list(parts[:1])
-    weight = np.array([len(p.reference) for p in parts], dtype=float)
+    weight = np.array([len(p.reference) for p in parts], float)
     share = weight / max(weight.sum(), 1.0)
     lag = np.array([p.lag for p in parts])
     # A log in which no lag fits says nothing of it: the others' shares are weighed anew.

@@ -72,7 +72,7 @@ def block_lengths(squares: Array) -> NDArray[np.intp]:
     samples = len(squares)
     longest = max(1, samples // LEAST_BLOCKS)
     shortest = min(longest, max(1, -(-samples // MOST_BLOCKS)))
-    wanted = np.ceil(MEMORY * correlation_time(squares)).astype(np.intp)
+    wanted = np.ceil(MEMORY * correlation_time(squares)).astype(int)
     return wanted.clip(shortest, longest)
 
 
@@ -162,8 +162,8 @@ def p_value(first: Array, second: Array) -> float:
 
     At least one over the number of draws; 1 where both numbers are equal.
     """
-    size = max(float(np.abs(first).mean()), float(np.abs(second).mean()), 1e-300)
-    if np.abs(first - second).max() <= SAME * size:
+    size = max(float(abs(first).mean()), float(abs(second).mean()), 1e-300)
+    if abs(first - second).max() <= SAME * size:
         return 1.0
     above = float(np.mean(first > second))
     return float(np.clip(2.0 * min(above, 1.0 - above), 1.0 / len(first), 1.0))

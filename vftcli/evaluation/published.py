@@ -98,11 +98,11 @@ class Comparison:
         """FDO and GMO of equal gain are one filter, so they agree where their gains do."""
         if not {"fdo", "gmo"} <= set(self.names):
             return []
-        gap = np.abs(self.ours["fdo"] - self.ours["gmo"])
+        gap = abs(self.ours["fdo"] - self.ours["gmo"])
         alike = gap <= SAME_FILTER * self.ours["fdo"]
         if not alike.any():
             return []
-        printed = np.abs(self.printed("fdo") - self.printed("gmo"))[alike]
+        printed = abs(self.printed("fdo") - self.printed("gmo"))[alike]
         return [fact("print-one-filter", on_joints(alike), printed_Nm=float(printed.max()))]
 
     def kalman_delay(self) -> list[Remark]:
@@ -202,7 +202,7 @@ def facts(
     for observer in observers:
         if (tuning := tunings.get(observer.name)) is None:
             continue
-        gain = np.abs(observer.frequency_response(frequency, step, len(noise))) ** 2
+        gain = abs(observer.frequency_response(frequency, step, len(noise))) ** 2
         one = Facts(
             name=observer.name,
             response=float(step_response(observer, step, len(noise)).max()),

@@ -76,7 +76,7 @@ def touches(run: Run) -> tuple[ShownContact, ...]:
         return ()
     cutoff = min(CUTOFF, 0.2 / recording.median_step)
     open_torque = low_pass(run.t, run.model_torque - run.drive_torque, cutoff)
-    level = np.abs(open_torque - np.median(open_torque, axis=0))
+    level = abs(open_torque - np.median(open_torque, axis=0))
     quiet = np.median(level, axis=0)
     limit = np.maximum(np.maximum(STANDING_OUT * quiet, OF_FRICTION * run.dry_friction), LEAST)
     found = []

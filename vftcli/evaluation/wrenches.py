@@ -59,13 +59,13 @@ def evaluate_wrenches(
             if len(error):
                 row |= {
                     f"bias_{unit}": number(error.mean()),
-                    f"max_{unit}": number(np.abs(error).max()),
+                    f"max_{unit}": number(abs(error).max()),
                     "correlation": number(correlation(x, y)),
                     "missing": float(np.mean(~answered[known, k])),
                 }
                 if wrench.sd is not None:
                     # An error of NaN lies in no band.
-                    inside = np.abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
+                    inside = abs(wrench.known[known, k] - y) <= COVERS * wrench.sd[known, k]
                     row["band_share"] = float(inside.mean())
             rows.append(row)
     return pl.DataFrame(rows, schema=WRENCH_SCHEMA)

@@ -149,13 +149,13 @@ def shared_part(recording: Recording, free: Recording) -> Alignment | None:
     """
     t = np.linspace(recording.t[0], recording.t[-1], COARSE)
     q = resample_columns(t, recording.t, recording.q)
-    path = np.append(np.abs(np.diff(q, axis=0)).max(axis=1), 0.0)
+    path = np.append(abs(np.diff(q, axis=0)).max(axis=1), 0.0)
     span = recording.duration + free.duration
     shifts = free.t[0] - recording.t[-1] + np.arange(0.0, span, max(0.02, span / 5000.0))
     shared = [float(np.sum(path * near(t + shift, q, free))) for shift in shifts]
     if max(shared) < LEAST_OVERLAP * float(path.sum()):
         return None
-    shift, rate = refined(recording, free, float(shifts[int(np.argmax(shared))]), 1.0)
+    shift, rate = refined(recording, free, float(shifts[np.argmax(shared)]), 1.0)
     matched = near(rate * recording.t + shift, recording.q, free)
     long = covered(intervals(recording.t, matched, least=1.0), recording.samples)
     found = aligned_at(recording, free, shift, rate, long)
@@ -169,12 +169,12 @@ def apart(t: Array, q: Array, free: Recording) -> Array:
 
 def near(t: Array, q: Array, free: Recording) -> Mask:
     """Whether the free run is within `SAME_TRAJECTORY` of q at its instants t. (T,)"""
-    return np.asarray(np.abs(apart(t, q, free)).max(axis=1) <= SAME_TRAJECTORY)
+    return np.asarray(abs(apart(t, q, free)).max(axis=1) <= SAME_TRAJECTORY)
 
 
 def explained_by_rate(recording: Recording, free: Recording) -> Alignment | None:
     """Alignment at a ratio of rates that makes two logs one path, if any."""
-    for rate in RATES[np.abs(RATES - 1.0) > SAME_RATE]:
+    for rate in RATES[abs(RATES - 1.0) > SAME_RATE]:
         lengths = (recording.duration * rate, free.duration)
         if min(lengths) < LEAST_OVERLAP * max(lengths):
             continue

@@ -251,7 +251,7 @@ def segment(recording: Recording, period: Period) -> Cycles:
 
 def comes_back(t: Array, q: Array, shift: float) -> Mask:
     """Whether the arm is at this place `shift` seconds away. (T,)"""
-    distance = np.abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1)
+    distance = abs(resample_columns(t + shift, t, q, np.nan) - q).max(axis=1)
     return np.asarray(distance <= ON_PATH)
 
 

@@ -46,7 +46,7 @@ SLACK = 0.03
 
 def within(t: Array, spans: Iterable[tuple[float, float]]) -> Mask:
     """Samples that lie in any of some spans. (T,)"""
-    inside = np.zeros(len(t), dtype=bool)
+    inside = np.zeros(len(t), bool)
     for first, last in spans:
         inside |= (t >= first) & (t <= last)
     return inside
@@ -176,7 +176,7 @@ class FreeMotion(Shown):
             own = own | np.isin(self.cycles.number(t), found.numbers)
             remarks += found.remarks(self.cycles.whole)[:1]
         pieces = [RunSamples(log, own)] if own.any() else []
-        whole = (RunSamples(r.run, np.ones(r.recording.samples, dtype=bool)) for r in self.runs)
+        whole = (RunSamples(r.run, np.ones(r.recording.samples, bool)) for r in self.runs)
         return FreePart((*pieces, *whole), own, tuple(remarks), doubted=not given)
 
     @cached_property

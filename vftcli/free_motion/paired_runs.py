@@ -133,7 +133,7 @@ class PairedRuns:
         """Rest of a joint in the log or in any free run. (T, n)"""
         found = self.motion.standing.copy()
         for p in self.pairings:
-            found |= p.there(p.free.standing.astype(np.float64)) > 0.0
+            found |= p.there(p.free.standing.astype(float)) > 0.0
         return found
 
     @cached_property

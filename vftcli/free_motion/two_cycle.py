@@ -207,7 +207,7 @@ def friction_change(motion: Run, tau: Array, moving: Mask) -> Array:
     for j in range(n):
         used = np.isfinite(tau[:, j]) & moving[:, j] & faster(motion.dq[:, j], REST)
         along = tau[used, j] * np.sign(motion.dq[used, j])
-        count = np.bincount(piece[used]).astype(np.float64)
+        count = np.bincount(piece[used]).astype(float)
         total = np.bincount(piece[used], weights=along)
         means = total[count > 0] / count[count > 0]
         if len(means) < 5:

@@ -109,7 +109,7 @@ def find_contacts(motion: PreparedLog, residual: Array, dry: Array) -> list[Cont
     # The filter spreads an event at standstill over a period of its cutoff.
     reach = max(1, round(1.0 / (motion.cutoff * median_step(motion.t))))
     sticks = near(slower(motion.dq, SLIDES), reach)
-    excess = np.maximum(np.abs(residual) - np.abs(dry) * sticks, 0.0)
+    excess = np.maximum(abs(residual) - abs(dry) * sticks, 0.0)
     z = excess * usable / np.maximum(sd, 1e-9)
     found: list[ContactSpan] = []
     for start, stop in intervals(motion.t, z.max(axis=1) > TOUCH, least=TOUCH_TIME):
@@ -205,7 +205,7 @@ def warm_up_remarks(data: Training, fits: Sequence[JointFit | None]) -> list[Rem
         more = np.array(
             [
                 np.sum(sign[part] * residual[part], axis=0)
-                / np.maximum(np.abs(sign[part]).sum(axis=0), 1e-9)
+                / np.maximum(abs(sign[part]).sum(axis=0), 1e-9)
                 for part in folds(log.samples, THIRDS)
             ]
         )

@@ -92,7 +92,7 @@ class JointData(NamedTuple):
     @property
     def speeds(self) -> list[float]:
         """Speed that the joint exceeds in a hundredth of each log. [rad/s]"""
-        each = (np.abs(log.dq[:, self.joint]) for log in self.logs)
+        each = (abs(log.dq[:, self.joint]) for log in self.logs)
         return [float(np.quantile(speed, 0.99)) for speed in each]
 
     @property

@@ -188,10 +188,10 @@ def group_parameters(layout: ParameterColumns) -> Grouping:
     if layout.rotor:
         A = np.concatenate([A, ddq[:, :, None] * np.eye(n)], axis=2)
     R, order = qr(A.reshape(-1, A.shape[2]), mode="r", pivoting=True)
-    diagonal = np.abs(np.diag(R))
+    diagonal = abs(np.diag(R))
     rank = int(np.count_nonzero(diagonal > RANK_TOLERANCE * diagonal[0]))
-    beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), dtype=float)
-    beta[np.abs(beta) < 1e-9] = 0.0  # rounding would enter the names
+    beta = np.asarray(np.linalg.solve(R[:rank, :rank], R[:rank, rank:]), float)
+    beta[abs(beta) < 1e-9] = 0.0  # rounding would enter the names
     first, friction = order[:rank].argsort(), range(layout.rotor_places.stop, layout.size)
     independent = (*order[:rank][first].tolist(), *friction)
     carried = np.vstack([beta[first], np.zeros((len(friction), beta.shape[1]))])
@@ -211,7 +211,7 @@ def base_parameters(triangles: Triangles, start: Array) -> pl.DataFrame:
     step, spread, lost = truncated_step(R, z - R @ before)
     values = before + step
     sd = np.where(lost > DOUBTFUL, np.inf, spread * np.sqrt(triangles.correlation))
-    determined = sd <= DOUBTFUL * np.maximum(np.abs(values), np.abs(before))
+    determined = sd <= DOUBTFUL * np.maximum(abs(values), abs(before))
     return pl.DataFrame([grouping.sums(layout.names), values, sd, determined], schema=BASE)
 
 

@@ -210,7 +210,7 @@ def identified_friction(
 
 def check_friction(j: int, friction: JointFriction, data: Training) -> list[Remark]:
     """A remark if joint j's (from 0) friction pushes at some speed, or falls."""
-    speed = max(float(np.abs(log.dq[:, j]).max()) for log in data.logs)
+    speed = max(float(abs(log.dq[:, j]).max()) for log in data.logs)
     torque = steady_torque(friction, np.linspace(0.1 * speed, speed, 10))
     noise = max(robust_sd(log.tau)[j] for log in data.logs)
     # A hundredth of the torque's spread: no friction comes out on either side of zero.

@@ -197,7 +197,7 @@ def load_friction(robot: Robot, q: Array, sign: Array, x: Array) -> Array:
     phi = chain_parameters(robot.loaded_chain)
     heavier = phi.copy()
     heavier[-LINK : -LINK + STATIC] += x
-    growth = np.abs(Y @ heavier) - np.abs(Y @ phi)
+    growth = abs(Y @ heavier) - abs(Y @ phi)
     out = np.zeros((len(q), n, n))
     out[:, range(n), range(n)] = growth * sign
     return out
@@ -268,7 +268,7 @@ def different_poses(q: Array) -> int:
     """Number of poses (P, n) at least `APART` apart."""
     found: list[Array] = []
     for pose in q:
-        if not found or np.abs(np.array(found) - pose).max(axis=1).min() > APART:
+        if not found or abs(np.array(found) - pose).max(axis=1).min() > APART:
             found.append(pose)
     return len(found)
 
@@ -334,7 +334,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     """
     robot, signals = runs[0].robot, []
     for run in [carrying(run, carried) for run in runs] if carried.any() else runs:
-        piece = RunSamples(run, np.ones(run.recording.samples, dtype=bool))
+        piece = RunSamples(run, np.ones(run.recording.samples, bool))
         at, own = weighed(piece), columns(piece)
         if own is not None:
             signals.append((*own, run.recording.q[at], run.recording.require("dq")[at]))

@@ -87,7 +87,7 @@ def targets_method(data: Training) -> MethodResult:
     robot = data.robot
     models = controller_models(data.recordings, robot)
     rotor, frictions = robot.chain.rotor_inertia.copy(), list(profile_friction(robot))
-    constants = np.array(robot.torque_constant, dtype=float)
+    constants = np.array(robot.torque_constant, float)
     numbers: list[Number] = []
     remarks: list[Remark] = []
     for j, model in enumerate(models):
@@ -224,7 +224,7 @@ def resolution(values: Array) -> float:
 
 def constant_in_motion(j: int, log: ControllerTargets) -> Estimate:
     """K from current against moment; sd from the friction's shapes."""
-    moment, speed = log.moment[:, j], np.abs(log.dq[:, j])
+    moment, speed = log.moment[:, j], abs(log.dq[:, j])
     constants, spread = [], []
     for shape in SHAPES:
         A = np.column_stack([moment, log.columns(j, shape)])
@@ -270,7 +270,7 @@ def controller_friction(j: int, log: ControllerTargets, constant: float) -> Fric
     The controller's own law is a bent line: its points where the motion spans them, elsewhere
     a logarithm. None at rest.
     """
-    speed = np.abs(log.dq[:, j])
+    speed = abs(log.dq[:, j])
     fast = float(np.quantile(speed, 0.9))
     if fast < SLIDES:
         return None

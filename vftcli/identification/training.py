@@ -104,7 +104,7 @@ class PreparedLog:
     @cached_property
     def load(self) -> Array:
         """Absolute gravity torque along the whole log. (T, n) [N·m]"""
-        return np.abs(gravity_torque(self.robot, self.recording.q))
+        return abs(gravity_torque(self.robot, self.recording.q))
 
     @cached_property
     def warmth(self) -> Array | None:
@@ -194,7 +194,7 @@ def prepare(recording: Recording, robot: Robot, cutoff: float = CUTOFF) -> Prepa
 
 def usable_samples(t: Array, dq: Array, cutoff: float) -> Mask:
     """Samples with information, by joint: no long stop, no gap beside. (T, n)"""
-    usable = np.ones(dq.shape, dtype=bool)
+    usable = np.ones(dq.shape, bool)
     for j, moves in enumerate(faster(dq, NONZERO).T):
         usable[:, j] = ~covered(intervals(t, ~moves, least=STOP), len(t))
     # What the filter makes of a gap reaches half a period of its cutoff to either side.
@@ -297,7 +297,7 @@ class Training:
 
     def top_speed(self, j: int) -> float:
         """Speed limit of joint j (from 0), else its fastest motion. [rad/s]"""
-        fastest = max(float(np.abs(log.dq[:, j]).max()) for log in self.logs)
+        fastest = max(float(abs(log.dq[:, j]).max()) for log in self.logs)
         return float(np.fmax(self.robot.limits.qd_max[j], fastest))
 
 

@@ -69,7 +69,7 @@ def settled_prior(model: Discrete, d: Densities) -> Array:
     for _ in range(LONGEST):
         before = prior
         prior = predicted(updated(prior, model.r)[1], model.a12, model.a22, noise)
-        if np.all(np.abs(prior - before) <= SETTLED * np.abs(prior)):
+        if np.all(abs(prior - before) <= SETTLED * abs(prior)):
             break
     return prior
 

@@ -236,8 +236,8 @@ def settling_samples(observer: "Observer", step: float, joints: int) -> int:
     zero = np.zeros((samples, joints))
     terms = DynamicsTerms(t=step * np.arange(float(samples)), p=zero, mu=zero - 1.0)
     answer = observer.estimate(terms).tau
-    left = np.abs(answer - answer[-1]).max(axis=1)
-    return int(np.flatnonzero(left > SETTLED * np.abs(answer[-1]).max())[-1]) + 1
+    left = abs(answer - answer[-1]).max(axis=1)
+    return int(np.flatnonzero(left > SETTLED * abs(answer[-1]).max())[-1]) + 1
 
 
 def lead_samples(observer: "Observer", step: float, joints: int) -> int:

@@ -253,7 +253,7 @@ def settle(model: Discrete, entering: Covariance, guess: Covariance) -> Gains:
             X = np.array([[a + o22 * delta, cross], [cross, c + o11 * delta]]) / whole
             gained = moved(phi, moved(phi, X).swapaxes(0, 1))
             new = (end + gained[(0, 0, 1), (0, 1, 1)])[..., :-1]
-            change = np.abs(new - starts[..., 1:]) / np.maximum(np.abs(new), np.finfo(float).tiny)
+            change = abs(new - starts[..., 1:]) / np.maximum(abs(new), np.finfo(float).tiny)
             starts[..., 1:] = new
             if change.max() <= SETTLED:
                 break

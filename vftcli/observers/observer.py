@@ -77,7 +77,7 @@ class BlockObserver(Shown):
 
 def per_joint(value: Array | float, joints: int) -> Array:
     """One number a joint from one number or one a joint. (n,)"""
-    found = np.asarray(value, dtype=float)
+    found = np.asarray(value, float)
     if found.size != 1 and found.shape != (joints,):
         words = f"an observer's parameter has shape {found.shape}"
         raise ShapeError(f"{words}; expected one number, or one a joint: ({joints},)")
@@ -95,5 +95,5 @@ def numbers_of(value: ArrayLike, name: str, observer: str) -> Array:
 
 def angular(frequency: Array) -> Array:
     """ω of frequencies [Hz], at 0 Hz so near that quotients have their limit. (F, 1) [rad/s]"""
-    omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)[:, None]
+    omega = 2.0 * np.pi * np.asarray(frequency, float)[:, None]
     return np.where(omega == 0.0, 1e-9, omega)

@@ -255,7 +255,7 @@ class KalmanObserver(BlockObserver):
         for name in ("r_diag", "q_p_diag", "q_tau_diag", "decay"):
             value = numbers_of(getattr(self, name), name, self.name)
             # The paper gives A_τ = −a, its tables a: either sign means this decay.
-            value = frozen(np.abs(value)) if name == "decay" else value
+            value = frozen(abs(value)) if name == "decay" else value
             object.__setattr__(self, name, value)
             least_allowed = value > 0 if name in {"r_diag", "q_tau_diag"} else value >= 0
             if not (np.isfinite(value).all() and least_allowed.all()):
@@ -306,7 +306,7 @@ class KalmanObserver(BlockObserver):
 
     def model(self, step: Array | float, joints: int) -> Discrete:
         """Discrete model at one sample time, or at each as a column (T, 1). [s]"""
-        return self._discretise(np.asarray(step, dtype=float), self.densities(joints))
+        return self._discretise(np.asarray(step, float), self.densities(joints))
 
     @property
     def _discretise(self) -> Callable[[Array, Densities], Discrete]:
@@ -340,7 +340,7 @@ class KalmanObserver(BlockObserver):
         """Covariance before the first update: given, or stationary at a sample time [s]. (n,)"""
         if self.initial_covariance is None:
             return predict(self.steady(step, joints).posterior, self.model(step, joints))
-        given = np.asarray(self.initial_covariance, np.float64)
+        given = np.asarray(self.initial_covariance, float)
         if given.shape not in {(3,), (3, 1), (3, joints)}:
             words = f"initial_covariance of {self.name} has shape {given.shape}"
             raise ShapeError(f"{words}; expected (3, {joints}): P₁₁, P₁₂, P₂₂ of each joint")

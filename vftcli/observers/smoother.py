@@ -94,7 +94,7 @@ class KalmanSmoother(Shown):
     def frequency_response(self, frequency: Array, step: float, joints: int) -> Complex:
         """Two-sided gain in the middle of a log: real, no delay. (F, n)"""
         causal = self.filter.tuning(step, joints)
-        x = 2.0 * np.pi * np.asarray(frequency, dtype=float)[:, None] / causal.omega_n
+        x = 2.0 * np.pi * np.asarray(frequency, float)[:, None] / causal.omega_n
         c = 4.0 * causal.zeta**2 - 2.0
         return (1.0 / (1.0 + c * x**2 + x**4)).astype(np.complex128)
 

@@ -125,12 +125,12 @@ class Spectra:
 
     def missed(self, response: NDArray[np.complex128]) -> Array:
         """∫|1 − H|² S_τ df, what lag and bandwidth leave out, of H (F, n). (n,) [(N·m)²]"""
-        missed = np.abs(1.0 - response) ** 2 * self.external
+        missed = abs(1.0 - response) ** 2 * self.external
         return np.asarray(missed.sum(axis=0) * self.width)
 
     def passed(self, response: NDArray[np.complex128]) -> Array:
         """∫|H|² S_n df, what of the noise comes through H (F, n). (n,) [(N·m)²]"""
-        return np.asarray(np.sum(np.abs(response) ** 2 * self.noise, axis=0) * self.width)
+        return np.asarray(np.sum(abs(response) ** 2 * self.noise, axis=0) * self.width)
 
 
 def neighbour_mean(spectrum: Array) -> Array:
@@ -166,7 +166,7 @@ def spectra_of(loaded: RunSamples, free: Sequence[RunSamples]) -> Spectra:
     (noise, few), (both, many) = (welch(found, size, nominal) for found in (quiet, heavy))
     both = noise + thinned * (both - noise) if thinned > 1.0 else both
     return Spectra(
-        frequency=np.asarray(np.fft.rfftfreq(size, nominal), dtype=float),
+        frequency=np.asarray(np.fft.rfftfreq(size, nominal), float),
         free=handed_over(noise),
         loaded=handed_over(both),
         step=nominal,

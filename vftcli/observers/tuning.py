@@ -56,7 +56,7 @@ def momentum(rate: Array) -> Observer:
 
 def kalman_filter(omega_n: Array, r: Array | float = 1.0) -> KalmanObserver:
     """Kalman observer of ω_n at ζ = 1/√2: Q_τ = R ω_n⁴, Q_p = 0. (n,)"""
-    density = np.broadcast_to(np.asarray(r, dtype=float), omega_n.shape)
+    density = np.broadcast_to(np.asarray(r, float), omega_n.shape)
     return KalmanObserver(
         discretisation="zoh", r_diag=density, q_p_diag=0.0, q_tau_diag=density * omega_n**4
     )
@@ -107,8 +107,8 @@ def error_curve(kind: Kind, spectra: Spectra, slowest: float = SLOWEST) -> Curve
     omega_n = natural_frequencies(spectra.step, slowest)
     # Each natural frequency is a joint of one observer: one call gives all responses.
     response = kind(omega_n).frequency_response(spectra.frequency, spectra.step, len(omega_n))
-    missed = (np.abs(1.0 - response) ** 2).T @ spectra.external
-    passed = (np.abs(response) ** 2).T @ spectra.noise
+    missed = (abs(1.0 - response) ** 2).T @ spectra.external
+    passed = (abs(response) ** 2).T @ spectra.noise
     return Curve(omega_n, np.sqrt((missed + passed) * spectra.width))
 
 
@@ -139,7 +139,7 @@ def noise_level(omega_n: Array, spectra: Spectra) -> Array:
     settled = unit.steady(spectra.step, n)
     response = unit.frequency_response(spectra.frequency, spectra.step, n)
     jump = 2.0 * np.sin(np.pi * spectra.frequency * spectra.step)[:, None]
-    share = (np.abs(response) * jump / settled.l2) ** 2
+    share = (abs(response) * jump / settled.l2) ** 2
     both, noise = (
         np.sum(share * density, axis=0) * spectra.width
         for density in (spectra.loaded, spectra.free)
@@ -250,7 +250,7 @@ def tune(observer: Observer, goal: Goal, step: float, joints: int) -> Observer:
         if goal.name == "delay":
             return tuning.delay - goal.value
         gain = turned(x).frequency_response(np.array([goal.value]), step, joints)[0]
-        return np.asarray(np.abs(gain) / tuning.dc_gain - np.sqrt(0.5))
+        return np.asarray(abs(gain) / tuning.dc_gain - np.sqrt(0.5))
 
     rising = goal.name == "bandwidth"
     a, b = (np.full(joints, np.log(limit)) for limit in (low, high))
@@ -318,7 +318,7 @@ def tune_all(spectra: Spectra, goal: Goal) -> tuple[Tuned, ...]:
     for name, (observer, rate, gains) in lines.items():
         response = observer.frequency_response(spectra.frequency, step, n)
         rmse = np.sqrt(spectra.missed(response) + spectra.passed(response))
-        power = np.abs(response) ** 2 * spectra.noise * spectra.width
+        power = abs(response) ** 2 * spectra.noise * spectra.width
         alarms = None if threshold is None else crossings(power, spectra.frequency, threshold)
         section, delay = "kfo" if name == "kfo-zoh" else name, observer.tuning(step, n).delay
         tuned.append(Tuned(name, section, gains, rate, delay, rmse, alarms, observer))
@@ -361,7 +361,7 @@ def few_alarms(kind: Kind, grid: Array, spectra: Spectra, threshold: Array, most
     """Whether a rate raises at most so many false alarms an hour. (G, n)"""
     response = kind(grid).frequency_response(spectra.frequency, spectra.step, len(grid))
     noise = spectra.noise * spectra.width
-    powers = (np.abs(column[:, None]) ** 2 * noise for column in response.T)
+    powers = (abs(column[:, None]) ** 2 * noise for column in response.T)
     few = np.array([crossings(one, spectra.frequency, threshold) <= most for one in powers])
     if len(never := np.flatnonzero(~few.any(axis=0))):
         read = np.sqrt(noise.sum(axis=0))

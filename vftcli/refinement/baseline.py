@@ -183,7 +183,7 @@ class FreeReading(NamedTuple):
 def free_reading(found: Baseline, observer: Observer, estimate: ExternalTorque) -> FreeReading:
     """An observer's run along the free pieces; on the log it is its estimate."""
     log = found.motion.log
-    read, rests = [np.zeros((0, estimate.joints))], [np.zeros((0, estimate.joints), dtype=bool)]
+    read, rests = [np.zeros((0, estimate.joints))], [np.zeros((0, estimate.joints), bool)]
     for run, inside in found.pieces:
         tau = estimate.tau if run is log else observer.estimate(found.of(run).terms).tau
         if found.load is not None:

@@ -84,7 +84,7 @@ def friction_shapes(run: Run, gravity: Array) -> list[Array]:
     """
     q, dq = run.q, run.dq
     sign = np.tanh(dq / SMOOTHING)
-    return [sign, play(q, PLAY).state - sign, np.abs(gravity) * sign, dq, dq * np.abs(dq)]
+    return [sign, play(q, PLAY).state - sign, abs(gravity) * sign, dq, dq * abs(dq)]
 
 
 def usual_friction(robot: Robot) -> Array:
@@ -157,7 +157,7 @@ def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
     own = LINK * joints + (SHAPES + 3) * joint
     return np.concatenate(
         [np.arange(LINK * joint, LINK * joints), np.arange(own, own + SHAPES + 3)]
-    ).astype(np.intp)
+    ).astype(int)
 
 
 def expected_error(robot: Robot) -> ModelError:
@@ -167,7 +167,7 @@ def expected_error(robot: Robot) -> ModelError:
     for j, (m, c) in enumerate(zip(chain.mass, chain.com, strict=True)):
         reach = float(np.dot(c, c))
         tensor = 0.2 * (np.trace(chain.inertia[j]) + m * reach) + 0.02 * m * np.sqrt(reach) + 1e-4
-        inertial[j] = [0.05 * m, *(0.01 * m + 0.05 * m * np.abs(c)), *[tensor] * len(TENSOR)]
+        inertial[j] = [0.05 * m, *(0.01 * m + 0.05 * m * abs(c)), *[tensor] * len(TENSOR)]
     rotor = 0.2 * chain.rotor_inertia
     ones = np.ones(chain.joints)
     return ModelError(
@@ -179,8 +179,8 @@ def expected_error(robot: Robot) -> ModelError:
                 0.2 * dry + 0.05,
                 0.7 * dry + 0.05,
                 0.03 * ones,
-                0.4 * np.abs(viscous) + 0.1,
-                0.4 * np.abs(quadratic) + 0.05,
+                0.4 * abs(viscous) + 0.1,
+                0.4 * abs(quadratic) + 0.05,
             ]
         ),
         offset=0.15 * dry + 0.02,

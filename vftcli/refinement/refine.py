@@ -153,7 +153,7 @@ def budget(found: Baseline, spectra: Spectra, reading: FreeReading) -> Budget:
     f, step, n = spectra.frequency, spectra.step, spectra.joints
     response = reading.observer.frequency_response(f, step, n)
     read = reading.rms**2
-    share = np.abs(response) ** 2
+    share = abs(response) ** 2
     noise = np.minimum(np.sum(spectra.floor * share, axis=0) * spectra.width, read)
     velocity = np.concatenate([piece.run.dq[piece.inside] for piece in found.pieces])
     by_friction = (read - noise) * friction_share(velocity, reading.samples)

@@ -90,7 +90,7 @@ def slow_loads(chain: Chain, t: Array, q: Array) -> SlowLoads:
     length = float(t[-1] - t[0])
     knots = 1 if length < CONSTANT else min(round(length / KNOTS) + 1, MOST_KNOTS)
     place = (t - t[0]) / length * (knots - 1)
-    knot = np.minimum(place.astype(np.intp), max(knots - 2, 0))
+    knot = np.minimum(place.astype(int), max(knots - 2, 0))
     return SlowLoads(-np.concatenate([wrench, *along], axis=2), knot, place - knot, knots)
 
 
@@ -189,7 +189,7 @@ class Rows:
         scales[:unknowns] = scale
         matrix = sums.gram * scales * scales[:, None]
         matrix.flat[:: len(matrix) + 1] += 1.0
-        factor = np.asarray(np.linalg.cholesky(matrix), dtype=float)
+        factor = np.asarray(np.linalg.cholesky(matrix), float)
         z = forward_solved(factor, scales * sums.right)
         gained = np.concatenate([[0.0], np.cumsum(z**2)])
         loads = min(self.loads.sizes, key=lambda size: PENALTY * size - gained[unknowns + size])
@@ -205,7 +205,7 @@ class Rows:
 
 def forward_solved(factor: Array, right: Array) -> Array:
     """L⁻¹ times right-hand sides, forward substitution in blocks. (N,) or (N, k)"""
-    found = right.astype(np.float64)
+    found = right.astype(float)
     for first in range(0, len(found), BLOCK):
         own = slice(first, first + BLOCK)
         rest = found[own] - factor[own, :first] @ found[:first]
@@ -253,7 +253,7 @@ def fit_robustly(rows: Rows, step: float, dry: Array) -> WholeLogFit:
     least = np.maximum(LEAST_SCALE * dry, LEAST_TORQUE)
     residual, scale = first_fit(rows, step, counted, least)
     for _ in range(FREE_PASSES):
-        free = free_samples(np.max(np.abs(residual) / scale, axis=1), step)
+        free = free_samples(np.max(abs(residual) / scale, axis=1), step)
         weight = huber(residual / scale) / (counted * scale**2)
         residual = rows.residual(rows.solution(rows.sums(weight, free)[0]))
         scale = np.maximum(robust_sd(residual[free]), least)
@@ -266,11 +266,11 @@ def first_fit(rows: Rows, step: float, counted: float, least: Array) -> tuple[Ar
     So many samples count as one; the scale is at `least` (n,) [N·m].
     """
     rows, residual = replace(rows, loads=rows.loads.none), rows.d
-    quiet = np.quantile(np.abs(residual), QUIET_SHARE, axis=0)
+    quiet = np.quantile(abs(residual), QUIET_SHARE, axis=0)
     scale = np.maximum(SD_PER_MEDIAN * quiet / QUIET_QUANTILE, least)
     threshold = np.inf
     for _ in range(PASSES):
-        worst = largest_around(np.max(np.abs(residual) / scale, axis=1), round(REACH / step))
+        worst = largest_around(np.max(abs(residual) / scale, axis=1), round(REACH / step))
         first = np.isinf(threshold)
         threshold = np.quantile(worst, FIRST) if first else threshold / NARROWED
         threshold = max(threshold, NARROWEST)
@@ -336,7 +336,7 @@ def guarded(fit: WholeLogFit, dq: Array) -> Guarded:
             if scale:
                 found = fit.rows.solution(rest, scale).model
                 residual = residual + fit.rows.modelled(found, inner)
-            held = np.minimum(np.abs(residual[free]) / fit.scale, LARGEST)
+            held = np.minimum(abs(residual[free]) / fit.scale, LARGEST)
             squares[k] += np.sum(held**2 * judged[inner][free], axis=0)
     best = int(squares.mean(axis=1).argmin())
     share = np.sqrt(squares[best] / np.maximum(squares[0], np.finfo(float).tiny))

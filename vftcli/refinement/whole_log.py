@@ -182,7 +182,7 @@ def untouched(terms: DynamicsTerms, why: Remark) -> WholeLogBias:
         weight=np.zeros(terms.joints),
         bias=none,
         sd=none,
-        free=np.ones(terms.samples, dtype=bool),
+        free=np.ones(terms.samples, bool),
         load=none,
         remarks=(why,),
         fitted=False,

@@ -121,7 +121,7 @@ def turn_after(found: Replay, n: int, row: dict[str, object]) -> float:
     t, axis = found.motion.t, AXES.index(str(row["axis"]))
     start = int(t.searchsorted(float(str(row["release_s"])) - 1e-9))
     outward = np.sign(found.motion.x[start, n, axis]) * found.motion.v[start:, n, axis]
-    return float(t[start + int(np.argmax(outward <= 0.0))] - t[start])
+    return float(t[start + np.argmax(outward <= 0.0)] - t[start])
 
 
 def latest_turns(_seed: int, *, alphas: Sequence[float]) -> RunResult:

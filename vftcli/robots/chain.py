@@ -187,7 +187,7 @@ def improper(mass: float, inertia: Array) -> str:
 
 def slack_of(inertia: Array) -> float:
     """How far a rounded tensor may be beyond what a body can have. [kg·m²]"""
-    return 1e-6 * max(float(np.abs(np.linalg.eigvalsh(inertia)).max()), 1e-12)
+    return 1e-6 * max(float(abs(np.linalg.eigvalsh(inertia)).max()), 1e-12)
 
 
 def nearest_tensor(inertia: Array) -> Array:
@@ -219,11 +219,11 @@ def kinematics(
     """Chain frames of a table, the poses of its inertial frames in them, and its tip's."""
     out = Pose(np.eye(3), np.array([0.0, 0.0, float(document.get("flange_d", 0.0))]))
     turn = rpy_matrix(document.get("ee_rpy", (0.0, 0.0, 0.0)))
-    tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), dtype=float))
+    tip = out @ Pose(turn, np.asarray(document.get("ee_xyz", (0.0, 0.0, 0.0)), float))
     placements, inertial_frames = [], [IDENTITY] * len(joints)
     for k, joint in enumerate(joints):
         if convention == "xyz-rpy":
-            placements.append(Pose(rpy_matrix(joint["rpy"]), np.asarray(joint["xyz"], dtype=float)))
+            placements.append(Pose(rpy_matrix(joint["rpy"]), np.asarray(joint["xyz"], float)))
             continue
         R, about = rotation_about("x", joint["alpha"]), rotation_about("z", joint["theta"])
         if convention == "modified-dh":

@@ -103,5 +103,5 @@ def declared_payload(recording: "Recording") -> "Payload":
             f"{recording.name}: the log does not say which payload the controller was told of; "
             "describe it in a [payload.NAME] section of the robot file and give --payload NAME"
         )
-    centre = np.zeros(3) if com is None else np.asarray(com, dtype=float)
+    centre = np.zeros(3) if com is None else np.asarray(com, float)
     return Payload(mass=mass, com=centre, inertia=np.zeros((3, 3)))

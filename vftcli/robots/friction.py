@@ -60,7 +60,7 @@ def coulomb_viscous(
     np.tanh(torque, out=torque)
     dry: Array | float = coulomb
     if load is not None and load_coulomb:
-        dry = np.abs(load)
+        dry = abs(load)
         dry *= load_coulomb
         dry += coulomb
     if stribeck:
@@ -69,7 +69,7 @@ def coulomb_viscous(
     if viscous:
         torque += viscous * dq
     if quadratic:
-        torque += quadratic * dq * np.abs(dq)
+        torque += quadratic * dq * abs(dq)
     if offset:
         torque += offset
     return torque
@@ -89,7 +89,7 @@ def coulomb_logarithmic(
     torque, a, b) it follows the joint tests of UR arms to .01–.3 N·m, where a signed quadratic
     falls from 1.1–1.6 rad/s on.
     """
-    rise = np.abs(dq)
+    rise = abs(dq)
     rise /= logarithmic_velocity
     np.log1p(rise, out=rise)
     np.copysign(rise, dq, out=rise)
@@ -188,7 +188,7 @@ FRICTION_MODELS = {
 def warmth(law: Sequence[float], temperature: Array | float) -> Array:
     """s(T) = p₁ e^(p₂ T) + p₃ e^(p₄ T), T in °C. Like `temperature` [1]"""
     p1, p2, p3, p4 = law
-    T = np.asarray(temperature, dtype=float)
+    T = np.asarray(temperature, float)
     return p1 * np.exp(p2 * T) + p3 * np.exp(p4 * T)
 
 
@@ -291,8 +291,8 @@ def falling_speed(friction: JointFriction, limit: float) -> float:
     dq = np.linspace(-limit, limit, 1001)
     torque = steady_torque(friction, dq)
     # A hundred-thousandth of the torque is rounding, at a sigmoid's flat ends too.
-    falls = np.diff(torque) < -1e-5 * np.abs(torque).max()
-    ends = np.minimum(np.abs(dq[:-1]), np.abs(dq[1:]))
+    falls = np.diff(torque) < -1e-5 * abs(torque).max()
+    ends = np.minimum(abs(dq[:-1]), abs(dq[1:]))
     return float(ends[falls].min()) if falls.any() else float("nan")
 
 

@@ -81,8 +81,8 @@ def felt_bodies(chain: Chain) -> tuple[Array, Array]:
             m[j - 1] += m[j]
         J[j] -= symmetric
         h[j, 2] = 0.0
-    size = np.abs(J).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return np.where(np.abs(J) <= ROUNDING * size, 0.0, J), h
+    size = abs(J).max(axis=(1, 2), keepdims=True, initial=0.0)
+    return np.where(abs(J) <= ROUNDING * size, 0.0, J), h
 
 
 def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
@@ -95,7 +95,7 @@ def record(chain: Chain) -> tuple[Tape, dict[str, list[Value]]]:
     dq, cosine, sine = ([Value(1.0, part * n + j) for j in range(n)] for part in range(3))
     # cos(π/2) is 6e-17 in floating point, and 1 − 1e-16 is one.
     whole = np.rint(chain.rotation)
-    R = np.where(np.abs(chain.rotation - whole) <= ROUNDING, whole, chain.rotation)
+    R = np.where(abs(chain.rotation - whole) <= ROUNDING, whole, chain.rotation)
     r = [constants(translation) for translation in chain.translation]
 
     omega, v, gamma = NOTHING, NOTHING, constants(chain.gravity)

@@ -305,7 +305,7 @@ def robot_document(robot: Robot) -> Table:
         body = Body(float(chain.mass[j]), chain.com[j], chain.inertia[j]).moved(inverse(frame))
         values = {"com": body.com, "inertia": body.inertia[np.triu_indices(3)]}
         for key, value in {"mass": np.array(body.mass), **values}.items():
-            scale, before = float(np.abs(value).max(initial=1e-12)), table.get(key)
+            scale, before = float(abs(value).max(initial=1e-12)), table.get(key)
             if before is None or not np.allclose(before, value, rtol=0, atol=AGREES * scale):
                 table[key] = value.tolist()
         table["rotor_inertia"] = float(robot.chain.rotor_inertia[j])

@@ -256,7 +256,7 @@ def unwound(recording: Recording, robot: Robot) -> Recording:
     for signal in ("q", "target_q"):
         if (values := getattr(recording, signal)) is not None:
             # A sample that is missing is no number; what is wound up behind it would be none.
-            steps = np.abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
+            steps = abs(np.diff(values, axis=0)).max(axis=0, initial=0.0)
             if turns := [j for j in columns if steps[j] > np.pi]:
                 changed[signal] = smooth = values.copy()
                 smooth[:, turns] = np.unwrap(values[:, turns], axis=0)

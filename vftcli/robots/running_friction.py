@@ -46,7 +46,7 @@ def play(q: Array, length: Array | float, centre: Array | None = None) -> Play:
     centre c before the first sample it starts undeflected, c = q⁰, wrong by at most the whole
     deflection until the joint has moved 2 s₀.
     """
-    reach = np.asarray(length, dtype=float)
+    reach = np.asarray(length, float)
     if not len(q):
         return Play(np.zeros_like(q), np.zeros(q.shape[1:]) if centre is None else centre)
     start = q[0] if centre is None else centre

@@ -240,10 +240,10 @@ def disturbance_blocks(
     """
     t, joints = terms.t, terms.joints
     if len(t) < 2:
-        nothing, never = np.zeros((1, joints)), np.zeros(1, dtype=bool)
+        nothing, never = np.zeros((1, joints)), np.zeros(1, bool)
         return Blocks(t, np.zeros(1), nothing, q, nothing, never)
     size = max(round(seconds / median_step(t)), 1)
-    whole = np.ones(len(t) - 1, dtype=bool)
+    whole = np.ones(len(t) - 1, bool)
     whole[gaps_of(t, GAP)] = False
     if inside is not None:
         whole &= inside[1:] & inside[:-1]

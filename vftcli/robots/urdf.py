@@ -136,7 +136,7 @@ class UrdfPart(NamedTuple):
             return np.array([1.0, 0.0, 0.0])
         vector = np.array(self.numbers(axis, "xyz", 3))
         # An axis is normalised: shorter, it is rounding, longer, its square overflows.
-        if not 1e-9 < np.abs(vector).max() < 1e9:
+        if not 1e-9 < abs(vector).max() < 1e9:
             self.refuse(f"axis is {axis.get('xyz')!r}; it must point somewhere")
         unit: Array = vector / np.linalg.norm(vector)
         return unit

@@ -20,7 +20,7 @@ def frozen(value: ArrayLike) -> Array:
     """A read-only float64 array that nobody else can write to; not copied where it is one."""
     if isinstance(value, np.ndarray) and value.dtype == np.float64 and is_sealed(value):
         return value
-    copy = np.array(value, dtype=float, order="K")
+    copy = np.array(value, float, order="K")
     copy.setflags(write=False)
     return copy
 
@@ -83,7 +83,7 @@ def seal(owner: object, *names: str, shape: tuple[int, ...] = (), called: str = 
 def seal_mask(owner: object, name: str) -> None:
     """Make a mask of a frozen dataclass read-only, non-zero true; None stays None."""
     if (value := getattr(owner, name)) is not None:
-        copy = np.array(value, dtype=bool)
+        copy = np.array(value, bool)
         copy.setflags(write=False)
         object.__setattr__(owner, name, copy)
 

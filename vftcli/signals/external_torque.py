@@ -142,7 +142,7 @@ class ExternalTorque(TimeSeries):
             sd = None if self.error_sd is None else self.error_sd[known, j]
             sizes: tuple[float | None, float | None] = (None, None)
             if len(tau):
-                sizes = float(np.sqrt(np.mean(tau**2))), float(np.abs(tau).max())
+                sizes = float(np.sqrt(np.mean(tau**2))), float(abs(tau).max())
             band = None if sd is None or not len(sd) else COVERS * float(np.sqrt(np.mean(sd**2)))
             yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
 

@@ -138,7 +138,7 @@ def butterworth(step: float, cutoff: float | tuple[float, float], order: int = O
         poles = np.concatenate([half + root, half - root])
         zeros, gain = np.array([1.0, 0.0, -1.0]), high - low  # zeros at 0 and half the rate
     # (s − p)(s − p*) with s = (1 − z⁻¹)/(1 + z⁻¹)
-    power, double = np.abs(poles) ** 2, 2.0 * poles.real
+    power, double = abs(poles) ** 2, 2.0 * poles.real
     a = np.stack([1.0 - double + power, 2.0 * (power - 1.0), 1.0 + double + power], axis=1)
     return handed_over(np.concatenate([gain * zeros / a[:, :1], a / a[:, :1]], axis=1))
 
@@ -154,7 +154,7 @@ def noise_passed(step: float, cutoff: float | tuple[float, float], slope: int = 
     sections = butterworth(step, cutoff)
     response = np.prod((sections[:, :3] @ delays) / (sections[:, 3:] @ delays), axis=0)
     # |H|² of one pass is the amplitude of both, so |H|⁴ is their power.
-    gain = np.abs(response) ** 4
+    gain = abs(response) ** 4
     if slope:
         gain = gain * (np.sin(omega) / step) ** 2
     return float(gain.mean())

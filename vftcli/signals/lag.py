@@ -54,7 +54,7 @@ def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
         behind = np.stack([overlap_energy(x[:, None], at, samples) for x in late])
         power = behind * overlap_energy(early.T, -at, samples)
     else:
-        there = known.astype(np.float64)[None]
+        there = known.astype(float)[None]
         power = sliding(late**2, there, at) * sliding(there, early**2, at)
     return np.asarray(sliding(late, early, at) / np.sqrt(np.where(power > 0, power, np.inf)))
 
@@ -70,7 +70,7 @@ def sliding(later: Array, earlier: Array, at: Indices) -> Array:
     size, whole = (1 << max(count - 1, 1).bit_length() for count in (2 * reach, samples + reach))
     size = min(max(BLOCK, size), whole)
     hop = size - reach
-    total = np.zeros((len(later), size // 2 + 1), dtype=np.complex128)
+    total = np.zeros((len(later), size // 2 + 1), np.complex128)
     for start in range(0, samples, hop):
         begin, end = start + first, start + first + size
         block = later[:, max(begin, 0) : max(min(end, later.shape[1]), 0)]
@@ -156,7 +156,7 @@ class LagFit(NamedTuple):
     @property
     def closest(self) -> float:
         """The lag with the smallest difference. [samples]"""
-        return float(self.lag[int(self.difference.argmin())])
+        return float(self.lag[self.difference.argmin()])
 
     def rivals(self, most: float) -> list[float]:
         """Lags of valleys with a longer overlap than the closest, longest first."""

@@ -102,14 +102,14 @@ def solve(A: Array, y: Array) -> Array:
 
 def huber(z: Array) -> Array:
     """Weights of residuals in standard deviations: 1 up to `HUBER`."""
-    return HUBER / np.maximum(np.abs(z), HUBER)
+    return HUBER / np.maximum(abs(z), HUBER)
 
 
 def robust_sd(residual: Array) -> Array:
     """Standard deviation of each column by the median of its size. (n,)"""
     if not len(residual):
         return np.zeros(residual.shape[1:])
-    return np.asarray(SD_PER_MEDIAN * np.median(np.abs(residual), axis=0))
+    return np.asarray(SD_PER_MEDIAN * np.median(abs(residual), axis=0))
 
 
 def correlation_time(residual: Array) -> float:
@@ -119,7 +119,7 @@ def correlation_time(residual: Array) -> float:
     if size < 4 or not x.any():
         return 1.0
     spectrum = np.fft.rfft(x, 2 * size)
-    rho = np.fft.irfft(np.abs(spectrum) ** 2)[: size // 2]
+    rho = np.fft.irfft(abs(spectrum) ** 2)[: size // 2]
     rho /= rho[0]
     end = int(np.argmax(rho <= 0.0)) or len(rho)
     return max(1.0, 1.0 + 2.0 * float(rho[1:end].sum()))

@@ -100,7 +100,7 @@ def rotation_onto(direction: Array) -> Array:
     if np.allclose(z, (0.0, 0.0, 1.0), atol=1e-15):
         return np.eye(3)
     # The axis farthest from z gives the best conditioned cross product.
-    start = np.eye(3)[int(np.abs(z).argmin())]
+    start = np.eye(3)[abs(z).argmin()]
     x = np.cross(start, z)
     x /= np.linalg.norm(x)
     return np.column_stack([x, np.cross(z, x), z])
@@ -140,7 +140,7 @@ def quaternion_product(a: Array, b: Array) -> Array:
 
 def exp_matrix(vector: Array) -> Array:
     """Rotations of rotation vectors (Rodrigues). (…, 3) [rad] → (…, 3, 3)"""
-    v = np.asarray(vector, dtype=float)
+    v = np.asarray(vector, float)
     angle, K = np.sqrt(np.sum(v**2, axis=-1))[..., None, None], skew(v)
     # sin θ/θ, and (1 − cos θ)/θ² = ½ (sin(θ/2)/(θ/2))²
     once = np.sinc(angle / np.pi)
@@ -150,7 +150,7 @@ def exp_matrix(vector: Array) -> Array:
 
 def log_matrix(matrix: Array) -> Array:
     """Rotation vector, at most π long, of a rotation matrix. (…, 3, 3) → (…, 3) [rad]"""
-    quaternion = matrix_quaternion(np.asarray(matrix, dtype=float))
+    quaternion = matrix_quaternion(np.asarray(matrix, float))
     # Of the two quaternions of a rotation the one with w ≥ 0 has the shorter logarithm.
     return log_quaternion(np.where(quaternion[..., :1] < 0.0, -quaternion, quaternion))
 

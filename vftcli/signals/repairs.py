@@ -84,7 +84,7 @@ def without_isolated(recording: Recording) -> Recording:
     and it falls straight between: no sample is switched.
     """
     there = [name for name in ("q", "dq", *EFFORTS) if getattr(recording, name) is not None]
-    changed = np.zeros(recording.q.shape, dtype=bool)
+    changed = np.zeros(recording.q.shape, bool)
     values: dict[str, Any] = {}
     for name in there:
         x = getattr(recording, name)
@@ -111,8 +111,8 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
     """
     made = np.array(x)
     if len(x) <= 6 * NEAR:
-        return made, np.zeros(x.shape, dtype=bool)
-    bend, travel = 0.5 * np.abs(x[2:] - 2.0 * x[1:-1] + x[:-2]), 0.5 * np.abs(x[2:] - x[:-2])
+        return made, np.zeros(x.shape, bool)
+    bend, travel = 0.5 * abs(x[2:] - 2.0 * x[1:-1] + x[:-2]), 0.5 * abs(x[2:] - x[:-2])
     travel += least
     # Stamps that jitter bend a moving joint's angles, and those of a resting one not at all.
     by_travel = np.quantile(bend / travel, USUAL, axis=0) * travel
@@ -129,11 +129,11 @@ def drawn_in(x: Array, least: Array | float, peak: float) -> tuple[Array, Mask]:
         three = np.min(near[:, NEAR:] - near[:, : NEAR + 1], axis=1)
         far = np.maximum(limit[rows - 1], peak * three)
         beyond = np.zeros(x.shape)
-        beyond[rows] = np.maximum(np.abs(made[rows] - near[:, NEAR]) - far, 0.0)
+        beyond[rows] = np.maximum(abs(made[rows] - near[:, NEAR]) - far, 0.0)
         worst = beyond[rows[:, None] + around].max(axis=1)
         drawn = drawn_to(near[:, NEAR], others, made[rows], far)
         made[rows] = np.where(beyond[rows] >= worst, drawn, made[rows])
-    return made, np.abs(made - x) > 0.0
+    return made, abs(made - x) > 0.0
 
 
 def at_an_end(x: Array, limit: Array) -> Array:
@@ -151,6 +151,6 @@ def at_an_end(x: Array, limit: Array) -> Array:
 def drawn_to(middle: Array, place: Array, x: Array, limit: Array) -> Array:
     """Samples, those off `middle` by more than the limit nearer to their place."""
     off = x - middle
-    bad = np.clip(np.abs(off) / limit - 1.0, 0.0, 1.0)
+    bad = np.clip(abs(off) / limit - 1.0, 0.0, 1.0)
     drawn = (1.0 - bad) * (middle + np.sign(off) * limit) + bad * place
     return np.where(bad > 0.0, drawn, x)

@@ -58,7 +58,7 @@ def resting(t: Array, dq: Array) -> Mask:
     """
     first = t.searchsorted(t - AROUND, side="left")
     last = t.searchsorted(t + AROUND, side="right")
-    rests, count = np.zeros(dq.shape, dtype=bool), np.zeros(len(t) + 1, dtype=int)
+    rests, count = np.zeros(dq.shape, bool), np.zeros(len(t) + 1, int)
     for j, slow in enumerate(slower(dq).T):
         slow.cumsum(out=count[1:])
         rests[:, j] = 2 * (count[last] - count[first]) > last - first
@@ -68,8 +68,8 @@ def resting(t: Array, dq: Array) -> Mask:
 def held(q: Array, step: float) -> Mask:
     """Where no joint travels further than `HELD`; q (T, n) [rad]. (T,)"""
     reach = max(1, round(0.5 * WINDOW / step))
-    found = np.zeros(len(q), dtype=bool)
+    found = np.zeros(len(q), bool)
     if len(q) > 2 * reach:
-        travel = np.abs(q[2 * reach :] - q[: -2 * reach])
+        travel = abs(q[2 * reach :] - q[: -2 * reach])
         found[reach:-reach] = np.all(travel <= HELD, axis=1)
     return found

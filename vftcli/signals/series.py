@@ -39,7 +39,7 @@ def median_step(t: Array) -> float:
 def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
     """Samples after which a clock waits longer than `steps` steps. (G,)"""
     if len(t) < 2:
-        return np.zeros(0, dtype=int)
+        return np.zeros(0, int)
     taken = np.diff(t)
     return np.flatnonzero(taken > steps * median(taken))
 
@@ -74,7 +74,7 @@ def intervals(t: Array, mask: Mask, least: float = 0.0, gap: float = 0.0) -> lis
 
 def covered(runs: Sequence[tuple[int, int]], samples: int, margin: int = 0) -> Mask:
     """The mask of some runs and of `margin` samples on either side of each. (T,)"""
-    mask = np.zeros(samples, dtype=bool)
+    mask = np.zeros(samples, bool)
     for start, stop in runs:
         mask[max(start - margin, 0) : stop + margin] = True
     return mask

@@ -101,7 +101,7 @@ def blocks_of(F: Array, g: Array, wanted: Array) -> tuple[Array, Array, Array, A
 def sum_by_doubling(x: Array, R: Array) -> None:
     """Run x_b ← x_b + R x_{b−1} over all blocks in place: x (n, B, m), R (n, m, m)."""
     reach, apart = R.transpose(0, 2, 1), 1
-    while apart < x.shape[1] and np.abs(reach).max() > FORGOTTEN:
+    while apart < x.shape[1] and abs(reach).max() > FORGOTTEN:
         # numpy.matmul is slow at states of one number.
         x[:, apart:] += x[:, :-apart] * reach if len(R[0]) == 1 else x[:, :-apart] @ reach
         reach = reach @ reach
@@ -177,7 +177,7 @@ def run_blocks(F: Array, y: Array, start: Array, kind: Indices | slice = slice(N
         columns = moved(step, columns)
     ends, reach, apart = samples[-1].copy(), columns.swapaxes(0, 1), 1
     ends[..., :1] += moved(reach[:, :, kind, :1], start[..., None])
-    while apart < ends.shape[-1] and np.abs(reach[..., apart:]).max() > FORGOTTEN:
+    while apart < ends.shape[-1] and abs(reach[..., apart:]).max() > FORGOTTEN:
         ends[..., apart:] += moved(reach[:, :, kind, apart:], ends[..., :-apart])
         columns[..., apart:] = moved(reach[..., apart:], columns[..., :-apart])
         apart *= 2

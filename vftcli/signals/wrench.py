@@ -158,7 +158,7 @@ class Wrench(TimeSeries):
     @property
     def hidden(self) -> Mask:
         """Samples in which the pose cannot tell the wrench. (T,)"""
-        return np.asarray(self.masked, dtype=bool)
+        return np.asarray(self.masked, bool)
 
     @property
     def known(self) -> Array:

@@ -218,7 +218,7 @@ class Arm:
 
     def check_motion(self) -> None:
         """Raise a ParameterError if the loop has become unstable."""
-        fastest = float(np.abs(self.plant.v).max())
+        fastest = float(abs(self.plant.v).max())
         if not fastest < RUNAWAY:
             raise ParameterError(
                 f"the arm runs away at {self.t:.3f} s: servo or contacts are too stiff for a step "

@@ -75,7 +75,7 @@ class TrueFriction:
             fade = np.exp(-((dq / self.stribeck_velocity) ** 2))
             dry = dry * (1.0 + self.stribeck * fade)
         if load is not None:
-            dry = dry + self.load_coulomb * np.abs(load)
+            dry = dry + self.load_coulomb * abs(load)
         return dry
 
     def creep(self, dq: Array, dry: Array) -> tuple[Array, Array, Array]:
@@ -86,7 +86,7 @@ class TrueFriction:
 
     def smooth(self, dq: Array) -> tuple[Array, Array]:
         """The smooth part and its derivative at `dq` (n,) [rad/s]. (n,) [N·m], (n,) [N·m·s/rad]"""
-        speed = np.abs(dq)
+        speed = abs(dq)
         torque = self.offset + (self.viscous + self.quadratic * speed) * dq
         slope = self.viscous + 2.0 * self.quadratic * speed
         if "logarithmic" in self.present:
@@ -208,7 +208,7 @@ class Plant:
             )
         self.pin, self.model, self.data = pin, model, model.createData()
         self.true_friction, self.step = friction, step
-        self.q, self.v = np.array(q, dtype=float), np.array(v, dtype=float)
+        self.q, self.v = np.array(q, float), np.array(v, float)
         self.q_mid, self.v_mid, self.centre = self.q.copy(), self.v.copy(), self.q.copy()
         self.a, self.friction, self.external = np.zeros((3, len(self.q)))
         self.moved = False
@@ -294,7 +294,7 @@ def slide_or_stick(
         rows = M[stuck]
         friction[stuck] = impulse[stuck] - rows[:, free] @ step - rows[:, stuck] @ stop
         better[free & (after * signs < 0.0) & (limit > 0.0)] = 0.0
-        breaks = stuck & (np.abs(friction) > limit)
+        breaks = stuck & (abs(friction) > limit)
         better[breaks] = np.where(friction[breaks] < 0.0, -1.0, 1.0)
         if np.array_equal(better, signs):
             return after, friction, signs
@@ -312,9 +312,9 @@ def gauss_seidel(M: Array, impulse: Array, v: Array, limit: Array) -> tuple[Arra
         for j in range(len(v)):
             slip = free[j] - A[j] @ friction
             friction[j] = np.clip(friction[j] + slip / A[j, j], -limit[j], limit[j])
-        if np.abs(friction - before).max() <= 1e-14 * (1.0 + np.abs(friction).max()):
+        if abs(friction - before).max() <= 1e-14 * (1.0 + abs(friction).max()):
             break
     after = free - A @ friction
-    after[np.abs(friction) < limit] = 0.0
-    signs = np.where(np.abs(friction) < limit, 0.0, np.where(friction < 0.0, -1.0, 1.0))
+    after[abs(friction) < limit] = 0.0
+    signs = np.where(abs(friction) < limit, 0.0, np.where(friction < 0.0, -1.0, 1.0))
     return after, friction, signs

@@ -73,7 +73,7 @@ class Stretches:
         """Where the stretches lead at times `t` (T,) [s]; between them the motion rests."""
         from numpy.polynomial import chebyshev
 
-        t = np.asarray(t, dtype=float)
+        t = np.asarray(t, float)
         which = np.clip(self.times[:, 0].searchsorted(t, side="right") - 1, 0, None)
         n = self.paths[0].shape[1]
         out = Reference(*(np.zeros((len(t), n)) for _ in range(3)))
@@ -133,7 +133,7 @@ class CircleSpec:
         ring = self.radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
         q = follow(robot, home.rotation, centre + ring[[*range(count), 0]], start, "the circle")
         closure = np.outer(np.arange(count) / count, q[-1] - q[0])
-        if np.abs(closure).max() > 1.0:
+        if abs(closure).max() > 1.0:
             raise ParameterError("the circle winds a joint up; choose another start or radius")
         mean, *series = np.fft.rfft(q[:-1], axis=0)[: HARMONICS + 1] / count
         cosine, sine = 2.0 * np.real(series), -2.0 * np.imag(series)
@@ -180,7 +180,7 @@ class OffsetsSpec:
             share = 0.5 * (nodes[:, None] + 1.0)
             points = home.translation + before + share * (after - before)
             line = follow(robot, home.rotation, points, q, "a move")
-            paths.append(np.asarray(chebyshev.chebfit(nodes, line, 16), dtype=float))
+            paths.append(np.asarray(chebyshev.chebfit(nodes, line, 16), float))
             q, before = line[-1], after
         return Stretches(times, tuple(paths), self.length)
 
@@ -262,7 +262,7 @@ class JointwiseSpec:
         t, times, paths = self.rest, [], []
         for axis, speed in product(self.amplitude * np.eye(robot.joints), self.speeds):
             for a, b in pairwise((0 * axis, axis, -axis, 0 * axis)):
-                length = max(float(np.abs(b - a).sum()) / speed, 0.2)
+                length = max(float(abs(b - a).sum()) / speed, 0.2)
                 times.append((t, t + length))
                 paths.append(np.vstack([start + 0.5 * (a + b), 0.5 * (b - a)]))
                 t += length
@@ -320,7 +320,7 @@ def flange_pose(model: Any, q: Array) -> Any:  # noqa: ANN401 - Pinocchio is unt
     import pinocchio as pin
 
     data = model.createData()
-    pin.framesForwardKinematics(model, data, np.asarray(q, dtype=float))
+    pin.framesForwardKinematics(model, data, np.asarray(q, float))
     return data.oMf[model.getFrameId("flange")].copy()
 
 
@@ -332,7 +332,7 @@ def reach(model: Any, goal: Any, guess: Array) -> Array | None:  # noqa: ANN401
     import pinocchio as pin
 
     data, frame = model.createData(), model.getFrameId("flange")
-    q = np.array(guess, dtype=float)
+    q = np.array(guess, float)
     for _ in range(ITERATIONS):
         pin.framesForwardKinematics(model, data, q)
         error = pin.log6(data.oMf[frame].inverse() * goal).vector
@@ -350,11 +350,11 @@ def follow(robot: Robot, rotation: Array, points: Array, start: Array, what: str
     """Joint positions along flange points (K, 3) [m], each from the one before. (K, n) [rad]"""
     import pinocchio as pin
 
-    q, path = np.array(start, dtype=float), []
+    q, path = np.array(start, float), []
     for k, point in enumerate(points):
         found = reach(robot.model, pin.SE3(rotation, point), q)
         # A jump of a radian is another branch of the inverse kinematics.
-        if found is None or np.abs(found - q).max() > 1.0:
+        if found is None or abs(found - q).max() > 1.0:
             place = ", ".join(f"{value:.3f}" for value in point)
             raise ParameterError(
                 f"{what}: the flange of {robot.name!r} cannot reach ({place}) m (point {k + 1} of "
@@ -374,7 +374,7 @@ def check_limits(robot: Robot, q: Array, dq: Array, what: str) -> None:
                 f"{what}: joint {j} of {robot.name!r} would move over {place.min():.3f} to "
                 f"{place.max():.3f} rad; its limits are {low:.3f} to {high:.3f}"
             )
-        if (fastest := np.abs(speed).max()) > most:
+        if (fastest := abs(speed).max()) > most:
             raise ParameterError(
                 f"{what}: joint {j} of {robot.name!r} would move at {fastest:.2f} rad/s; "
                 f"its limit is {most:.2f}"
@@ -389,4 +389,4 @@ def check_start(robot: Robot, start: tuple[float, ...]) -> Array:
             f"trajectory.start has {len(start)} angles; robot {robot.name!r} has {robot.joints} "
             "joints"
         )
-    return np.array(start, dtype=float)
+    return np.array(start, float)

@@ -55,7 +55,7 @@ def find_contacts(t: Array, score: Array, gap: float = GAP) -> tuple[ContactInte
 
     Those shorter than `HOLD` are dropped, those closer than `gap` joined.
     """
-    inside = np.zeros(len(t), dtype=bool)
+    inside = np.zeros(len(t), bool)
     for begin, end in runs_of(score > LEAVE):
         # It starts where 1 is first exceeded, not where the lower threshold is.
         inside[begin:end] = np.logical_or.accumulate(score[begin:end] > 1.0)
@@ -66,7 +66,7 @@ def true_intervals(
     t: Array, truth: Array, limits: Array | float, gap: float = GAP
 ) -> tuple[ContactInterval, ...]:
     """Contacts of a true wrench or torque (T, k)."""
-    return find_contacts(t, np.nan_to_num(np.abs(truth) / limits).max(axis=1), gap=gap)
+    return find_contacts(t, np.nan_to_num(abs(truth) / limits).max(axis=1), gap=gap)
 
 
 def departure(values: Array, quiet: Array, least: Array | float) -> Array:
@@ -79,8 +79,8 @@ def departure(values: Array, quiet: Array, least: Array | float) -> Array:
     if len(inside) == 0:
         raise ParameterError("the free part holds no sample in which the wrench is known")
     centre = np.median(inside, axis=0)
-    half = np.maximum(BAND * np.abs(inside - centre).max(axis=0), least)
-    return np.asarray(np.nan_to_num(np.abs(values - centre) / half, nan=0.0).max(axis=1))
+    half = np.maximum(BAND * abs(inside - centre).max(axis=0), least)
+    return np.asarray(np.nan_to_num(abs(values - centre) / half, nan=0.0).max(axis=1))
 
 
 class Interval(Protocol):
@@ -269,7 +269,7 @@ def judge_contacts(
     if measured is not None:
         kind, least = "wrench", WRENCH_LIMITS
         signals = {wrench.name: wrench.known for wrench in measured.wrenches}
-    known = known or KnownContacts(untouched=np.zeros(len(t), dtype=bool))
+    known = known or KnownContacts(untouched=np.zeros(len(t), bool))
     settled = t >= t[0] + SETTLING
     quiet = known.untouched & settled
     if measured is not None and measured.drifts:

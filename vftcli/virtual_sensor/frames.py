@@ -96,10 +96,10 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:
     """A pose whose rotation is one."""
-    R, p = np.asarray(rotation, dtype=float), np.asarray(translation, dtype=float)
+    R, p = np.asarray(rotation, float), np.asarray(translation, float)
     if R.shape != (3, 3) or p.shape != (3,) or not (np.isfinite(R).all() and np.isfinite(p).all()):
         raise ParameterError(f"{what}: a pose has a finite 3×3 rotation and three finite lengths")
-    error = float(np.abs(R.T @ R - np.eye(3)).max())
+    error = float(abs(R.T @ R - np.eye(3)).max())
     if error > ROTATION_TOLERANCE or np.linalg.det(R) < 0:
         why = f"RᵀR differs from the identity by {error:.3g}"
         if error <= ROTATION_TOLERANCE:

@@ -149,7 +149,7 @@ def torque_noise(
         variance=moving**2,
         time=np.full(len(dry), USUAL_TIME),
         dry=dry,
-        seen=np.ones(len(dry), dtype=bool),
+        seen=np.ones(len(dry), bool),
         at_rest=rest**2 - moving**2,
         pushed=RESETTLED * rest**2,
         near=NEAR_REST,
@@ -191,7 +191,7 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
         # The fit calls the quietest samples free; what its friction says is a floor, if it is any.
         asked &= DRY_SHARE * dry < LEAST_ERROR
     for j in np.flatnonzero(asked):
-        quiet = np.quantile(np.abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD
+        quiet = np.quantile(abs(log.d[moving[:, j], j]), QUIET) / QUIET_SD
         least[j] = max(least[j], quiet)
     variance, time, seconds = least**2, np.full(len(dry), LEAST_TIME), 0.0
     if learned is not None:
@@ -204,7 +204,7 @@ def infer_noise(log: Blocks, dry: Array, learned: TorqueNoise | None) -> TorqueN
         variance=variance,
         time=time,
         dry=dry,
-        seen=np.ones(len(dry), dtype=bool),
+        seen=np.ones(len(dry), bool),
         at_rest=(CREEP_SHARE * dry) ** 2,
         pushed=(PUSHED_SHARE * dry) ** 2,
         free_seconds=seconds,

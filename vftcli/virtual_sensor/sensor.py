@@ -110,7 +110,7 @@ class AxesFit(NamedTuple):
     @property
     def words(self) -> str:
         """Where each of their axes lies in ours, as "+x +z −y"."""
-        places = np.abs(self.matrix).argmax(axis=1)
+        places = abs(self.matrix).argmax(axis=1)
         signs = np.where(self.matrix.sum(axis=1) > 0, "+", "−")
         return " ".join(f"{sign}{'xyz'[k]}" for sign, k in zip(signs, places, strict=True))
 
@@ -125,7 +125,7 @@ def fit_axes(ours: Array, theirs: Array) -> AxesFit:
     x, y = ours[known] - ours[known].mean(axis=0), theirs[known] - theirs[known].mean(axis=0)
     U, _, Vt = np.linalg.svd(y.T @ x)
     Q, rows = U @ Vt, np.arange(3)
-    order = max(permutations(range(3)), key=lambda order: float(np.abs(Q[rows, order]).sum()))
+    order = max(permutations(range(3)), key=lambda order: float(abs(Q[rows, order]).sum()))
     matrix = np.zeros((3, 3))
     matrix[rows, order] = np.sign(Q[rows, order])
     z = x @ matrix.T

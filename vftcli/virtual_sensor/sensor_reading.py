@@ -220,7 +220,7 @@ def unloaded_start(wrench: Wrench) -> Span | None:
     # Medians, since a knock in the first half second must move neither level nor spread.
     level = np.median(wrench.values[first], axis=0)
     spread = robust_sd(wrench.values[first] - level)
-    away = np.any(np.abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
+    away = np.any(abs(wrench.values - level) > np.maximum(STEPS, SPREADS * spread), axis=1)
     last = len(t) - 1
     runs = [(a, b) for a, b in runs_of(away & known) if t[min(b, last)] - t[a] >= 0.1]
     loaded = covered(runs, len(t)) & (t >= SETTLING)
@@ -239,7 +239,7 @@ def zero_warning(wrench: Wrench, drift: Drift) -> tuple[Remark, ...]:
     tried = [("zero-swings", swing, 4.0 * STEPS, {})]
     if start is not None:
         level = zero_drift(wrench, start)
-        away = np.abs(drift.mean - level.mean) - SPREADS * level.sd
+        away = abs(drift.mean - level.mean) - SPREADS * level.sd
         tried.insert(0, ("zero-far-from-start", away, STEPS, {"start_s": list(start)}))
     for code, value, limit, values in tried:
         k = int(np.argmax(value / limit))

@@ -183,8 +183,8 @@ def block_model(
 def gated(blocks: Blocks, intervals: Sequence[tuple[float, float]] | None) -> Mask:
     """Blocks in listed intervals [s] and one beside each; all without a list. (K,)"""
     if intervals is None:
-        return np.ones(len(blocks.t), dtype=bool)
-    inside = np.zeros(len(blocks.t), dtype=bool)
+        return np.ones(len(blocks.t), bool)
+    inside = np.zeros(len(blocks.t), bool)
     half = 0.5 * blocks.length
     for start, stop in intervals:
         inside |= (blocks.t + half > start) & (blocks.t - half < stop)
@@ -334,7 +334,7 @@ def prior_of(
 ) -> WrenchPrior:
     """The prior under which a log is most likely; the arguments as of `smooth_wrench`."""
     model = block_model(run, free, gate, block_length(run.t, fine=False))
-    return GRID[int(log_likelihood(model.under(GRID)).argmax())]
+    return GRID[log_likelihood(model.under(GRID)).argmax()]
 
 
 def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
@@ -363,7 +363,7 @@ def unlisted(model: BlockModel, prior: WrenchPrior) -> Array:
     added = variance * (1.0 - kept)
     beta = R * (1.0 - kept) - added
     ahead = 0.5 * (np.sqrt(beta**2 + 4.0 * added * R) - beta)
-    v, time = noise.stationary(blocks, np.ones(count, dtype=bool))
+    v, time = noise.stationary(blocks, np.ones(count, bool))
     kept = np.exp(-2.0 * length / time)
     quiet = ahead * R / (ahead + R)
     backward = v[::-1], kept[::-1], half

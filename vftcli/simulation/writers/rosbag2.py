@@ -48,7 +48,7 @@ def write_rosbag2(path: Path, simulation: Simulation) -> None:
 
     rows, signals = np.array(simulation.measured.rows), simulation.measured.signals
     clock = simulation.measured.stamp[rows] + simulation.scenario.sensing.start
-    stamps = np.array([round(float(t) * 1e9) for t in clock], dtype=np.int64)
+    stamps = np.array([round(float(t) * 1e9) for t in clock], np.int64)
     make = robot_states if simulation.robot.ros_state == ROBOT_STATE else joint_states
     topics = [make(simulation, rows, stamps)]
     if "wrench" in signals:
