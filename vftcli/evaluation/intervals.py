@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, Indices
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
@@ -67,7 +66,7 @@ def resample(squares: Array, length: int) -> Resampled:
     return Resampled(picked, blocks)
 
 
-def block_lengths(squares: Array) -> NDArray[np.intp]:
+def block_lengths(squares: Array) -> Indices:
     """Block length per column: `MEMORY` correlation times. (m,) [samples]"""
     samples = len(squares)
     longest = max(1, samples // LEAST_BLOCKS)

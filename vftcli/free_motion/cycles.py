@@ -3,12 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.free_motion.difference import difference
 from vftcli.free_motion.paired_runs import PairedRuns, Pairing, in_gap
 from vftcli.robots.run import Run, band
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.filters import low_pass
 from vftcli.signals.lag import overlap_energy, sliding
@@ -215,7 +214,7 @@ class Cycles(NamedTuple):
         """Whole cycles; the last may lack a few samples."""
         return max(int((self.end - self.begin) / self.period + 1.0 - COMPLETE), 0)
 
-    def number(self, t: Array) -> NDArray[np.int64]:
+    def number(self, t: Array) -> Indices:
         """Cycle of each instant, from 0; −1 before the first and after the last. (T,)"""
         cycle = np.floor((t - self.begin) / self.period).astype(np.int64)
         return np.where((t < self.begin) | (t > self.end), -1, cycle)

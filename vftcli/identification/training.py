@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.identification.shapes import Shape, term_values
 from vftcli.robots.chain import Chain
@@ -22,7 +21,7 @@ from vftcli.robots.kernels import (
 from vftcli.robots.robot import Robot
 from vftcli.robots.running_friction import RunningFriction, measured_temperature, play
 from vftcli.robots.terms import drive_torque, uses_current
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import STEEP, derivative, zero_phase
 from vftcli.signals.recording import Recording
@@ -67,7 +66,7 @@ class PreparedLog:
     recording: Recording  #: The log.
     robot: Robot  #: The arm with its model.
     cutoff: float  #: Cutoff of its filter, one for all parts of a joint's torque. [Hz]
-    kept: NDArray[np.int64]  #: Numbers of these samples in the log. (M,)
+    kept: Indices  #: Numbers of these samples in the log. (M,)
     t: Array  #: Time. (M,) [s]
     q: Array  #: Positions. (M, n) [rad]
     dq: Array  #: Velocities. (M, n) [rad/s]

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.robots.chain import Chain
 from vftcli.robots.friction import dry_friction, steady_torque
@@ -27,7 +26,7 @@ from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
 from vftcli.robots.running_friction import play
 from vftcli.robots.terms import GAP
-from vftcli.signals.arrays import Array, seal
+from vftcli.signals.arrays import Array, Indices, seal
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.series import median_step
 
@@ -152,7 +151,7 @@ def error_of(values: Array, joints: int) -> ModelError:
     )
 
 
-def column_numbers(joint: int, joints: int) -> NDArray[np.intp]:
+def column_numbers(joint: int, joints: int) -> Indices:
     """Which of all columns the row of one joint has: links from it on, then its own."""
     own = LINK * joints + (SHAPES + 3) * joint
     return np.concatenate(

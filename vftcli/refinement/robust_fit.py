@@ -21,11 +21,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vftcli.refinement.model_error import column_numbers
 from vftcli.robots.chain import Chain, flange_jacobian, link_poses
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Indices, Mask
 from vftcli.signals.least_squares import FOLDS, SD_PER_MEDIAN, NormalEquations, huber, robust_sd
 from vftcli.signals.rest import faster
 from vftcli.signals.series import covered, runs_of
@@ -44,7 +43,7 @@ class SlowLoads(NamedTuple):
     #: External torque, sign reversed, of one standard deviation of every component: the flange's
     #: wrench, then forces along the arm. (S, n, m) [N·m]
     torque: Array
-    knot: NDArray[np.intp]  #: The knot before each sample. (S,)
+    knot: Indices  #: The knot before each sample. (S,)
     share: Array  #: A sample's way to the next one, 0 … 1. (S,)
     knots: int  #: Number of knots.
 
@@ -55,7 +54,7 @@ class SlowLoads(NamedTuple):
         return tuple(sorted({0, min(WRENCH * self.knots, every), every}))
 
     @property
-    def numbers(self) -> NDArray[np.intp]:
+    def numbers(self) -> Indices:
         """Columns of each knot's components, the wrench first. (knots, m)"""
         numbers = np.arange(self.torque.shape[2] * self.knots)
         flange, along = np.split(numbers, [WRENCH * self.knots])

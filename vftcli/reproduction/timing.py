@@ -231,10 +231,10 @@ def first_order_loops(p: Array, mu: Array, step: float, rate: float = 10.0) -> t
     return y1 + y2 + rate * p[-1], r
 
 
-def taylor_exponential(A: Array, order: int = 5) -> Array:
-    """exp(A) by its Taylor series, as the paper approximates it."""
+def taylor_exponential(A: Array) -> Array:
+    """exp(A) by its Taylor series to the fifth order, as the paper approximates it."""
     term = total = np.eye(len(A))
-    for k in range(1, order + 1):
+    for k in range(1, 6):
         term = term @ A / k
         total = total + term
     return total

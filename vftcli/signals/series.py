@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vftcli.signals.arrays import Array, Mask, empty_series, is_uniform, median
+from vftcli.signals.arrays import Array, Indices, Mask, empty_series, is_uniform, median
 from vftcli.signals.errors import ClockError
 
 
@@ -36,7 +35,7 @@ def median_step(t: Array) -> float:
     return median(np.diff(t))
 
 
-def gaps_of(t: Array, steps: float) -> NDArray[np.intp]:
+def gaps_of(t: Array, steps: float) -> Indices:
     """Samples after which a clock waits longer than `steps` steps. (G,)"""
     if len(t) < 2:
         return np.zeros(0, int)
