@@ -145,7 +145,9 @@ def test_results_made_anyway_say_so(analysis: Analysis) -> None:
     bad = warning("effort-sign", signal="current", misfit_percent=190.0, healed_percent=3.0,
                   column="current", width=6)  # fmt: skip
     made = replace(analysis, examinations=(replace(own, findings=(bad,)),))
-    assert "MEANINGLESS unless this is wrong (--anyway): effort-sign" in log_screen(made, CANVAS)
+    assert "MEANINGLESS if this finding is right (you chose --anyway): effort-sign" in log_screen(
+        made, CANVAS
+    )
     assert "MEANINGLESS" in short_screen(made, CANVAS)
 
 

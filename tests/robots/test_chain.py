@@ -88,6 +88,19 @@ def test_a_payload_that_no_body_can_be_is_refused() -> None:
         Payload(mass=-2.0, com=np.zeros(3), inertia=np.zeros((3, 3)))
 
 
+def test_a_payload_is_merged_into_the_last_link_as_pinocchio_does() -> None:
+    chain = load_robot("ur5").chain
+    load = Payload(mass=2.5, com=np.array([0.02, -0.03, 0.11]), inertia=np.diag([0.02, 0.03, 0.01]))
+    model = chain.to_pinocchio()
+    flange = pin.SE3(chain.flange_rotation, chain.flange_translation)
+    model.inertias[6] += flange.act(pin.Inertia(load.mass, load.com, load.inertia))
+    loaded, whole = chain.with_payload(load), model.inertias[6]
+    assert loaded.mass[-1] == pytest.approx(whole.mass, rel=1e-12)  # rounding
+    np.testing.assert_allclose(loaded.com[-1], whole.lever, atol=1e-12)
+    np.testing.assert_allclose(loaded.inertia[-1], whole.inertia, atol=1e-12)
+    np.testing.assert_array_equal(loaded.inertia[:-1], chain.inertia[:-1])
+
+
 TABLE = [
     {"a": 0.1, "d": 0.3, "alpha": 0.7, "theta": 0.2},
     {"a": -0.4, "d": 0.05, "alpha": -1.2, "theta": -0.5},

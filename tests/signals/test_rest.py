@@ -11,6 +11,7 @@ from vftcli.signals.rest import (
     REST,
     duration,
     faster,
+    held,
     resting,
     slower,
     standing,
@@ -87,3 +88,14 @@ def test_rest_is_what_lasts_longer_than_half_of_the_time_around() -> None:
     assert np.count_nonzero(found[:, 0] != expected) <= 2
     assert found[100, 0]
     assert not found[70, 0]
+
+
+def test_a_pose_is_held_where_no_joint_travels_over_the_window() -> None:
+    """Both rest for 2 s, then one moves at 0.02 rad/s: 4 mrad in 0.2 s, four times the limit."""
+    q = np.column_stack([0.02 * np.maximum(T - 2.0, 0.0), np.full(400, 0.7)])
+    found = held(q, STEP)
+    # The window reaches 0.1 s to either side, and one that holds 1 mrad of the way still counts.
+    assert found[10:196].all()
+    assert not found[:10].any()
+    assert not found[200:].any()
+    assert not held(q[:20], STEP).any()

@@ -95,7 +95,7 @@ def annotate_dataset(
     if json:
         echo_data(to_json(record))
         return
-    for line in told_lines(record, asked):
+    for line in copy_lines(record, asked):
         say(line)
     say(f"wrote {output}")
 
@@ -107,8 +107,10 @@ def meaning(column: "Mapping[str, str]") -> str:
     return f"{column['units']}, {column['frame']}"
 
 
-def told_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
-    """What was written, and what a user of it should know."""
+def copy_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
+    """Lines on what was written, and on what a user of it should know."""
+    from vftcli.doctor.examination import doubt
+
     done, frames = record["status"], sum(one.get("frames", 0) for one in record["episodes"])
     count = ", ".join(f"{n} {status}" for status, n in done.items())
     kind = "causal" if record["causal"] else "NOT causal: it looks ahead, no policy can run on it"
@@ -124,5 +126,5 @@ def told_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
     lines += [f"  clock: {clock}" for clock in clocks]
     overridden = sorted({code for one in record["episodes"] for code in one.get("overridden", ())})
     if overridden:
-        lines.append(f"MEANINGLESS unless this is wrong (--anyway): {', '.join(overridden)}")
+        lines.append(doubt(", ".join(overridden)))
     return lines

@@ -221,7 +221,7 @@ def health_of(
     library: "Library", *, anyway: bool, fitting: bool = True, on_screen: bool = False
 ) -> "Examiner":
     """The examiner of a command's logs: it prints one line on the health of each."""
-    from vftcli.doctor.examination import Examiner
+    from vftcli.doctor.examination import Examiner, doubt
     from vftcli.outputs.examination import health_line
 
     def tell(examination: "Examination") -> None:
@@ -230,7 +230,7 @@ def health_of(
             if remark.code in PARTS:
                 say(f"note: {recording.name}: {remark}")
         if codes := dict.fromkeys(f.code for f in examination.refusals(fitting=fitting)):
-            say(f"MEANINGLESS unless this is wrong, and made with --anyway: {', '.join(codes)}")
+            say(doubt(", ".join(codes)))
         line = health_line(examination, named=len(library) > 1 or bool(recording.source.part))
         (detail if on_screen and not codes else say)(line)
         for assumption in examination.assumptions:

@@ -281,6 +281,11 @@ class FindingWords(NamedTuple):
         return f"{self.name}: {'. '.join(part for part in parts if part)}."
 
 
+def doubt(findings: str) -> str:
+    """The line above results that findings make meaningless."""
+    return f"MEANINGLESS if this finding is right (you chose --anyway): {findings}"
+
+
 def in_words(finding: Remark) -> FindingWords:
     """A finding's words, its numbers filled in."""
     entry = words(finding.code)

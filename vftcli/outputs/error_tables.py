@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import polars as pl
 
+from vftcli.doctor.examination import doubt
 from vftcli.evaluation.errors import POOLED, JointMeans, joint_means
 from vftcli.outputs.examination import refused_codes
 from vftcli.outputs.grid import (
@@ -313,11 +314,7 @@ def doubts_of(errors: pl.DataFrame) -> list[str]:
     if OVERRIDDEN not in errors.columns:
         return []
     rows = errors.select("recording", OVERRIDDEN).unique(maintain_order=True).drop_nulls()
-    return [
-        f"MEANINGLESS unless these findings are wrong (--anyway): {name}: {codes}"
-        for name, codes in rows.iter_rows()
-        if name != POOLED
-    ]
+    return [doubt(f"{name}: {codes}") for name, codes in rows.iter_rows() if name != POOLED]
 
 
 def to_terminal(

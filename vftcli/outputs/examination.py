@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.doctor import Examination, finding_record, in_words
+from vftcli.doctor.examination import doubt
 from vftcli.outputs.quantity import counted
 from vftcli.signals.parsing import printable
 from vftcli.signals.recording import Recording
@@ -150,7 +151,7 @@ def overridden_lines(examinations: Sequence[Examination], *, fitting: bool = Tru
     One line a finding; none where there is no such finding.
     """
     return [
-        f"MEANINGLESS unless this finding is wrong (--anyway): {one.recording.name}: {words}"
+        doubt(f"{one.recording.name}: {words}")
         for one in examinations
         for words in map(in_words, one.refusals(fitting=fitting))
     ]

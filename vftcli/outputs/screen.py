@@ -14,6 +14,7 @@ import numpy as np
 
 from vftcli.analysis import Analysis
 from vftcli.contacts.contact_list import Contact, ContactList
+from vftcli.doctor.examination import doubt
 from vftcli.outputs.believability import (
     MARKS,
     Ground,
@@ -159,7 +160,7 @@ def facts(analysis: Analysis) -> str:
 def doubt_lines(analysis: Analysis) -> list[str]:
     """Warning on meaningless results that are made anyway."""
     codes = ", ".join(refused_codes(analysis.examinations))
-    return [f"MEANINGLESS unless this is wrong (--anyway): {codes}"] if codes else []
+    return [doubt(codes)] if codes else []
 
 
 def written_lines(
