@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from vftcli.observers.tuning import Goal, Tuned
 
 Opened = Path | Recording  #: A log as a call has it: a file, or read already.
+OpenedLogs = Sequence[Opened]  #: Several such logs.
 
 
 def errors_of(
@@ -55,7 +56,7 @@ def errors_of(
 
 
 def free_thresholds(
-    logs: Sequence[Opened], choice: AnalysisChoice, rate: float, *, anyway: bool
+    logs: OpenedLogs, choice: AnalysisChoice, rate: float, *, anyway: bool
 ) -> "tuple[list[Run], list[ComparedSignals], Thresholds]":
     """Contact-free logs, their signals, and what motion like theirs exceeds at a rate. [1/h]"""
     from vftcli.contacts.threshold_check import compared_signals
@@ -106,8 +107,8 @@ def touched(run: Run, *, anyway: bool = False) -> tuple[Remark, ...]:
 
 
 def identified(
-    logs: Sequence[Opened],
-    check: Sequence[Opened],
+    logs: OpenedLogs,
+    check: OpenedLogs,
     choice: AnalysisChoice,
     task: Task,
     tell: Callable[[Recording], None] | None = None,

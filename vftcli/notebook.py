@@ -20,6 +20,7 @@ from vftcli.analysis import Analysis
 from vftcli.answering import (
     TUNED,
     Opened,
+    OpenedLogs,
     errors_of,
     free_thresholds,
     gains_of,
@@ -166,7 +167,7 @@ def checked(log: object, robot: object) -> tuple[Any, str | Robot | None]:
     return Path(log) if isinstance(log, str) else log, arm
 
 
-def several(logs: Opened | Sequence[Opened]) -> list[Opened]:
+def several(logs: Opened | OpenedLogs) -> list[Opened]:
     """One log or several as a list."""
     found = [logs] if isinstance(logs, Opened) else list(logs)
     if not found:
@@ -224,9 +225,7 @@ def analysed(log: Opened, choice: AnalysisChoice, asked: Asked) -> Analysis:
 
 
 @call(*OF_REPORT, also=("reference",))
-def compare(
-    logs: Opened | Sequence[Opened], asked: Asked, *, wrench: bool = False
-) -> "pl.DataFrame":
+def compare(logs: Opened | OpenedLogs, asked: Asked, *, wrench: bool = False) -> "pl.DataFrame":
     """Each observer's error against a reference, the columns those of ``errors.csv``."""
     if asked.words.get("reference") is None:
         raise ParameterError("compare needs reference=: two-cycle, sensor, vendor, zero, …")
@@ -235,16 +234,14 @@ def compare(
 
 
 @call(*OF_LOG)
-def thresholds(free: Opened | Sequence[Opened], asked: Asked, rate: float = 1.0) -> "Thresholds":
+def thresholds(free: Opened | OpenedLogs, asked: Asked, rate: float = 1.0) -> "Thresholds":
     """Thresholds that motion like that of contact-free logs exceeds at a rate. [1/h]"""
     logs = several(free)
     return free_thresholds(logs, asked.analysis(logs), rate, anyway=asked.anyway)[2]
 
 
 @call(*OF_CONTACTS, Task, GoalChoice, RefinementChoice, also=("method",))
-def identify(
-    logs: Opened | Sequence[Opened], asked: Asked, *, check: Sequence[Opened] = ()
-) -> Robot:
+def identify(logs: Opened | OpenedLogs, asked: Asked, *, check: OpenedLogs = ()) -> Robot:
     """The robot that logs of free motion show; `Robot.save` writes its file."""
     paths, task, goal = several(logs), asked.of(Task), asked.of(GoalChoice)
     if task.method == "gains":

@@ -111,7 +111,7 @@ def test_what_there_is_not_names_the_nearest_if_it_is_near(
 
 def test_what_is_typed_is_left_of_what_it_means() -> None:
     rows = [("--a", "short"), ("--a-very-long-option-of-more-than NAME", "what it means")]
-    assert list(two_columns(rows, 72)) == [
+    assert list(two_columns(rows)) == [
         "  --a" + " " * 32 + "short",
         "  --a-very-long-option-of-more-than NAME",
         " " * 37 + "what it means",

@@ -62,14 +62,6 @@ def work_on_log(task: LogTask) -> None:
     folder = BatchFolder(task.folder)
     if folder.row_file(task.key).exists():
         return
-    analysis = analysed(task)
-    begin("writing")
-    write_result(folder.path / folder.place(task.key), analysis, task)
-    folder.put_rows(task.key, rows_of(analysis, task.key))
-
-
-def analysed(task: LogTask) -> Analysis:
-    """The log as its job asks, as the command of that name alone would analyse it."""
     begin("reading")
     choice, library = task.job.choice, Library([task.path])
     read = replace(choice.read, episode=task.episode, all_episodes=False)
@@ -84,7 +76,10 @@ def analysed(task: LogTask) -> Analysis:
     recording = replace(recording, source=source)
     begin("analysing")
     work: Analyser = list_touches if task.job.do == "contacts" else analyse
-    return work(*prepared(recording, choice), choice, Runs())
+    analysis = work(*prepared(recording, choice), choice, Runs())
+    begin("writing")
+    write_result(folder.path / folder.place(task.key), analysis, task)
+    folder.put_rows(task.key, rows_of(analysis, task.key))
 
 
 def write_result(folder: Path, analysis: Analysis, task: LogTask) -> None:

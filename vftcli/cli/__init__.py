@@ -121,7 +121,7 @@ def launch() -> None:
         code = end.code
     except Stopped as stopped:
         echo("error: interrupted; run the command again", err=True)
-        code = 128 + stopped.number
+        code = 128 + stopped.args[0]
     with suppress(Stopped):
         atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
@@ -149,15 +149,7 @@ def check_room() -> None:
 
 
 class Stopped(BaseException):
-    """The user or the system ends the command; what is half written goes.
-
-    Attributes:
-        number: The signal's.
-    """
-
-    def __init__(self, number: int) -> None:
-        super().__init__(number)
-        self.number = number
+    """The user or the system ends the command by a signal; what is half written goes."""
 
 
 def stop(number: int, _frame: FrameType | None) -> None:

@@ -127,8 +127,11 @@ def settle(ctx: Any) -> None:  # noqa: ANN401
         key, kept = key_of(param), ctx.default_map[param.name]
         if (value := fitting(key, kept, logs)) != kept:
             ctx.params[param.name] = value
-        each = value if isinstance(value, list) else [value]
-        words += [word for one in each if one is not None for word in as_typed(key, one)]
+        for one in value if isinstance(value, list) else [value]:
+            if one is True:
+                words.append(f"--{key}")
+            elif one is not None:  # what begins as an option does stands behind =
+                words += [f"--{key}={one}"] if one.startswith("-") else [f"--{key}", one]
     TAKEN.set(Taken(path, tuple(words), settings))
     said = shlex.join(words) or "nothing that this command takes and is not typed"
     echo(printable(f"note: {path} gives {said} (--config none: without it)"), err=True)
@@ -147,13 +150,6 @@ def fitting(key: str, value: Any, logs: Sequence[Path]) -> Any:  # noqa: ANN401
         own = logs[0].resolve()
         return [word for word in value if Path(word).resolve() != own] or None
     return value
-
-
-def as_typed(key: str, value: str | bool) -> tuple[str, ...]:
-    """The words of an option; a value that begins as an option does stands behind ``=``."""
-    if isinstance(value, bool):
-        return (f"--{key}",)
-    return (f"--{key}={value}",) if value.startswith("-") else (f"--{key}", value)
 
 
 def keys_for(command: Any, path: Path) -> Table:  # noqa: ANN401

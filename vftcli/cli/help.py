@@ -70,7 +70,7 @@ class GroupedCommand(TyperCommand):
         others = [group for group in found if group not in GROUPS]
         for group in (LOG, *others, *GROUPS[1:]):
             if group in found:
-                lines += [f"{group}:", *two_columns(found[group], width)]
+                lines += [f"{group}:", *two_columns(found[group])]
         formatter.write("\n".join(lines) + "\n")
 
 
@@ -90,7 +90,7 @@ class JourneyGroup(TyperGroup):
                     lines += textwrap.wrap(text, width, subsequent_indent=" " * (left + 4))
         shown = (p for p in self.get_params(ctx) if p.name != "show_completion")
         rows = [row for p in shown if (row := row_of(p, ctx)) is not None]
-        formatter.write("\n".join([*lines, "", *two_columns(rows, width)]) + "\n")
+        formatter.write("\n".join([*lines, "", *two_columns(rows)]) + "\n")
 
     def parse_args(self, ctx: Any, args: list[str]) -> Any:  # noqa: ANN401
         """Parse the words: without a command of the default one, former words by today's."""
@@ -127,11 +127,11 @@ def row_of(param: Any, ctx: typer.Context) -> tuple[str, str] | None:  # noqa: A
     return record
 
 
-def two_columns(rows: Sequence[tuple[str, str]], width: int) -> Iterator[str]:
+def two_columns(rows: Sequence[tuple[str, str]]) -> Iterator[str]:
     """What is typed to the left, what it means to the right, wrapped."""
     left = min(max(len(typed) for typed, _ in rows), LEFT)
     for typed, meaning in rows:
-        lines = textwrap.wrap(meaning, width - left - 4) or [""]
+        lines = textwrap.wrap(meaning, columns() - left - 4) or [""]
         if len(typed) > left:
             yield f"  {typed}"
         else:
@@ -173,16 +173,13 @@ def show_help(
     if name is not None and topic not in {"robots", "formats"}:
         raise ParameterError(f"help {topic} {name}: a name follows robots or formats only")
     root: Any = ctx.find_root()
-    if topic is None:
-        echo("\n".join(contents()))
+    topic, lists = topic or "", {"": contents, "observers": observers, "settings": settings}
+    if topic in lists:
+        echo("\n".join(lists[topic]()))
     elif topic == "robots":
         echo(robots(name, tip))
     elif topic == "formats":
         echo("\n".join(formats(name)))
-    elif topic == "observers":
-        echo("\n".join(observers()))
-    elif topic == "settings":
-        echo("\n".join(settings()))
     elif topic in topics():
         echo(topics()[topic]["text"].rstrip())
     elif topic in COMMANDS:
@@ -198,9 +195,9 @@ def contents() -> Iterator[str]:
     """What can be asked for: topics, lists and commands."""
     explained = {name: entry["summary"] for name, entry in topics().items()}
     yield "vftcli help TOPIC, of"
-    yield from two_columns([*explained.items(), *LISTS.items()], columns())
+    yield from two_columns([*explained.items(), *LISTS.items()])
     yield "or of a command:"
-    yield from two_columns([(name, each.summary) for name, each in COMMANDS.items()], columns())
+    yield from two_columns([(name, each.summary) for name, each in COMMANDS.items()])
 
 
 def robots(name: str | None, tip: str | None) -> str:
@@ -224,7 +221,7 @@ def observers() -> Iterator[str]:
         numbers = ", ".join(f"{entry.section}.{each}" for each in PARAMETERS[entry.section])
         rows += [(name, f"{entry.title} {entry.equations}"), ("", entry.summary)]
         rows.append(("", f"--set {numbers}"))
-    yield from two_columns(rows, columns())
+    yield from two_columns(rows)
 
 
 def formats(name: str | None) -> Iterator[str]:
@@ -232,13 +229,13 @@ def formats(name: str | None) -> Iterator[str]:
     from vftcli.readers import FORMATS
 
     if name is None:
-        yield from two_columns([(form.name, form.title) for form in FORMATS.values()], columns())
+        yield from two_columns([(form.name, form.title) for form in FORMATS.values()])
         yield "\nvftcli help formats NAME: how to record one. It reads .gz and .zst too."
     elif name in FORMATS:
         form = FORMATS[name]
         yield f"{form.name}: {form.title}"
         rows = {"record:": form.recording, "read:": form.takes, "pitfalls:": form.pitfalls}
-        yield from two_columns([*rows.items()], columns())
+        yield from two_columns([*rows.items()])
     else:
         near = did_you_mean(name, FORMATS)
         raise UnknownFormatError(f"no format {name!r}; there is {', '.join(FORMATS)}.{near}")
@@ -251,7 +248,7 @@ def settings() -> Iterator[str]:
     every = {kind: None for c in commands.values() for kind in vars(c.callback)["choices"]}
     rows = sorted(row for kind in every for row in settings_of(kind))
     yield "SETTINGS: --set NAME=VALUE, or in vftcli.toml a table [GROUP], NAME = VALUE."
-    yield from two_columns(rows, columns())
+    yield from two_columns(rows)
     yield "simulate has a scenario's keys: --set servo.stiffness=soft, --set duration=8."
 
 

@@ -96,7 +96,9 @@ class Stages:
         with self._lock:
             if self._stage:
                 done = round(BAR * self._share)
-                bar = f"[{'#' * done}{rest() * (BAR - done)}] {100.0 * self._share:2.0f} %"
+                letters = getattr(sys.stderr, "encoding", None) or ""
+                rest = "·" if letters.lower().startswith("utf") else "."
+                bar = f"[{'#' * done}{rest * (BAR - done)}] {100.0 * self._share:2.0f} %"
                 since, first = self._from
                 gained, left = self._share - first, ""
                 if gained > ENOUGH:
@@ -106,12 +108,6 @@ class Stages:
                 line = f"{bar}  {self._stage[: max(room, 0)]}{left}"
                 typer.echo(f"\r{line:<{self._shown}}", err=True, nl=False)
                 self._shown = len(line)
-
-
-def rest() -> str:
-    """What the bar is made of where work is left, a letter that stderr has."""
-    letters = getattr(sys.stderr, "encoding", None) or ""
-    return "·" if letters.lower().startswith("utf") else "."
 
 
 def clock(seconds: float) -> str:

@@ -14,6 +14,7 @@ from vftcli.readers.table import (
     Names,
     Pick,
     Picks,
+    Signals,
     Table,
     cells_of,
     listed,
@@ -22,7 +23,6 @@ from vftcli.readers.table import (
     pick_of,
     require_positions,
 )
-from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import tables_beside
 from vftcli.signals.recording import EFFORTS
@@ -50,8 +50,7 @@ WRENCHES = (
 )
 
 INDEXED = re.compile(
-    r"(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
-    re.IGNORECASE,
+    r"(?i)(?P<stem>.*?)[_./ ]?(?:(?:joint|j)_?(?P<a>\d{1,9})|\[(?P<b>\d{1,9})\]|(?P<c>\d{1,9}))",
 )  # a number of any length would be tried from each of its digits on
 #: What ROS tools put before the fields of a JointState.
 FIELD = re.compile(r"field\.|/?joint_states?[./]")
@@ -63,13 +62,13 @@ JOINT_FIRST = re.compile(
 SIGNAL_WORDS = "pos|position|vel|velocity|eff|effort|tau|torque|current"
 #: A signal's name before or behind a joint's, as in pos_elbow and elbow_joint_vel.
 SIGNAL_OF_JOINT = (
-    re.compile(rf"(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)", re.IGNORECASE),
-    re.compile(rf"(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})", re.IGNORECASE),
+    re.compile(rf"(?i)(?P<stem>{SIGNAL_WORDS})[_./ ](?P<joint>[A-Za-z][\w ]*)"),
+    re.compile(rf"(?i)(?P<joint>[A-Za-z][\w ]*?)[_./ ](?P<stem>{SIGNAL_WORDS})"),
 )
 
-NUMBERED_JOINT = re.compile(r"(joint|j)?_?\d+", re.IGNORECASE)
+NUMBERED_JOINT = re.compile(r"(?i)(joint|j)?_?\d+")
 #: What a pose has in place of joints.
-AXES = re.compile(r"r?[xyz]|q[wxyz]|roll|pitch|yaw", re.IGNORECASE)
+AXES = re.compile(r"(?i)r?[xyz]|q[wxyz]|roll|pitch|yaw")
 
 FEWEST_JOINTS = 3
 
@@ -315,7 +314,7 @@ UR_NAMES = (
 UR_WORDS = ("base", "shoulder", "elbow", "wrist 1", "wrist 2", "wrist 3")
 
 FRANKA = re.compile(r"(?:.*_)?(panda|fr3|fer|fp3)_joint([1-7])")
-NUMBERED = re.compile(r".*?joint[_ ]?(\d{1,9})", re.IGNORECASE)
+NUMBERED = re.compile(r"(?i).*?joint[_ ]?(\d{1,9})")
 
 HINTS = {"panda": "panda", "fer": "panda", "fr3": "fr3"}  #: Stem of Franka's joint names → profile.
 
@@ -342,7 +341,7 @@ def kinematic_order(names: Sequence[str]) -> tuple[int, ...]:
     return tuple(range(len(names)))
 
 
-def along_arm(names: Names, signals: dict[str, Array]) -> tuple[Names, dict[str, Array]]:
+def along_arm(names: Names, signals: Signals) -> tuple[Names, Signals]:
     """Joints base to tip without a gripper's fingers: their names, and signals with a column each.
 
     Of an arm of six joints the wrench has as many columns, but they are no joints.

@@ -23,10 +23,10 @@ from vftcli.readers.objects import columns_of, columns_of_lines, lines_of, load_
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage, unpacked_limit
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Column, Columns, listed
+from vftcli.readers.table import Column, Columns, Notes, listed
 from vftcli.readers.tables import UR, ArrayTable, from_table, read_layout
 from vftcli.signals.errors import LogError, NoLogError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 
 SKILL = "skill_state_dict"  #: What frankapy calls the states of a skill.
 #: What NumPy raises for a header or content that is no array.
@@ -36,7 +36,7 @@ NOT_AN_ARRAY = (
 )  # fmt: skip
 #: What is raised for a bundle of arrays that is damaged.
 NOT_A_BUNDLE = (
-    zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, OSError, ValueError,
+    zipfile.BadZipFile, RuntimeError, EOFError, OSError, ValueError,
 )  # fmt: skip
 
 
@@ -120,7 +120,7 @@ def _read_arrays(
     file: LogFile,
     request: ReadChoice,
     arrays: Mapping[str, Column],
-    remarks: tuple[Remark, ...] = (),
+    remarks: Notes = (),
 ) -> RawLog:
     """Read named arrays as panda-py's log, by --columns, or by alias."""
     # Rows of matrices are laid out flat, a column of single numbers is a row of them.
@@ -236,7 +236,7 @@ MATLAB_NUMBERS = {
 #: What SciPy raises for a file that is none.
 NOT_MATLAB = (
     ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, OSError, zlib.error,
-    MemoryError, OverflowError, RecursionError, NotImplementedError, UnicodeError, SystemError,
+    MemoryError, OverflowError, RecursionError, NotImplementedError, SystemError,
 )  # fmt: skip
 
 

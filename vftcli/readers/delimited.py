@@ -3,7 +3,7 @@
 import ast
 import csv
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cached_property
 from itertools import takewhile
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile
-from vftcli.readers.table import Block, Column, Names, Table
+from vftcli.readers.table import Block, Column, Names, Places, Table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -67,8 +67,12 @@ class TextTable(Table):
         lines[0] = lines[0].removeprefix("\ufeff")
         comments = list(takewhile(is_comment, lines))
         rows = lines[len(comments) :]
-        if comments and rows and _names_in(comments[-1], rows[0]):
-            return [comments[-1].lstrip("# "), *rows]
+        if comments and rows:
+            head = comments[-1].lstrip("# ")
+            names, cells = (re.split(r"[,;\t ]+", line.strip()) for line in (head, rows[0]))
+            numbers = all(map(is_number, cells)) and not any(map(is_number, names))
+            if numbers and len(names) == len(cells):
+                return [head, *rows]
         return rows or lines
 
     @cached_property
@@ -97,7 +101,7 @@ class TextTable(Table):
         """Whether a cell holds a number as this table writes them."""
         return is_number(cell, decimal_comma=self.decimal_comma)
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
         kinds = dict.fromkeys(columns, "Float64")
         if clock is not None:
@@ -250,13 +254,6 @@ class TextTable(Table):
                         "not a number. Cut the row out, or leave the column out with _."
                     )
         return LogError(f"{self.path}: cannot be parsed as a table of numbers; is it a log?")
-
-
-def _names_in(comment: str, row: str) -> bool:
-    names = re.split(r"[,;\t ]+", comment.lstrip("# ").strip())
-    cells = re.split(r"[,;\t ]+", row.strip())
-    words = not any(map(is_number, names))
-    return words and len(names) == len(cells) and all(map(is_number, cells))
 
 
 def decoded(line: bytes) -> str:

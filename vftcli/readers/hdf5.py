@@ -29,7 +29,7 @@ from vftcli.readers.opening import (
 )
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Block, Names, listed
+from vftcli.readers.table import Block, Names, Places, listed
 from vftcli.readers.tables import ArrayTable, from_table, read_known_columns
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
@@ -84,7 +84,7 @@ def opened(file: LogFile) -> Iterator[Any]:
     h5py = needed("h5py", f"{file.path}: an HDF5 file", error=LogError)
     errors = (
         OSError, RuntimeError, ValueError, KeyError, TypeError, MemoryError, OverflowError,
-        NotImplementedError, AttributeError, SystemError,
+        AttributeError, SystemError,
     )  # fmt: skip
     with (
         naming_damage(file.path, "a damaged HDF5 file", errors),
@@ -110,12 +110,12 @@ class Hdf5Table(ArrayTable):
         below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
         return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
         return super().blocks(columns, clock)
 
-    def check_size(self, columns: Sequence[int]) -> None:
+    def check_size(self, columns: Places) -> None:
         """Check that datasets may be read: a kilobyte may claim any size, and costs nothing."""
         each = [list(self.columns.items())[c] for c in columns]
         stored = sum(dataset.id.get_storage_size() for _, dataset in each)

@@ -17,10 +17,10 @@ from vftcli.readers.opening import LogFile, open_log
 from vftcli.readers.parquet import EPISODE, ParquetTable, episodes_of
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import LogFormat
-from vftcli.readers.table import Names, listed
+from vftcli.readers.table import Names, Notes, listed
 from vftcli.readers.tables import read_known_columns
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 
 Json = Any  #: A value of a description.
 
@@ -43,7 +43,7 @@ COUNTED = re.compile(
 )
 
 SIDE = re.compile(rf"(?:^|[._/ ])({'|'.join(ARMS)})(?:$|[._/ ])")
-NO_JOINT = re.compile(r"grip|finger", re.IGNORECASE)
+NO_JOINT = re.compile(r"(?i)grip|finger")
 #: Names of elements that are a pose's.
 CARTESIAN = {
     "x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw",
@@ -92,7 +92,7 @@ def read_episode(
     path = data_file(file.path, episode)
     table = _rows_of(open_log(path), episode)
     names: Names = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: Notes = ()
     if request.spec.item("q"):
         usual, side = "t=timestamp,q=observation.state", ""
     else:
@@ -112,14 +112,14 @@ def read_episode(
 
 def _columns_of(
     path: Path, table: ParquetTable, features: Mapping[str, Any], request: ReadChoice
-) -> tuple[str, Names, str, tuple[Remark, ...]]:
+) -> tuple[str, Names, str, Notes]:
     """The --columns text, the joints' names or none, the arm of two or "", what is to be said."""
     there = [e for name in table.names for e in _elements_of(name, table, features.get(name))]
     sides = [side for side in ARMS if any(e.side == side and e.signal == "q" for e in there)]
     # Nothing tells a sensor's wrench from an estimate.
     observed = [name for name in table.names if name.startswith("observation.")]
     left = [name for name in observed if "wrench" in f"{name} {features.get(name)}".lower()]
-    remarks: tuple[Remark, ...] = ()
+    remarks: Notes = ()
     if left and not request.spec.item("wrench"):
         remarks = (fact("wrench-left-out", features=listed(left)),)
     side = ""

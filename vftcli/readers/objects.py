@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile, reason_of
-from vftcli.readers.table import Columns
+from vftcli.readers.table import Columns, Notes
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import printable
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 
 #: Bytes of objects that a document may be _parsed into; one a line may be of any length.
 MEMORY_LIMIT = 768 * 1024 * 1024
@@ -30,7 +30,7 @@ CHUNK_LINES = 8192  #: Lines whose objects are in memory at a time.
 NOT_JSON = re.compile(rb"(?<=[\[,:\s])(-?)(nan|inf)(?=[\],}\s])")
 
 Data = Any  #: Whatever a document or a pickle holds.
-Objects = list[dict[str, Any]]
+Object = dict[str, Data]  #: An object of a document.
 
 
 def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
@@ -48,12 +48,10 @@ def lines_of(content: memoryview) -> Iterator[tuple[int, bytes]]:
         start = end + 1
 
 
-def columns_of_lines(
-    file: LogFile, lines: Iterable[tuple[int, bytes]]
-) -> tuple[Columns, tuple[Remark, ...]]:
+def columns_of_lines(file: LogFile, lines: Iterable[tuple[int, bytes]]) -> tuple[Columns, Notes]:
     """The numbers of objects, one a line; a last one that is cut is left out and said."""
     blocks: list[Columns] = []
-    objects: Objects = []
+    objects: list[Object] = []
     waiting: int | None = None
     first = number = 1
     for number, line in lines:
@@ -79,7 +77,7 @@ def columns_of_lines(
     return columns, (fact("line-cut"),) if waiting is not None else ()
 
 
-def _object_in(line: bytes) -> dict[str, Any] | None:
+def _object_in(line: bytes) -> Object | None:
     if len(line) > LONGEST_LINE:
         return None
     words = {b"nan": b"NaN", b"inf": b"Infinity"}
@@ -89,14 +87,14 @@ def _object_in(line: bytes) -> dict[str, Any] | None:
         return None
     if not isinstance(found, dict):
         return None
-    flat: dict[str, Any] = {}
+    flat: Object = {}
     for name, value in found.items():
         inner = value.items() if isinstance(value, dict) else ()
         flat |= {f"{name}.{key}": v for key, v in inner} if inner else {name: value}
     return flat
 
 
-def columns_of(file: LogFile, objects: Objects, first: int) -> Columns:
+def columns_of(file: LogFile, objects: list[Object], first: int) -> Columns:
     """The numeric fields of some objects, a row an object."""
     columns: Columns = {}
     for name, value in objects[0].items():
@@ -329,7 +327,7 @@ def load_arrays_only(file: LogFile) -> Data:
         raise LogError(f"{file.path}: the pickle is nested too deeply. {remedy}") from None
     except (
         pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError, IndexError,
-        AttributeError, OverflowError, MemoryError, UnicodeDecodeError, SyntaxError,
+        AttributeError, OverflowError, MemoryError, SyntaxError,
     ) as error:  # fmt: skip
         reason = str(error).split("\n")[0][:80]
         raise LogError(f"{file.path}: a damaged pickle ({reason}). {remedy}") from None

@@ -7,7 +7,7 @@ polars would end the whole process.
 import json
 import struct
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cached_property, partial
@@ -19,7 +19,7 @@ import numpy as np
 
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
-from vftcli.readers.table import Block, Column, Table
+from vftcli.readers.table import Block, Column, Places, Table
 from vftcli.readers.tables import from_table
 from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
@@ -70,7 +70,7 @@ class ColumnarTable(Table):
         """Open the file; its schema, and how many rows it says it has."""
 
     @abstractmethod
-    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
+    def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         """Some columns of all rows, not many more than so many at a time."""
 
     def conversion(self) -> dict[str, Any]:
@@ -93,7 +93,7 @@ class ColumnarTable(Table):
                 found[k] = len(first or ())
             return found
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
         """Decode some columns."""
         self._check(columns)
         with guarded(self.path):
@@ -133,7 +133,7 @@ class ColumnarTable(Table):
         # Not copied where nothing is to be changed: what is picked of it is copied once more.
         return plain(values).astype(target, copy=False)
 
-    def _check(self, columns: Sequence[int]) -> None:
+    def _check(self, columns: Places) -> None:
         """Check that columns may be unpacked: a few bytes of a page may stand for a billion rows.
 
         The rows are asked for, not the pages: on a damaged page's description pyarrow ends the
@@ -189,7 +189,7 @@ class ParquetTable(ColumnarTable):
         about = self._file.metadata  # vftcli's own is the file's, not the schema's
         return self._file.schema_arrow.with_metadata(about.metadata), int(about.num_rows)
 
-    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
+    def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         names = [self.names[c] for c in columns]
         for group in range(self._file.num_row_groups):  # together they would all lie in memory
             yield from self._file.iter_batches(rows, [group], names, use_threads=False)
@@ -207,7 +207,7 @@ class ArrowTable(ColumnarTable):
         check_unpacked(file.path, sum(size for _, size in batches), self._size)
         return pa.ipc.open_stream(self._content).schema, sum(rows for rows, _ in batches)
 
-    def _batches(self, columns: Sequence[int], rows: int) -> Iterator[Arrow]:
+    def _batches(self, columns: Places, rows: int) -> Iterator[Arrow]:
         import pyarrow as pa
 
         options = pa.ipc.IpcReadOptions(use_threads=False, included_fields=list(columns))

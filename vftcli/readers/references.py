@@ -16,6 +16,7 @@ from vftcli.readers.table import (
     JACOBIAN,
     Cell,
     JacobianError,
+    Notes,
     Pick,
     Picks,
     Table,
@@ -26,7 +27,6 @@ from vftcli.readers.tables import load_signals
 from vftcli.signals.arrays import Array, check_clock
 from vftcli.signals.errors import ClockError, LogError
 from vftcli.signals.option import interval_text
-from vftcli.signals.remarks import Remark
 from vftcli.signals.wrench import WrenchFrame
 
 TORQUE = "tau_ext"
@@ -108,7 +108,7 @@ class JacobianLog(NamedTuple):
     tau_ext: Array  #: The vendor's estimate of the torque on the robot. (T, n) [N·m]
     jacobian: Array  #: Rows of velocity, then of angular velocity. (T, 6, n)
     wrench: Array | None  #: What a sensor reads, in axes of its own, or None. (T, 6) [N, N·m]
-    remarks: tuple[Remark, ...] = ()  #: What reading dropped or turned.
+    remarks: Notes = ()  #: What reading dropped or turned.
 
 
 @np.errstate(all="ignore")  # whatever a damaged file holds is judged, not computed with

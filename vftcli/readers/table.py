@@ -25,6 +25,9 @@ JACOBIAN = re.compile(r"(?i)jac(obian)?_(\d)_(\d)")
 Column = NDArray[Any]  #: One column as it is stored: (T,) numbers, or (T, k) for a column of lists.
 Columns = dict[str, Column]  #: Name → column.
 Block = dict[int, Column]  #: Place in the table → column, or some rows of it.
+Places = Sequence[int]  #: Places of columns in the table.
+Notes = tuple[Remark, ...]  #: What is to be said of a log.
+Signals = dict[str, Array]  #: Signal → a row a sample. (T, k)
 Names = tuple[str, ...]  #: Names of columns, fields or joints, in their order.
 
 
@@ -34,7 +37,7 @@ class Table(ABC):
     path: Path | str  #: What messages call the table: the file, and in a bag the topic.
     names: Names  #: Column names, none for a headerless table.
     width: int  #: Number of columns.
-    remarks: tuple[Remark, ...] = ()  #: What loading dropped or mended.
+    remarks: Notes = ()  #: What loading dropped or mended.
 
     @property
     def lists(self) -> Mapping[int, int]:
@@ -42,10 +45,10 @@ class Table(ABC):
         return {}
 
     @abstractmethod
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
         """Columns as float64, some thousand rows at a time; the clock's may stay whole numbers."""
 
-    def load(self, columns: Sequence[int], clock: int | None = None) -> Block:
+    def load(self, columns: Places, clock: int | None = None) -> Block:
         """All rows of some columns."""
         first, *more = self.blocks(columns, clock)
         return (
@@ -114,25 +117,21 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
             )
         found = [pick_of(item, named_cells(table, item)) for item in spec.items if item.pattern]
     else:
-        found = list(_counted(table, spec))
+        cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
+        missing = len(cells) - spec.width
+        if missing < 0 or (missing and not any(item.count == 0 for item in spec.items)):
+            remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
+            raise LogError(
+                f"{table.path}: --columns describes {spec.width} columns, the table has "
+                f"{len(cells)}; {remedy}."
+            )
+        left = iter(cells)
+        items = [item for item in spec.items if item.rate is None]
+        found = [pick_of(item, tuple(islice(left, item.count or missing))) for item in items]
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
     clock = next((pick for pick in found if pick.signal == "t"), None)
     rate = next((item.rate for item in spec.items if item.rate is not None), None)
     return Picks(signals, clock, rate)
-
-
-def _counted(table: Table, spec: ColumnSpec) -> list[Pick]:
-    cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
-    missing = len(cells) - spec.width
-    if missing < 0 or (missing and not any(item.count == 0 for item in spec.items)):
-        remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
-        raise LogError(
-            f"{table.path}: --columns describes {spec.width} columns, the table has "
-            f"{len(cells)}; {remedy}."
-        )
-    left = iter(cells)
-    items = [item for item in spec.items if item.rate is None]
-    return [pick_of(item, tuple(islice(left, item.count or missing))) for item in items]
 
 
 def cells_of(table: Table, column: int, elements: slice = slice(None)) -> Cells:
@@ -317,7 +316,7 @@ class JoinedRows:
         return np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
 
 
-def joined(parts: Iterable[Mapping[str, Array]]) -> dict[str, Array]:
+def joined(parts: Iterable[Signals]) -> Signals:
     """Signals that come part by part, each as one array; all parts have the same signals."""
     found: dict[str, JoinedRows] = {}
     for part in parts:

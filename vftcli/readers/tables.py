@@ -26,8 +26,11 @@ from vftcli.readers.table import (
     Block,
     Cells,
     Column,
+    Notes,
     Pick,
     Picks,
+    Places,
+    Signals,
     Table,
     joined,
     missing_column,
@@ -36,7 +39,7 @@ from vftcli.readers.table import (
 )
 from vftcli.signals.arrays import Array
 from vftcli.signals.errors import LogError
-from vftcli.signals.remarks import Remark, fact
+from vftcli.signals.remarks import fact
 from vftcli.signals.wrench import WrenchFrame
 
 UR = FORMATS["ur-csv"]  #: The columns of UR's real-time data exchange, whoever wrote them.
@@ -156,7 +159,7 @@ class ArrayTable(Table):
     path: Path | str
     columns: Mapping[str, Any]  #: Name → (T,) or (T, k).
     headed: bool = True  #: Whether the names are the file's own.
-    remarks: tuple[Remark, ...] = ()
+    remarks: Notes = ()
 
     def __post_init__(self) -> None:
         self.names = tuple(self.columns) if self.headed else ()
@@ -168,7 +171,7 @@ class ArrayTable(Table):
         arrays = enumerate(self.columns.values())
         return {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
-    def blocks(self, columns: Sequence[int], clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
         """All rows of some columns; whole stamps stay whole."""
         each = list(self.columns.items())
         if len({len(each[c][1]) for c in columns}) > 1:
@@ -243,7 +246,7 @@ def load_signals(
         column: [] for column in (*(cell.column for cell in clock), *origin, *picks.constants)
     }
 
-    def stacked() -> Iterator[dict[str, Array]]:
+    def stacked() -> Iterator[Signals]:
         asked = sorted({*whole, *(cell.column for pick in signals for cell in pick.cells)})
         for loaded in table.blocks(asked, clock[0].column if clock else None):
             for column, parts in whole.items():

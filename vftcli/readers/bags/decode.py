@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from vftcli.readers.aliases import along_arm
 from vftcli.readers.bags.container import Batch, Bytes, Channel, Integers, ReadBudget, strided
 from vftcli.readers.bags.ros_messages import SIZES, Field, LayoutError, Types, types_for
-from vftcli.readers.table import Column, Columns, JoinedRows, Names
+from vftcli.readers.table import Column, Columns, JoinedRows, Names, Signals
 from vftcli.signals.arrays import Array, Mask
 from vftcli.signals.errors import LogError
 
@@ -219,15 +219,25 @@ class Stream:
     frame: str  #: Frame of its stamps' headers, or nothing.
     receive: Integers  #: When each was recorded. (T,) [ns]
     header: Integers | None  #: Stamp in each header. (T,) [ns]
-    signals: dict[str, Array]  #: Signal → (T, k).
+    signals: Signals  #: Signal → (T, k).
     robot: Array | None = None  #: The robot's own clock, or None. (T,) [s]
     #: Last value of each constant.
     constants: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
+    def topic(self) -> str:
+        """The topic's name."""
+        return self.channel.topic
+
+    @property
     def messages(self) -> int:
         """Number of messages."""
         return len(self.receive)
+
+    @property
+    def width(self) -> int:
+        """Number of positions."""
+        return len(self.signals["q"].T)
 
 
 #: What tells streams of a topic apart: the joints' names, the frame, the signals.

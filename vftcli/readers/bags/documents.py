@@ -2,7 +2,7 @@
 
 import json
 import struct
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -26,7 +26,7 @@ STAMPS = ("header.stamp", "timestamp", "stamp")
 SECONDS, NANOSECONDS = ("sec", "secs", "seconds"), ("nsec", "nsecs", "nanos", "nanosec")
 MAX_BYTES, MAX_DEPTH, MAX_VALUES = 1 << 20, 8, 4096  #: What a message of joints may be.
 Json = Any  #: A value of a document.
-Document = Mapping[str, Any]  #: A message, flattened: dotted path → value.
+Document = dict[str, Json]  #: A message, flattened: dotted path → value.
 
 
 class Documents:
@@ -190,12 +190,12 @@ def flattened(message: bytes, encoding: str) -> Document:
     document = json.loads(message) if encoding == "json" else joint_states(message)
     if not isinstance(document, dict):
         raise ValueError("not an object")  # noqa: TRY004 - damage, as what json finds
-    flat: dict[str, Json] = {}
+    flat: Document = {}
     _flatten(document, "", flat, 0)
     return flat
 
 
-def _flatten(value: Json, path: str, flat: dict[str, Json], depth: int) -> None:
+def _flatten(value: Json, path: str, flat: Document, depth: int) -> None:
     listed = isinstance(value, list)
     if depth > MAX_DEPTH or len(flat) > MAX_VALUES:
         raise ValueError("nested or long beyond any message of joints")
@@ -217,15 +217,15 @@ def _flatten(value: Json, path: str, flat: dict[str, Json], depth: int) -> None:
 JOINT_FIELDS = {2: "position", 3: "velocity", 4: "acceleration", 5: "effort"}
 
 
-def joint_states(message: bytes) -> dict[str, Any]:
+def joint_states(message: bytes) -> Document:
     """A foxglove.JointStates message: timestamp = 1, joints = 2 {name 1, position 2, …}."""
-    document: dict[str, Any] = {"joints": []}
+    document: Document = {"joints": []}
     for number, value in fields(message):
         if number == 1 and isinstance(value, bytes):
             stamp = dict(fields(value))
             document["timestamp"] = {"sec": stamp.get(1, 0), "nsec": stamp.get(2, 0)}
         elif number == 2 and isinstance(value, bytes):
-            joint: dict[str, Any] = {}
+            joint: Document = {}
             for part, inner in fields(value):
                 if part == 1 and isinstance(inner, bytes):
                     joint["name"] = inner.decode("utf-8", "replace")

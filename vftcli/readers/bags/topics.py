@@ -23,10 +23,10 @@ from vftcli.signals.remarks import Remark, caution, fact, warning
 from vftcli.signals.series import median_step, resample_columns
 from vftcli.signals.wrench import FRANKA_FRAME, WrenchFrame
 
-TARGETS = re.compile(r"desired|command|target|goal|reference", re.IGNORECASE)
-VENDOR_WRENCH = re.compile(r"franka|F_ext$|external_wrench", re.IGNORECASE)
+TARGETS = re.compile(r"(?i)desired|command|target|goal|reference")
+VENDOR_WRENCH = re.compile(r"(?i)franka|F_ext$|external_wrench")
 #: Topics and types that may hold a wrench: left out, they are named.
-FORCES = re.compile(r"wrench|force|\bft\b|F_ext", re.IGNORECASE)
+FORCES = re.compile(r"(?i)wrench|force|\bft\b|F_ext")
 #: A wrench further than this many of its own sample times from a pose is not taken for it.
 NEAR = 3.0
 OWN = "/vftcli/"  #: Topics that vftcli itself writes.
@@ -45,7 +45,7 @@ def aligned(
                 release(values)
     frame = gathering.take_wrench(streams)
     gathering.report_left_out(streams, others)
-    width = lead.signals["q"].shape[1]
+    width = lead.width
     # Another topic about the arm may have the names.
     named = [s.names for s in streams if len(s.names) == width and robot_of(s.names)]
     names = lead.names or next(iter(named), ())
@@ -86,9 +86,9 @@ class Gathering:
         self._settle_effort(request.spec.items)
 
     def _take_lead(self) -> None:
-        lead, width = self.lead, self.lead.signals["q"].shape[1]
+        lead, width = self.lead, self.lead.width
         if lead.mixed:
-            self.remarks.append(fact("joints-reordered", topic=lead.channel.topic))
+            self.remarks.append(fact("joints-reordered", topic=lead.topic))
         for signal, value in lead.signals.items():
             if signal != "wrench" and value.shape[1] != width:
                 continue
@@ -96,7 +96,7 @@ class Gathering:
                 self.signals[signal] = value
             elif signal == "q":
                 raise LogError(
-                    f"{self.path}: the positions in {lead.channel.topic} are NaN in all "
+                    f"{self.path}: the positions in {lead.topic} are NaN in all "
                     f"{lead.messages} messages, so nothing was measured. Record another topic."
                 )
             else:  # drivers publish NaN for what they do not measure
@@ -121,8 +121,7 @@ class Gathering:
             if source not in there:
                 fields = [next((f for f, s in FIELDS.items() if s == name), name) for name in there]
                 raise LogError(
-                    f"--columns: {lead.channel.topic} has no field {last!r}; it has "
-                    f"{', '.join(fields)}."
+                    f"--columns: {lead.topic} has no field {last!r}; it has {', '.join(fields)}."
                 )
             self.signals.pop(source, None)
             self.signals[signal] = there[source] * item.factor + 0.0
@@ -136,7 +135,7 @@ class Gathering:
 
     def take(self, stream: Stream) -> None:
         """Take what another topic has of the same joints, and the leading one has not."""
-        if stream.channel.topic.startswith(OWN):
+        if stream.topic.startswith(OWN):
             self._take_own(stream)
         elif stream is not self.lead and same_arm(stream, self.lead):
             for signal in [s for s in stream.signals if s != "effort" and s not in self.signals]:
@@ -145,7 +144,7 @@ class Gathering:
 
     def _take_own(self, stream: Stream) -> None:
         """Take a topic of an MCAP that vftcli convert wrote: /vftcli/SIGNAL, sample by sample."""
-        name, lead = stream.channel.topic.removeprefix(OWN), self.lead
+        name, lead = stream.topic.removeprefix(OWN), self.lead
         value = stream.signals.get("wrench" if name == "wrench" else "effort")
         same = stream.messages == lead.messages and np.array_equal(host_times(stream), self.host)
         if value is None or not same or name not in {*SIGNALS, *SIGNALS.values()}:
@@ -164,11 +163,11 @@ class Gathering:
         frame = FRANKA_FRAME if self.lead.kind.franka else None
         # A sensor's topic goes before the vendor's, the fullest before the others.
         found = [s for s in streams if s.channel.type == "geometry_msgs/WrenchStamped"]
-        sensors = [s for s in found if not VENDOR_WRENCH.search(s.channel.topic)]
+        sensors = [s for s in found if not VENDOR_WRENCH.search(s.topic)]
         sensor = max(sensors or found, key=lambda s: s.messages, default=None)
         if sensor is None or named or (not sensors and "wrench" in self.lead.signals):
             pass
-        elif sensor.channel.topic.startswith(OWN):
+        elif sensor.topic.startswith(OWN):
             frame = WrenchFrame.of_conversion(sensor.frame)
         elif (values := self.interpolated(sensor, "wrench")) is not None:
             self.signals["wrench"] = values
@@ -190,7 +189,7 @@ class Gathering:
 
         None, and a caution, where the other topic does not cover the leading one's time.
         """
-        lead, times, topic = self.lead, self.host, stream.channel.topic
+        lead, times, topic = self.lead, self.host, stream.topic
         own = host_times(stream)
         # One of the two may have receive stamps only: like is compared with like.
         if times is not lead.header:
@@ -207,7 +206,7 @@ class Gathering:
         start = int(own[0])  # whole nanoseconds are subtracted before they are scaled
         x, xp = np.asarray((times - start) * 1e-9, float), np.asarray((own - start) * 1e-9, float)
         self.used.add(topic)
-        rate, leads = 1e9 / usual, lead.channel.topic
+        rate, leads = 1e9 / usual, lead.topic
         self.remarks.append(
             fact("signal-interpolated", signal=signal, topic=topic, rate_Hz=rate, lead=leads)
         )
@@ -215,14 +214,14 @@ class Gathering:
 
     def report_left_out(self, streams: Sequence[Stream], others: dict[str, str]) -> None:
         """Remark which messages and topics were left out, those with forces first."""
-        lead, topic = self.lead, self.lead.channel.topic
+        lead, topic = self.lead, self.lead.topic
         for stream in streams:
             if stream.channel == lead.channel and stream.names == lead.names and stream is not lead:
                 there, count = tuple(stream.signals) or ("names",), stream.messages
                 self.remarks.append(
                     caution("messages-left-out", messages=count, topic=topic, signals=there)
                 )
-        topics = {s.channel.topic for s in streams if not s.channel.topic.startswith(OWN)}
+        topics = {s.topic for s in streams if not s.topic.startswith(OWN)}
         topics |= {t for t, kind in others.items() if FORCES.search(t) or FORCES.search(kind)}
         left = sorted(topics - {topic} - self.used, key=lambda t: (FORCES.search(t) is None, t))
         if left:
@@ -237,9 +236,9 @@ def same_arm(stream: Stream, lead: Stream) -> bool:
     if "q" not in stream.signals and "effort" not in stream.signals:
         return False
     if not stream.names or not lead.names:
-        width = lead.signals["q"].shape[1]
-        return "q" not in stream.signals or stream.signals["q"].shape[1] == width
-    return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.channel.topic)
+        width = lead.width
+        return "q" not in stream.signals or stream.width == width
+    return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.topic)
 
 
 def leading(
@@ -251,13 +250,13 @@ def leading(
     """
     found = [
         s for s in streams
-        if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.channel.topic)
+        if "q" in s.signals and s.messages > 1 and not TARGETS.search(s.topic)
     ]  # fmt: skip
-    found = [s for s in found if s.signals["q"].shape[1] > 2] or found
+    found = [s for s in found if s.width > 2] or found
     named = {(i.pattern or "").rpartition(".")[0] for i in request.spec.items if i.signal == "q"}
-    found = [s for s in found if s.channel.topic in named] or found
+    found = [s for s in found if s.topic in named] or found
     if not found:
-        there = [f"{s.channel.topic} ({s.channel.type})" for s in streams]
+        there = [f"{s.topic} ({s.channel.type})" for s in streams]
         there += [f"{topic} ({kind})" for topic, kind in others.items()]
         raise LogError(
             f"{path}: no topic with joint positions among {', '.join(there[:12]) or 'no topics'}. "
@@ -268,18 +267,18 @@ def leading(
     near = [s for s in found if s.messages >= 0.9 * most]
     best = max(near, key=lambda s: (s.kind.franka, "effort" in s.signals, s.messages))
     # A stream of as many joints with other names, of the same type and rate, is another arm.
-    width, joints = best.signals["q"].shape[1], set(best.names)
+    width, joints = best.width, set(best.names)
     rivals = [
         s for s in near
         if s.kind is best.kind and s.names and set(s.names) != joints
-        and s.signals["q"].shape[1] == width
+        and s.width == width
     ]  # fmt: skip
     if rivals:
-        topics = ", ".join(s.channel.topic for s in (best, *rivals))
+        topics = ", ".join(s.topic for s in (best, *rivals))
         raise LogError(
             f"{path}: two arms were recorded: {topics} "
             f"({', '.join(best.names[:2])}… and {', '.join(rivals[0].names[:2])}…). Say which with "
-            f"--columns 'q={best.channel.topic}.position'."
+            f"--columns 'q={best.topic}.position'."
         )
     return best
 
@@ -291,7 +290,7 @@ def clock_of(stream: Stream) -> tuple[Any, float, str, Integers]:
         Its stamps (T,), the length of their tick [s], which clock they are, and header or receive
         stamps (T,) [ns].
     """
-    host, robot, topic = host_times(stream), stream.robot, stream.channel.topic
+    host, robot, topic = host_times(stream), stream.robot, stream.topic
     if robot is None or not runs(robot):
         unset = f"receive stamps of {topic} (its header stamps are unset or run back)"
         words = unset if host is stream.receive else f"header stamps of {topic}"
@@ -339,7 +338,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     if "metadata.yaml" in file.entries:
         with (file.path / "metadata.yaml").open("rb") as metadata:
             text = metadata.read(METADATA_BYTES)
-        match = re.search(rb"^  message_count: (\d{1,15})\s*$", text, flags=re.MULTILINE)
+        match = re.search(rb"(?m)^  message_count: (\d{1,15})\s*$", text)
         counted = messages if match is None else int(match[1])
         if messages < counted:
             said = warning("messages-missing", kept=messages, counted=counted, by="metadata.yaml")
@@ -355,7 +354,7 @@ def read(file: LogFile, request: ReadChoice, _: LogFormat) -> RawLog:
     if documents.found and not any("q" in stream.signals for stream in streams):
         raw = documents.read(request)
     else:
-        known = {stream.channel.topic for stream in of_documents}
+        known = {stream.topic for stream in of_documents}
         rows = (channel for channel in documents.found if channel.topic not in known)
         others = decoder.others | {c.topic: c.type or c.encoding for c in rows}
         raw = aligned(streams, file.path, request, others)
