@@ -172,8 +172,7 @@ def connected(choice: WorkersChoice, seen: Sequence[str], tell: Tell) -> Iterato
 def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
     """A cluster of processes on this machine, behind a certificate of this run."""
     from dask.system import CPU_COUNT
-    from distributed import Client
-    from distributed.security import Security
+    from distributed import Client, Security
     from distributed.system import MEMORY_LIMIT
 
     from vftcli.batch.nodes import closed_cluster
@@ -200,8 +199,7 @@ def local(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
 @contextmanager
 def standing(choice: WorkersChoice, tell: Tell) -> Iterator["Client"]:
     """The cluster of the scheduler at this address, with a worker at least."""
-    from distributed import Client
-    from distributed.security import Security
+    from distributed import Client, Security
 
     names = ("tls_ca_file", "tls_client_cert", "tls_client_key")
     files = dict(zip(names, map(str, choice.tls), strict=False))

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import polars as pl
+from polars import Boolean, Float64, Int64, String
 
 from vftcli.analysis import Analysis
 from vftcli.batch.cluster import begin
@@ -115,29 +116,29 @@ def for_comparison(choice: AnalysisChoice) -> AnalysisChoice:
 Kinds = dict[str, Any]  #: Column → its type in polars.
 #: Columns with one value a log.
 OF_LOG: Kinds = {
-    "robot": pl.String,
-    "samples": pl.Int64,
-    "duration_s": pl.Float64,
-    "rate_hz": pl.Float64,
-    "health": pl.String,
-    "reason": pl.String,
-    "findings": pl.List(pl.String),
-    "contacts": pl.Int64,
-    "load": pl.Boolean,
-    "hardest_N": pl.Float64,
-    "hardest_band_N": pl.Float64,
-    "hardest_s": pl.Float64,
-    "told_N": pl.Float64,
+    "robot": String,
+    "samples": Int64,
+    "duration_s": Float64,
+    "rate_hz": Float64,
+    "health": String,
+    "reason": String,
+    "findings": pl.List(String),
+    "contacts": Int64,
+    "load": Boolean,
+    "hardest_N": Float64,
+    "hardest_band_N": Float64,
+    "hardest_s": Float64,
+    "told_N": Float64,
 }
 #: Which estimate, and its size: root mean square, and what 99 % of |τ̂| stay below.
 OF_ESTIMATE: Kinds = {
-    "observer": pl.String,
-    "joint": pl.Int64,
-    "axis": pl.String,
-    "rms_Nm": pl.Float64,
-    "p99_Nm": pl.Float64,
-    "rms_N": pl.Float64,
-    "p99_N": pl.Float64,
+    "observer": String,
+    "joint": Int64,
+    "axis": String,
+    "rms_Nm": Float64,
+    "p99_Nm": Float64,
+    "rms_N": Float64,
+    "p99_N": Float64,
 }
 COMPARED = "compared_samples"  #: Samples of a comparison; `samples` are the log's.
 #: Columns of the errors, as `vftcli compare --json` has them; null without a reference.
@@ -147,7 +148,7 @@ OF_ERROR: Kinds = {
     if name not in {"recording", *OF_ESTIMATE}
 }
 #: Columns of a log's rows.
-SCHEMA: Kinds = {"key": pl.String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
+SCHEMA: Kinds = {"key": String, **OF_LOG, **OF_ESTIMATE, **OF_ERROR}
 JOINED = ("observer", "joint", "axis")  #: By which an estimate and its error belong together.
 
 

@@ -1,7 +1,8 @@
 """`vftcli annotate`: a dataset becomes a copy with forces in it."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from vftcli.batch.choice import WorkersChoice
 from vftcli.cli import options as opt
@@ -11,12 +12,6 @@ from vftcli.observers.choice import ObserverChoice
 from vftcli.signals.option import WRITE, Option
 from vftcli.signals.parsing import check_known
 from vftcli.virtual_sensor.choice import WrenchChoice
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from vftcli.batch.annotation import ForceChoice
-
 
 ADDED = ("wrench", "sd", "contact")  #: What ``--add`` takes.
 
@@ -95,19 +90,19 @@ def annotate_dataset(
     if json:
         echo_data(to_json(record))
         return
-    for line in copy_lines(record, asked):
+    for line in copy_lines(record, asked.observer):
         say(line)
     say(f"wrote {output}")
 
 
-def meaning(column: "Mapping[str, str]") -> str:
+def meaning(column: Mapping[str, str]) -> str:
     """What a column's numbers are: unit and axes of a force, else what 1 and 0 say."""
     if column["units"] == "1":
         return column["sign"]
     return f"{column['units']}, {column['frame']}"
 
 
-def copy_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
+def copy_lines(record: Mapping[str, Any], observer: str) -> list[str]:
     """Lines on what was written, and on what a user of it should know."""
     from vftcli.doctor.examination import doubt
 
@@ -118,7 +113,7 @@ def copy_lines(record: "Mapping[str, Any]", asked: "ForceChoice") -> list[str]:
     lines = [
         f"{episodes} episode{'s' * (episodes != 1)} ({count}), {frames} frames, "
         f"{record['robot']['name']}, "
-        f"{asked.observer}, {kind}",
+        f"{observer}, {kind}",
         *(f"  {name}: {meaning(column)}" for name, column in record["columns"].items()),
         f"  the first {delay} frames of an episode still show where the observer started",
     ]

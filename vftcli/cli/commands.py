@@ -14,9 +14,9 @@ from vftcli.signals.parsing import tables_beside
 class ListedCommand(NamedTuple):
     """One command: where it is, so that --help need not load it."""
 
+    journey: str  #: Heading under which `--help` lists it.
     file: str  #: File of this package.
     function: str  #: The function in it.
-    journey: str  #: Heading under which `--help` lists it.
 
     @property
     def summary(self) -> str:
@@ -54,7 +54,7 @@ JOURNEYS = {
 }
 #: Name → the command.
 COMMANDS = {
-    name: ListedCommand(place.partition(":")[0], place.partition(":")[2], journey)
+    name: ListedCommand(journey, *place.split(":"))
     for journey, places in JOURNEYS.items()
     for name, place in places.items()
 }

@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 from vftcli.cli import options as opt
 from vftcli.cli.analysis import LogOptions
@@ -24,9 +24,6 @@ from vftcli.identification import Task
 from vftcli.observers.choice import GoalChoice
 from vftcli.refinement.choice import RefinementChoice
 from vftcli.signals.errors import ParameterError
-
-if TYPE_CHECKING:
-    from vftcli.robots.robot import Robot
 
 
 def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str, object]) -> None:
@@ -59,9 +56,9 @@ def check_uses(task: Task, free: FreeChoice, logs: list[Path], others: dict[str,
         )
 
 
-def file_for(robot: "Robot") -> Path:
+def file_for(robot: str) -> Path:
     """The file in this folder for what is found of a robot, where no other is named."""
-    return Path("my_" + re.sub(r"[^\w.-]", "_", robot.name) + ".toml")
+    return Path("my_" + re.sub(r"[^\w.-]", "_", robot) + ".toml")
 
 
 @opt.command
@@ -113,7 +110,7 @@ def identify_robot(
     examiner = health_of(library, anyway=anyway, fitting=task.keeps_links)
     choice = replace(logged.asked(library, free=without_load), examiner=examiner)
     profile = examiner.robot(next(library.open_each(logs, choice.read)), choice.robot)
-    output = output or file_for(profile)
+    output = output or file_for(profile.name)
     form = made.figures
     OutputFolder(output.parent, made.force, files_beside(output, form)).check()
     found = identified(logs, check or (), choice, replace(task, name=output.stem), say_recording)
@@ -152,7 +149,7 @@ def find_gains(
     choice = logged.asked(Library([log]), observers=TUNED, **others)
     if output is None:
         recording = choice.library.open(log, choice.read)
-        output = file_for(choice.examiner.robot(recording, choice.robot))
+        output = file_for(choice.examiner.robot(recording, choice.robot).name)
     check_file(output, made.force)
     found = gains_of(log, choice, goal)
     notes, health = list(map(str, found.remarks)), found.examinations

@@ -1,6 +1,6 @@
 """`vftcli report` and `vftcli estimate`: logs become folders, with all of it or estimates alone."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,8 +23,6 @@ from vftcli.evaluation.reference_choice import ReferenceChoice
 from vftcli.signals.option import WRITE, Choice, Option, setting
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
-
     from vftcli.analysis import Analysis
     from vftcli.outputs.estimates import Group
     from vftcli.pipeline import AnalysisChoice

@@ -6,7 +6,6 @@ And what the values of a table without a header settle of it, as a text of that 
 import re
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import permutations
 from typing import NamedTuple
 
@@ -61,14 +60,13 @@ ITEM = re.compile(
 )
 
 
-@dataclass(frozen=True, kw_only=True)
-class Item:
+class Item(NamedTuple):
     """One item of a --columns text."""
 
     signal: str  #: A key of SIGNALS, `t`, or `_`.
     factor: float = 1.0  #: What a value is multiplied with to be in SI units and in our sign.
     unit: str | None = None  #: The unit as written, or None.
-    count: int = 1  #: Columns in a row that it covers, in a headerless table; 0 for all others.
+    width: int = 1  #: Columns in a row that it covers, in a headerless table; 0 for all others.
     #: The column names it means, in a headed table; None for those found without it.
     pattern: str | None = None
     rate: float | None = None  #: Sampling rate of a table that has no clock. [Hz]
@@ -91,7 +89,7 @@ class ColumnSpec(NamedTuple):
     @property
     def width(self) -> int:
         """Number of columns that a counting text describes, those of ``_:*`` left out."""
-        return sum(item.count for item in self.items if item.rate is None)
+        return sum(item.width for item in self.items if item.rate is None)
 
 
 def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
@@ -106,7 +104,7 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     items = tuple(_parse_item(part) for part in parts if not part.startswith("segment="))
     signals = {item.signal for item in items}
     # Nothing can be counted without positions: what is left says a unit or a sign.
-    single = all(item.count == 1 or item.signal == "wrench" for item in items)
+    single = all(item.width == 1 or item.signal == "wrench" for item in items)
     alone = log and single and not signals & {"q", "_"}
     named = alone or any(item.pattern is not None for item in items)
     for item in items:
@@ -119,7 +117,7 @@ def parse_columns(text: str, *, log: bool = True) -> ColumnSpec:
     for name in names:
         if names.count(name) > 1:
             raise LogError(f"--columns: {name} is given twice. Skip the other columns with _.")
-    if sum(item.count == 0 for item in items) > 1:
+    if sum(item.width == 0 for item in items) > 1:
         raise LogError("--columns: _:* covers all columns that are left; give it once.")
     if log and items and "q" not in names and not named:
         raise LogError("--columns: no q; a log needs joint positions, as in t,q:6,dq:6,current:6.")
@@ -150,7 +148,7 @@ def _parse_item(part: str) -> Item:
     if match["count"] == "*":
         if name != "_":
             raise LogError(f"--columns: {part!r}: only _:* covers all columns that are left.")
-        return Item(signal=name, count=0)
+        return Item(name, width=0)
     count = int(match["count"] or (6 if name == "wrench" and match["pattern"] is None else 1))
     if count == 0 or count > 10_000 or (name == "t" and count != 1):
         raise LogError(f"--columns: {part!r} covers {count} columns; it must cover at least one.")
@@ -158,7 +156,7 @@ def _parse_item(part: str) -> Item:
         signal=name,
         factor=factor,
         unit=match["unit"],
-        count=count,
+        width=count,
         pattern=match["pattern"],
         rate=rate,
     )

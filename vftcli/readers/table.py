@@ -119,7 +119,7 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
     else:
         cells = [cell for column in range(table.width) for cell in cells_of(table, column)]
         missing = len(cells) - spec.width
-        if missing < 0 or (missing and not any(item.count == 0 for item in spec.items)):
+        if missing < 0 or (missing and not any(item.width == 0 for item in spec.items)):
             remedy = f"skip the rest with _:{missing}" if missing > 0 else "leave some out"
             raise LogError(
                 f"{table.path}: --columns describes {spec.width} columns, the table has "
@@ -127,7 +127,7 @@ def unchecked_picks(table: Table, spec: ColumnSpec) -> Picks:
             )
         left = iter(cells)
         items = [item for item in spec.items if item.rate is None]
-        found = [pick_of(item, tuple(islice(left, item.count or missing))) for item in items]
+        found = [pick_of(item, tuple(islice(left, item.width or missing))) for item in items]
     signals = tuple(pick for pick in found if pick.signal not in {"t", "_"})
     clock = next((pick for pick in found if pick.signal == "t"), None)
     rate = next((item.rate for item in spec.items if item.rate is not None), None)

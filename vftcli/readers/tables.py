@@ -123,7 +123,7 @@ def read_known_columns(table: Table, usual: str, request: ReadChoice, **more: Ra
             raise missing_column(table, item.signal, item.signal)
         scale = before.factor if item.unit is None else math.copysign(1.0, before.factor)
         unit = item.unit or before.unit
-        items[item.signal] = replace(before, factor=item.factor * scale, unit=unit)
+        items[item.signal] = before._replace(factor=item.factor * scale, unit=unit)
     spec = ColumnSpec(items=tuple(items.values()), named=True, segment=stated.segment)
     unit = items["q"].unit if "q" in items else None
     more = {"segment": spec.segment, "degrees_possible": unit is None, **more}

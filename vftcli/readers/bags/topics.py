@@ -236,8 +236,7 @@ def same_arm(stream: Stream, lead: Stream) -> bool:
     if "q" not in stream.signals and "effort" not in stream.signals:
         return False
     if not stream.names or not lead.names:
-        width = lead.width
-        return "q" not in stream.signals or stream.width == width
+        return "q" not in stream.signals or stream.width == lead.width
     return set(stream.names) >= set(lead.names) and not TARGETS.search(stream.topic)
 
 
