@@ -115,12 +115,12 @@ class Admittance:
     @property
     def drag_ratio(self) -> Array:
         """Damping ratio of the drag phase, B_d/(2√(M_d K_d)). (6,)"""
-        return np.asarray(self.damping / (2.0 * np.sqrt(self.mass * self.stiffness)))
+        return self.damping / (2.0 * np.sqrt(self.mass * self.stiffness))
 
     @property
     def release_threshold(self) -> Array:
         """Force from which down an axis that is dragged recovers. (6,) [N, N·m]"""
-        return np.asarray(self.threshold * (1.0 - np.asarray(self.hysteresis)))
+        return self.threshold * (1.0 - np.asarray(self.hysteresis))
 
     @property
     def damping_ratio(self) -> Array:
@@ -223,7 +223,7 @@ class Controller:
     def xi(self) -> Array:
         """Damping ratio ξ of the recovery phase. (6,)"""
         p = self.parameters
-        return np.asarray(self.damping / (2.0 * np.sqrt(p.mass * p.stiffness)))
+        return self.damping / (2.0 * np.sqrt(p.mass * p.stiffness))
 
     @cached_property
     def drag(self) -> Array:
@@ -250,7 +250,7 @@ class Controller:
         factor = np.array([escape_factor(xi) for xi in distinct.tolist()])[each]
         scale = np.sqrt(p.mass / p.stiffness) / self.alpha
         with np.errstate(divide="ignore"):
-            return np.asarray(factor * scale / self.rate)
+            return factor * scale / self.rate
 
     def complaints(self, size: Array | float = np.inf) -> Iterator[Remark]:
         """Its instabilities, in releases from rest of a size (6,) [m, rad] or in all motion."""
@@ -319,7 +319,7 @@ def energy(controller: Controller, x: Array, v: Array) -> Array:
     # The traditional controller has no speed scale; its branch below does not use the quotient.
     rate = np.where(varies, controller.rate, 1.0)
     shape = np.where(varies, kinetic_shape(abs(v) * rate) / rate**2, 0.5 * v**2)
-    return np.asarray(0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2)
+    return 0.5 * p.stiffness * x**2 + p.mass * shape / controller.alpha**2
 
 
 def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
@@ -327,7 +327,7 @@ def printed_energy(controller: Controller, x: Array, v: Array) -> Array:
     p = controller.parameters
     swell = np.exp(abs(v) * controller.rate)
     kinetic = 0.5 * p.mass / (controller.alpha * swell) * v**2
-    return np.asarray(kinetic + 0.5 * controller.alpha * p.stiffness * swell * x**2)
+    return kinetic + 0.5 * controller.alpha * p.stiffness * swell * x**2
 
 
 class UnstableError(ParameterError):
@@ -336,7 +336,7 @@ class UnstableError(ParameterError):
 
 def discrete_number(mass: Array, damping: Array, stiffness: Array, period: float) -> Array:
     """2TsB/M + Ts²K/M, below 4 where semi-implicit Euler is stable. [1]"""
-    return np.asarray((2.0 * period * damping + period**2 * stiffness) / mass)
+    return (2.0 * period * damping + period**2 * stiffness) / mass
 
 
 def escape_factor(xi: float) -> float:

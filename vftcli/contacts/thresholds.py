@@ -45,7 +45,7 @@ def block_maxima(t: Array, level: Array) -> Array:
     first = np.flatnonzero(np.diff(number, prepend=-1))
     known = np.add.reduceat(np.isfinite(level).astype(int), first)
     maxima = np.maximum.reduceat(np.where(np.isfinite(level), level, -np.inf), first)
-    return np.asarray(maxima[known * median_step(t) >= KNOWN * BLOCK])
+    return maxima[known * median_step(t) >= KNOWN * BLOCK]
 
 
 def events(t: Array, level: Array) -> tuple[ContactInterval, ...]:

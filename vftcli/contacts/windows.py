@@ -59,7 +59,7 @@ def places(chain: Chain, q: Array) -> list[ContactPlace]:
 def points_on(poses: LinkPoses, link: Indices | int, share: Array | float) -> Array:
     """Points along links, from their joints (0) to the next (1), in base axes. (K, …, 3) [m]"""
     start, end = poses.translation[:, link - 1], poses.translation[:, link]
-    return np.asarray(start + share * (end - start))
+    return start + share * (end - start)
 
 
 def link_jacobian(poses: LinkPoses, link: int, share: float) -> Array:
@@ -291,4 +291,4 @@ def evidence(
     each = np.full((len(runs), len(places)), -np.inf)
     np.maximum.at(each, tuple(np.transpose(owners)), likelihoods(log, touched))
     bare = contact_lanes(log, [places[0].jacobian] * len(runs), runs, [None] * len(runs))
-    return np.asarray(each - likelihoods(log, bare)[:, None])
+    return each - likelihoods(log, bare)[:, None]

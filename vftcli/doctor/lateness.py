@@ -163,7 +163,7 @@ def lateness_of(recording: Recording, robot: Robot) -> Lateness | None:
     rate = (terms.coriolis_transpose_dq - terms.gravity).reshape(dq.shape)
 
     def mean(by: Array, of: Array) -> Array:
-        return np.asarray((by[:, None] @ of)[:, 0])
+        return (by[:, None] @ of)[:, 0]
 
     rigid = -mean(slope, terms.p.reshape(dq.shape)) - mean(weight, rate)
     columns = (rigid, mean(weight, np.tanh(dq / SLOW)), mean(weight, dq), -mean(slope, dq))

@@ -243,7 +243,7 @@ class Case:
     @cached_property
     def gravity(self) -> Array:
         """Torque that holds the arm. (W, n) [N·m]"""
-        return np.asarray(self.windows.gravity @ self.up)
+        return self.windows.gravity @ self.up
 
     @cached_property
     def needed(self) -> Array:

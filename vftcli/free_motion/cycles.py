@@ -139,7 +139,7 @@ def distances(x: Array) -> Array:
     energy = overlap_energy(x, lags, samples) + overlap_energy(x, -lags, samples)
     for column in x.T[:, None]:
         energy -= 2.0 * sliding(column, column, lags)[0]
-    return np.asarray(np.maximum(energy, 0.0) / (samples - lags))
+    return np.maximum(energy, 0.0) / (samples - lags)
 
 
 def valleys(distance: Array, step: float, stated: float | None) -> list[float]:

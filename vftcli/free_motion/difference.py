@@ -51,7 +51,7 @@ class ErrorModel(NamedTuple):
     @property
     def trusted_joints(self) -> Mask:
         """Joints with motion enough to cancel friction; all if none has. (n,)"""
-        trusted = np.asarray(self.standing_share <= 1.0 - TRUSTED_SHARE)
+        trusted = self.standing_share <= 1.0 - TRUSTED_SHARE
         return trusted if trusted.any() else np.ones_like(trusted)
 
     @property

@@ -54,7 +54,7 @@ def in_gap(clock: Array, times: Array) -> Mask:
     """Whether an instant lies in a gap of a clock. (T,)"""
     steps = np.diff(clock)
     at = np.clip(clock.searchsorted(times) - 1, 0, len(steps) - 1)
-    return np.asarray(steps[at] > GAP * np.median(steps))
+    return steps[at] > GAP * np.median(steps)
 
 
 def by_phase(motion: Run, pairing: Pairing) -> Pairing:

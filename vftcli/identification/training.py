@@ -130,7 +130,7 @@ class PreparedLog:
         load, temperature = gravity_torque(robot, log.q), measured_temperature(log)
         friction = RunningFriction(robot.friction)
         losses = friction.torque(log.q, log.require("dq"), load, temperature)
-        return np.asarray(torque + self.filtered(losses))
+        return torque + self.filtered(losses)
 
     def column(self, term: str, j: int, shape: Shape) -> Array:
         """One friction term of joint j (from 0), filtered like the torque, made once. (M,)"""

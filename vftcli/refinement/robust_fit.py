@@ -109,7 +109,7 @@ class FittedError(NamedTuple):
     def covariance(self) -> Array:
         """Covariance of the model's error, in squared standard deviations. (P, P)"""
         half = forward_solved(self.factor, np.eye(len(self.factor), len(self.model)))
-        return np.asarray(self.scale**2 * (half.T @ half))
+        return self.scale**2 * (half.T @ half)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -89,7 +89,7 @@ class WholeLogBias:
     @property
     def applied(self) -> Mask:
         """Joints on which the correction is used. (n,)"""
-        return np.asarray(self.weight > 0.0)
+        return self.weight > 0.0
 
     def corrected(self, log: Run) -> Run:
         """The log itself without the bias, μ ← μ − b."""

@@ -160,7 +160,7 @@ def assembled_bearing(
 
 def within(wrench: Wrench, span: Sequence[float]) -> Mask:
     """The samples of a span."""
-    return np.asarray((wrench.t > span[0]) & (wrench.t < span[1]))
+    return (wrench.t > span[0]) & (wrench.t < span[1])
 
 
 def mean_of(wrench: Wrench, span: Sequence[float]) -> Array:

@@ -329,7 +329,7 @@ def dry_torque(joint: JointFriction, load: Array | float = 0.0) -> Array:
     coulomb = known.get("coulomb", 0.0) + known.get("stribeck", 0.0) + known.get("presliding", 0.0)
     # A sigmoid runs from one saturation to the other, which lie one amplitude apart.
     coulomb += 0.5 * abs(known.get("amplitude", 0.0)) + sum(joint.torques[:1])
-    return np.asarray(coulomb + known.get("load_coulomb", 0.0) * np.abs(load))
+    return coulomb + known.get("load_coulomb", 0.0) * np.abs(load)
 
 
 #: Standard deviation of a torque that rests anywhere within ±F_c, as a share of F_c, and of the

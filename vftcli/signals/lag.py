@@ -56,7 +56,7 @@ def fits(late: Array, early: Array, known: Mask, at: Indices) -> Array:
     else:
         there = known.astype(float)[None]
         power = sliding(late**2, there, at) * sliding(there, early**2, at)
-    return np.asarray(sliding(late, early, at) / np.sqrt(np.where(power > 0, power, np.inf)))
+    return sliding(late, early, at) / np.sqrt(np.where(power > 0, power, np.inf))
 
 
 def sliding(later: Array, earlier: Array, at: Indices) -> Array:
@@ -78,7 +78,7 @@ def sliding(later: Array, earlier: Array, at: Indices) -> Array:
             block = np.pad(block, ((0, 0), (min(-begin, size), 0)))[:, :size]
         spectrum = np.conj(np.fft.rfft(earlier[:, start : start + hop], size))
         total += spectrum * np.fft.rfft(block, size)
-    return np.asarray(np.fft.irfft(total, size)[:, : reach + 1])
+    return np.fft.irfft(total, size)[:, : reach + 1]
 
 
 def centred(signals: Array, known: Mask) -> Array:

@@ -109,7 +109,7 @@ def robust_sd(residual: Array) -> Array:
     """Standard deviation of each column by the median of its size. (n,)"""
     if not len(residual):
         return np.zeros(residual.shape[1:])
-    return np.asarray(SD_PER_MEDIAN * np.median(abs(residual), axis=0))
+    return SD_PER_MEDIAN * np.median(abs(residual), axis=0)
 
 
 def correlation_time(residual: Array) -> float:

@@ -26,12 +26,12 @@ NEAR_REST = 0.3  #: Stiction counts this long around a rest too, where no free p
 
 def slower(dq: Array, speed: float = REST) -> Mask:
     """Where joints are slower than a speed, not at just that [rad/s]. As `dq`"""
-    return np.asarray((dq < speed) & (dq > -speed))
+    return (dq < speed) & (dq > -speed)
 
 
 def faster(dq: Array, speed: float = MOVES) -> Mask:
     """Where joints are faster than a speed [rad/s]. As `dq`"""
-    return np.asarray((dq > speed) | (dq < -speed))
+    return (dq > speed) | (dq < -speed)
 
 
 def duration(t: Array, dq: Array) -> Array:

@@ -256,7 +256,7 @@ class Arm:
 
 def deviate(rng: np.random.Generator, size: float, shape: tuple[int, ...]) -> Array:
     """Normal deviates of standard deviation `size`, cut at two standard deviations."""
-    return np.asarray(size * rng.standard_normal(shape).clip(-2.0, 2.0))
+    return size * rng.standard_normal(shape).clip(-2.0, 2.0)
 
 
 def as_payload(spec: PayloadSpec, scale: float = 1.0) -> Payload:

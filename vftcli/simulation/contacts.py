@@ -218,7 +218,7 @@ def draw_walk(
     walk += spec.initial * rng.standard_normal(joints)
     late = np.arange(steps) * step >= spec.begin
     begun = walk - (walk[late.argmax()] if spec.begin > 0 else 0.0)
-    return np.asarray(begun * late[:, None])
+    return begun * late[:, None]
 
 
 class Touching:

@@ -248,7 +248,7 @@ class Plant:
             # The play operator's centre follows the positions.
             reach = true.presliding_length
             self.centre = np.minimum(np.maximum(self.centre, q_mid - reach), q_mid + reach)
-            given = np.asarray(true.presliding * (q_mid - self.centre) / reach)
+            given = true.presliding * (q_mid - self.centre) / reach
             smooth, slope = smooth + creeping + given, slope + steep
         torque = tau - bias - smooth
         if external is not None:

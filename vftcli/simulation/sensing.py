@@ -88,7 +88,7 @@ def sample_run(arm: Arm) -> Samples:
     span = max(interval if spec.torque == "average" else 0.0, step)
     begin, stop = np.maximum(time - span, 0.0), np.maximum(time, step)
     grown = resample_columns(stop, grid, total) - resample_columns(begin, grid, total)
-    tau = np.asarray(grown / (stop - begin)[:, None])
+    tau = grown / (stop - begin)[:, None]
     return Samples(time=time, stamp=stamp, tau=tau, **signals)
 
 

@@ -91,7 +91,7 @@ def from_base(frame: str, flange: Array, mounting: Mounting) -> Array:
     X[:, :3, :3] = X[:, 3:, 3:] = turned
     if frame == "flange":
         return X
-    return np.asarray(adjoint(inverse(frame_pose(frame, mounting))) @ X)
+    return adjoint(inverse(frame_pose(frame, mounting))) @ X
 
 
 def checked_pose(rotation: Array, translation: Array, what: str) -> Pose:

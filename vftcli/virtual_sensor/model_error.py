@@ -249,7 +249,7 @@ def without_reversals(piece: Blocks, joints: Mask) -> Blocks:
 def periodogram(d: Array, seconds: float) -> Array:
     """Two-sided periodogram at the positive frequencies. (N//2, n) [(N·m)²/Hz]"""
     spectrum = np.fft.rfft(d, axis=0)[1:]
-    return np.asarray((spectrum.real**2 + spectrum.imag**2) * (seconds / len(d)))
+    return (spectrum.real**2 + spectrum.imag**2) * (seconds / len(d))
 
 
 def fit_spectrum(f: Array, P: Array, seconds: float, longest: float) -> tuple[float, float, float]:

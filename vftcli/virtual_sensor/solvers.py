@@ -125,7 +125,7 @@ def null_space(parts: Decomposition, tau: Array) -> Array:
     # U is orthonormal, so V = J_sᵀU/σ holds the row space; λ below 1e-12 is rounding.
     tall = parts.scaled.swapaxes(1, 2) @ parts.U
     share = np.where(parts.squares > 1e-12, 1.0 / np.maximum(parts.squares, 1e-12), 0.0)
-    return np.asarray(tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau)))
+    return tau - tall @ (share[:, :, None] * (tall.swapaxes(1, 2) @ tau))
 
 
 class FlangeWrench(NamedTuple):
