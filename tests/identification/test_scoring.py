@@ -13,8 +13,9 @@ from vftcli.identification.fitting import (
     repeated_share,
     score_remarks,
 )
-from vftcli.identification.training import apparent_load, root_mean_square
+from vftcli.identification.training import apparent_load
 from vftcli.robots import Payload, load_robot
+from vftcli.signals.arrays import root_mean_squares
 
 UR5 = load_robot("ur5")
 
@@ -31,7 +32,7 @@ def trace(motion, residual, role="held-out"):
 
 
 def test_rms_is_the_root_of_the_mean_square():
-    np.testing.assert_allclose(root_mean_square(np.array([[3.0, 1], [-4.0, 1]])), [3.5355339, 1.0])
+    np.testing.assert_allclose(root_mean_squares(np.array([[3.0, 1], [-4.0, 1]])), [3.5355339, 1.0])
 
 
 def test_rigid_torque_is_pinocchios_without_rotors(motion):

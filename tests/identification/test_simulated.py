@@ -8,12 +8,12 @@ from vftcli.identification.links import is_physical
 from vftcli.identification.training import (
     gravity_torque,
     prepare,
-    root_mean_square,
 )
 from vftcli.robots import load_robot
 from vftcli.robots.friction import friction_torque
 from vftcli.robots.kernels import chain_parameters
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import root_mean_squares
 from vftcli.simulation import load_scenario, simulate
 from vftcli.simulation import prepare as build
 
@@ -94,9 +94,9 @@ def test_another_trajectory_is_predicted_to_the_noise_floor(train, other, truth)
     found = identify([train], load_robot("ur5"), Task(method="base"), [other])
     trace = next(t for t in found.traces if t.role == "held-out")
     motion = prepare(other, truth)
-    floor = root_mean_square(motion.tau - motion.with_robot(truth).predicted)
+    floor = root_mean_squares(motion.tau - motion.with_robot(truth).predicted)
     # the floor is what the true arm itself leaves: current noise and stiction at reversals
-    assert root_mean_square(trace.residual).mean() <= 1.1 * floor.mean()
+    assert root_mean_squares(trace.residual).mean() <= 1.1 * floor.mean()
     assert is_physical(chain_parameters(found.robot.chain))
     assert np.all(found.robot.chain.rotor_inertia > 0)
 

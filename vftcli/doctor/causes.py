@@ -20,6 +20,7 @@ from vftcli.doctor.windows import Case, Terms, Windows, size_of, solve, spread, 
 from vftcli.robots import Robot
 from vftcli.robots.friction import steady_torque
 from vftcli.robots.terms import effort_name
+from vftcli.signals.arrays import root_mean_squares
 from vftcli.signals.recording import Recording
 
 #: Least range of gravity's torque that shows the kind of an effort. [N·m]
@@ -284,7 +285,7 @@ def scaled(case: Case) -> Iterator[Cause]:
 def swapped(case: Case) -> Iterator[Cause]:
     """Two joints with all signals exchanged: each pair evaluates the model."""
     far = case.by_joint > SUSPECT
-    gravity = np.sqrt(np.mean(case.gravity**2, axis=0))
+    gravity = root_mean_squares(case.gravity)
     if not np.any(far & (gravity > CARRIES * case.effort_sizes)):
         return  # gravity loads none of the joints with a large misfit
     few = spread(len(case.given), FEW)
@@ -336,7 +337,7 @@ def is_modelled(case: Case, robot: Robot) -> bool:
     n = len(case.constant)
     if len(robot.friction) != n:
         return False
-    typical = np.sqrt(np.mean(case.windows.motion[:, 1] ** 2, axis=0))
+    typical = root_mean_squares(case.windows.motion[:, 1])
     pairs = zip(robot.friction, typical[:, None], strict=True)
     stated = abs(np.concatenate([steady_torque(joint, speed) for joint, speed in pairs]))
     moving = (case.windows.ways.min(axis=0) >= FORTH_AND_BACK) & (stated > 0)

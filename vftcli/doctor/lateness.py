@@ -18,7 +18,7 @@ from vftcli.doctor.signals import effort_of
 from vftcli.doctor.windows import spread, trapezoids
 from vftcli.robots import Robot
 from vftcli.robots.kernels import momentum_terms
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices, Mask, root_mean_squares
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, on_joints, warning
 from vftcli.signals.rest import MOVES
@@ -195,7 +195,7 @@ def window_starts(t: Array, length: int, earliest: int, latest: int) -> Indices:
 
 def rest_of(model: Array, effort: Array) -> Array:
     """Rest (L,) of an effort (W, L) at every lag by its parts (W, 4), of better samples."""
-    size = np.sqrt(np.mean(model**2, axis=0))
+    size = root_mean_squares(model)
     columns = model / np.where(size > 0, size, 1.0)
     keep = np.ones(len(columns), bool)
     for _ in range(2):

@@ -17,7 +17,7 @@ import numpy as np
 from vftcli.robots import Robot
 from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import load_regressor, momentum_terms
-from vftcli.signals.arrays import Array, Indices, Mask
+from vftcli.signals.arrays import Array, Indices, Mask, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import inverse_of
 from vftcli.signals.recording import Recording
 
@@ -60,7 +60,7 @@ class RobustFit(NamedTuple):
     @property
     def by_joint(self) -> Array:
         """Root mean square of each joint's rest. (n,) [N·m]"""
-        return np.asarray(np.sqrt(np.mean(self.rest[self.kept] ** 2, axis=0)))
+        return root_mean_squares(self.rest[self.kept])
 
 
 def solve(target: Array, *by: Terms) -> RobustFit:
@@ -282,7 +282,7 @@ class Case:
     @cached_property
     def effort_sizes(self) -> Array:
         """Root mean square of each joint's effort, contact set aside. (n,) [N·m]"""
-        sizes = np.sqrt(np.mean(self.given[self.bare.kept] ** 2, axis=0))
+        sizes = root_mean_squares(self.given[self.bare.kept])
         return np.asarray(np.maximum(sizes, 1e-9 * self.size))
 
     @cached_property
@@ -312,4 +312,4 @@ class Case:
 
 def size_of(given: Array) -> float:
     """Root mean square of a torque. [N·m]"""
-    return float(np.sqrt(np.mean(given**2)))
+    return root_mean_square(given)

@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from vftcli.evaluation.intervals import Resampled, block_lengths, interval, p_value, resample
-from vftcli.signals.arrays import Array, Mask, number_array
+from vftcli.signals.arrays import Array, Mask, number_array, root_mean_square
 from vftcli.signals.errors import ParameterError, ShapeError
 from vftcli.signals.external_torque import COVERS, ExternalTorque
 from vftcli.signals.lag import lags_of_each
@@ -226,7 +226,7 @@ def rows(recording: str, reference: str, joint: Scored) -> list[dict[str, object
                 "p_vs_best": 1.0 if k == best else p_value(paired[:, k], paired[:, best]),
                 "reference_trusted": share >= TRUSTED_SHARE,
                 "at_rest": 1.0 - share,
-                "rmse_moving_Nm": number(np.sqrt(np.mean(moving**2))) if len(moving) else None,
+                "rmse_moving_Nm": number(root_mean_square(moving)) if len(moving) else None,
                 "coverage_95": number(covered),
                 "missing": joint.missing[k] / len(x),
             }

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 
-from vftcli.signals.arrays import Array, Indices
+from vftcli.signals.arrays import Array, Indices, root_mean_squares
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import sliding
 
@@ -146,7 +146,7 @@ def paired_significance(
             continue
         squares = errors**2
         draws = np.sqrt(resample(squares, int(block_lengths(squares).max())).draws)
-        observed = np.sqrt(np.mean(errors**2, axis=0))
+        observed = root_mean_squares(errors)
         for a, b in combinations(range(len(estimates)), 2):
             difference = draws[:, a] - draws[:, b]
             low, high = np.quantile(difference, [0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL])

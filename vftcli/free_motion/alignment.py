@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, root_mean_square
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.lag import lag_fit
 from vftcli.signals.least_squares import robust_sd
@@ -217,7 +217,7 @@ def distance_moving(recording: Recording, free: Recording, shift: float, rate: f
     """
     distance = np.linalg.norm(apart(rate * recording.t + shift, recording.q, free), axis=1)
     speed = np.linalg.norm(np.gradient(recording.q, recording.t, axis=0), axis=1)
-    used = np.isfinite(distance) & (speed >= 0.5 * np.sqrt(np.mean(speed**2)))
+    used = np.isfinite(distance) & (speed >= 0.5 * root_mean_square(speed))
     if np.count_nonzero(used) < 8:
         return float("inf")
     return float(np.quantile(distance[used], 0.25))
@@ -269,5 +269,5 @@ def aligned_at(
     if within is not None:
         overlap &= within
     some = np.count_nonzero(overlap) >= 2
-    deviation = float(np.sqrt(np.mean(distance[overlap] ** 2))) if some else float("inf")
+    deviation = root_mean_square(distance[overlap]) if some else float("inf")
     return Alignment(shift, rate, deviation, overlap)

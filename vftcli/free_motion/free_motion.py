@@ -31,7 +31,15 @@ from vftcli.robots.chain import Chain
 from vftcli.robots.kernels import load_regressor, load_wrench
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import gain_sd
-from vftcli.signals.arrays import Array, Indices, Mask, handed_over, seal
+from vftcli.signals.arrays import (
+    Array,
+    Indices,
+    Mask,
+    handed_over,
+    root_mean_square,
+    root_mean_squares,
+    seal,
+)
 from vftcli.signals.errors import ClockError, ParameterError, ReferenceTorqueError
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.option import interval_text
@@ -269,7 +277,7 @@ def free_load(pieces: Sequence[RunSamples]) -> FreeLoad | None:
     weights, sd, loaded = weigh(d, A, prior)
     _, _, bare = weigh(d, A[:, :, 4:], prior[4:])
     moved = bare > 0.0  # a simulation without noise leaves nothing on a joint at rest
-    share = float(np.sqrt(np.mean((loaded[moved] / bare[moved]) ** 2)))
+    share = root_mean_square(loaded[moved] / bare[moved])
     mass = float(weights[0])
     if mass < max(LEAST, SURE * float(sd[0])) or share > PARTLY:
         return None
@@ -319,13 +327,13 @@ def weigh(d: Array, A: Array, prior: Array) -> tuple[Array, Array, Array]:
     by what the fit leaves of it; the prior (m,) is of the weights about zero.
     """
     together = max(1.0, MEMORY * RATE)
-    spread = np.sqrt(np.mean(d**2, axis=0)) + 1e-6
+    spread = root_mean_squares(d) + 1e-6
     for _ in range(PASSES):
         scaled = A / spread[:, None]
         gram = np.einsum("sjm,sjk->mk", scaled, scaled) / together + np.diag(prior**-2)
         right = np.einsum("sjm,sj->m", scaled, d / spread) / together
         covariance = np.linalg.inv(gram)
         weights = covariance @ right
-        left = np.sqrt(np.mean((d - A @ weights) ** 2, axis=0))
+        left = root_mean_squares(d - A @ weights)
         spread = np.maximum(left, 1e-3 * left.max() + 1e-6)
     return weights, np.sqrt(np.diag(covariance)), left

@@ -21,7 +21,7 @@ from vftcli.free_motion.free_motion import FreeMotion, FreeRun
 from vftcli.free_motion.paired_runs import Pairing, pair_with_run
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, root_mean_squares
 from vftcli.signals.errors import ReferenceTorqueError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.recording import Recording
@@ -180,7 +180,7 @@ def measured_scale(
         both = {"found": pair, "commanded": pair}
         spread = next(differences(first.free, both, (chosen.rung,), (chosen.cutoff,)))
         ratios.append(error_ratio(spread, spread.error.known))
-    return np.asarray(np.sqrt(np.mean(np.square(ratios), axis=0)))
+    return root_mean_squares(np.array(ratios))
 
 
 def error_ratio(found: Difference, where: Mask) -> Array:

@@ -27,14 +27,13 @@ from vftcli.identification.training import (
     apparent_load,
     prepare,
     prepare_training,
-    root_mean_square,
     settings_record,
 )
 from vftcli.robots.friction import SMOOTHING
 from vftcli.robots.profile import robot_document
 from vftcli.robots.robot import Robot
 from vftcli.robots.terms import uses_current
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, root_mean_square, root_mean_squares
 from vftcli.signals.least_squares import fit_column
 from vftcli.signals.recording import Recording, refuse_repeated_logs
 from vftcli.signals.remarks import Remark, Where, caution, fact
@@ -87,7 +86,7 @@ class Trace(NamedTuple):
     @property
     def rms(self) -> Array:
         """RMS of the residual in each joint. (n,) [N·m]"""
-        return root_mean_square(self.residual)
+        return root_mean_squares(self.residual)
 
     def rows(self, index: int) -> list[tuple[str, int, str, str, int, float, int]]:
         """Rows of `RESIDUALS`, this log being the one of this index."""
@@ -122,7 +121,7 @@ def score(log: Recording, role: str, profile: Robot, robot: Robot, cutoff: float
     motion = prepare(log, profile, cutoff)
     if motion.samples < 2:
         return Trace(motion, role, motion.tau, motion.tau, np.zeros(motion.tau.shape[1]))
-    before = root_mean_square(motion.tau - motion.predicted)
+    before = root_mean_squares(motion.tau - motion.predicted)
     old, new, measured = profile.torque_constant, robot.torque_constant, motion.tau
     # What was made from currents with the old constants is made with the new.
     if old is not None and new is not None and uses_current(log, profile):
@@ -195,7 +194,7 @@ def joint_remark(trace: Trace, j: int, trained: float) -> Remark:
     explained = 1.0 - left / max(float(np.mean(residual[used, j] ** 2)), 1e-12)
     if explained < EXPLAINS:
         return caution("larger-residual", where, **values)
-    speed = float(np.sqrt(np.mean(motion.dq[used, j] ** 2)))
+    speed = root_mean_square(motion.dq[used, j])
     more = float(fit.values[0] + fit.values[1] * speed)
     values |= {"friction_Nm": abs(more), "speed_rad_s": speed, "share_percent": 100.0 * explained}
     return caution("more-friction" if more > 0 else "less-friction", where, **values)

@@ -12,10 +12,10 @@ from vftcli.identification.shapes import (
     Shape,
     bent,
 )
-from vftcli.identification.training import PreparedLog, Training, root_mean_square
+from vftcli.identification.training import PreparedLog, Training
 from vftcli.robots.friction import SMOOTHING, falling_speed
 from vftcli.robots.robot import JointFriction
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, root_mean_square, root_mean_squares
 from vftcli.signals.filters import low_pass
 from vftcli.signals.least_squares import ColumnFit, cross_validated, fit_column, left_out
 from vftcli.signals.rest import MOVES
@@ -247,7 +247,7 @@ def choose_presliding(joints: Sequence[JointData]) -> PreslidingScore:
         ]
         none = min(errors[: len(rivals)])
         ratios[i] = np.array([none, *errors[len(rivals) :]]) / max(none, 1e-300)
-    whole = root_mean_square(ratios)
+    whole = root_mean_squares(ratios)
     near = np.flatnonzero(whole <= LENGTH_MARGIN * whole.min())
     return PreslidingScore(lengths[near[0]], dict(zip(lengths, whole.tolist(), strict=True)))
 
@@ -332,7 +332,7 @@ def bounded_shape(shape: Shape, data: JointData) -> tuple[Shape, bool]:
         power = float(np.sum(data.weights * fit.residual**2))
         own = [k for k, term in enumerate(one.terms) if term in BOUNDED]
         if not without:
-            push = float(np.sqrt(np.mean((data.columns(one)[:, own] @ fit.values[own]) ** 2)))
+            push = root_mean_square(data.columns(one)[:, own] @ fit.values[own])
             both, free = bool(np.all(fit.values[own] < 0.0)), power
         if np.all(fit.values[own] >= 0.0):
             powers[one] = power

@@ -14,7 +14,6 @@ from vftcli.identification.training import (
     gravity_torque,
     load_columns,
     prepare,
-    root_mean_square,
 )
 from vftcli.readers.table import listed
 from vftcli.robots.chain import Payload
@@ -23,7 +22,7 @@ from vftcli.robots.kernels import LINK, chain_parameters, momentum_terms, torque
 from vftcli.robots.robot import Robot
 from vftcli.robots.run import Run, RunSamples
 from vftcli.robots.terms import drive_torque, gain_sd
-from vftcli.signals.arrays import Array, Indices, handed_over
+from vftcli.signals.arrays import Array, Indices, handed_over, root_mean_square, root_mean_squares
 from vftcli.signals.errors import IdentificationError
 from vftcli.signals.filters import zero_phase
 from vftcli.signals.least_squares import folds, inverse_of, solve
@@ -156,7 +155,7 @@ def fit_all_joints(A: Array, y: Array, usable: Array) -> JointsFit:
         w = np.sqrt(usable) / np.maximum(scale, 1e-9)
         x = solve((A * w[:, :, None]).reshape(-1, A.shape[2]), (y * w).ravel())
         left = y - np.einsum("knp,p->kn", A, x)
-        scale = root_mean_square(left)
+        scale = root_mean_squares(left)
     w = np.sqrt(usable) / np.maximum(scale, 1e-9)
     return JointsFit(x, left, w, A * w[:, :, None])
 
@@ -186,7 +185,7 @@ def payload_from_pair(first: Recording, second: Recording, robot: Robot) -> Load
     sd = np.sqrt(np.diag(fit.motion_covariance(extra, gain_sd(loaded, robot))))[:STATIC]
     values = {"loaded": loaded.name, "free": free.name, "distance_mrad": 1e3 * distance}
     origin = Remark("load-from-pair", values={**values, "shift_s": round(-shift, 3) + 0.0})
-    x, left = fit.x[:STATIC], root_mean_square(fit.left)
+    x, left = fit.x[:STATIC], root_mean_squares(fit.left)
     return load_at_flange(x, sd, left, robot, (loaded,), origin)
 
 
@@ -216,7 +215,7 @@ def find_time_shift(motion: PreparedLog, other: Recording) -> tuple[float, float
         if np.count_nonzero(inside) < 0.5 * len(at):
             return float("inf")
         there = resample_columns(at[inside], other.t, other.q)
-        return float(np.sqrt(np.mean((there - motion.q[inside]) ** 2)))
+        return root_mean_square(there - motion.q[inside])
 
     low, high = other.t[0] - motion.t[-1], other.t[-1] - motion.t[0]
     # The distance has many minima: try the whole range, then refine.
@@ -350,7 +349,7 @@ def weigh_motion(runs: Sequence[Run], carried: Array) -> tuple[Array, Array, Arr
     gain = max(gain_sd(run.recording, robot) for run in runs)
     covariance = fit.motion_covariance(weight, gain)[:STATIC, :STATIC]
     power = np.sum(usable * fit.left**2) / max(np.sum(usable * bare.left**2), 1e-12)
-    return x, covariance, root_mean_square(fit.left), float(np.sqrt(power))
+    return x, covariance, root_mean_squares(fit.left), float(np.sqrt(power))
 
 
 def carrying(run: Run, x: Array) -> Run:

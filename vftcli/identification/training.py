@@ -222,12 +222,6 @@ def apparent_load(log: PreparedLog, residual: Array) -> tuple[float, float]:
     return float(x[0]), 1.0 - float(np.sum((y - A @ x) ** 2) / max(np.sum(y**2), 1e-12))
 
 
-def root_mean_square(x: Array) -> Array:
-    """Root mean square of each column of x (M, n), in its unit. (n,)"""
-    value: Array = np.sqrt(np.mean(x**2, axis=0))
-    return value
-
-
 class ParameterColumns(NamedTuple):
     """Order of all unknowns in one vector: inertial parameters, rotor inertias, friction."""
 

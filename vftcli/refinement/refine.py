@@ -29,7 +29,7 @@ from vftcli.refinement.choice import AUTOMATIC
 from vftcli.refinement.model_error import error_columns, friction_alone, smooth_motion
 from vftcli.refinement.whole_log import stride_of
 from vftcli.robots.friction import HELD, ONE_STOP
-from vftcli.signals.arrays import Array, Mask, handed_over
+from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares
 from vftcli.signals.errors import ClockError
 from vftcli.signals.external_torque import DynamicsTerms, ExternalTorque
 from vftcli.signals.remarks import Remark, Where, caution, fact, on_joints
@@ -217,7 +217,7 @@ def expected_gap(
     errors = {}
     for name in (BEST, *(o.name for o in paper)):
         sd = known[name].error_sd
-        errors[name] = np.nan if sd is None else float(np.sqrt(np.mean(sd**2, axis=0)).mean())
+        errors[name] = np.nan if sd is None else float(root_mean_squares(sd).mean())
     return gap_remark(EXPECTED, errors, {o.name: o.tuning(step, n).delay for o in paper})
 
 

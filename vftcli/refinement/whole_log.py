@@ -31,7 +31,7 @@ from vftcli.refinement.robust_fit import (
     slow_loads,
 )
 from vftcli.robots.run import Run
-from vftcli.signals.arrays import Array, Mask, handed_over, seal, seal_mask
+from vftcli.signals.arrays import Array, Mask, handed_over, root_mean_squares, seal, seal_mask
 from vftcli.signals.external_torque import DynamicsTerms
 from vftcli.signals.filters import derivative, zero_phase
 from vftcli.signals.remarks import Remark, caution, fact, on_joints
@@ -217,7 +217,7 @@ def bias_of(
         sd=handed_over(np.hypot(spread, undecided)),
         free=free,
         load=load,
-        remarks=remarks_of(found, np.sqrt(np.mean(bias**2, axis=0)), float(fit.free.mean())),
+        remarks=remarks_of(found, root_mean_squares(bias), float(fit.free.mean())),
         error=error,
     )
 

@@ -136,6 +136,16 @@ def median(values: Array) -> float:
     return 0.5 * float(lower + upper)
 
 
+def root_mean_square(x: Array) -> float:
+    """Root mean square of all values, in their unit."""
+    return float(np.sqrt(np.mean(x**2)))
+
+
+def root_mean_squares(x: Array) -> Array:
+    """Root mean square of each column of x (T, n), in its unit. (n,)"""
+    return np.asarray(np.sqrt(np.mean(x**2, axis=0)))
+
+
 EVEN = 1e-6  #: Largest share by which steps of an even clock, stamps of nine digits, differ.
 
 

@@ -14,6 +14,7 @@ from vftcli.signals.arrays import (
     check_shape,
     empty_series,
     handed_over,
+    root_mean_square,
     seal,
     seal_mask,
 )
@@ -142,8 +143,8 @@ class ExternalTorque(TimeSeries):
             sd = None if self.error_sd is None else self.error_sd[known, j]
             sizes: tuple[float | None, float | None] = (None, None)
             if len(tau):
-                sizes = float(np.sqrt(np.mean(tau**2))), float(abs(tau).max())
-            band = None if sd is None or not len(sd) else COVERS * float(np.sqrt(np.mean(sd**2)))
+                sizes = root_mean_square(tau), float(abs(tau).max())
+            band = None if sd is None or not len(sd) else COVERS * root_mean_square(sd)
             yield f"J{j + 1}", *sizes, band, f"{known.mean():.0%}"
 
     def columns(self, rows: slice = ALL) -> Iterator[tuple[str, Array]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from vftcli.robots.chain import Chain, link_poses
 from vftcli.robots.robot import Robot
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, root_mean_square
 from vftcli.signals.errors import ParameterError
 from vftcli.signals.external_torque import ExternalTorque
 from vftcli.signals.lag import bridge_unknown, time_offset
@@ -63,7 +63,7 @@ def fit_pose(flange: Array, sensor: Array) -> PoseFit:
     variance = float(np.mean(left**2))
     return PoseFit(
         pose=Pose(R, p),
-        force_rms=float(np.sqrt(np.mean((ours[:, :3] - theirs[:, :3] @ R.T) ** 2))),
+        force_rms=root_mean_square(ours[:, :3] - theirs[:, :3] @ R.T),
         moment_rms=float(np.sqrt(variance)),
         position_sd=np.sqrt(variance * np.diag(np.linalg.pinv(lever.T @ lever))),
     )
@@ -144,7 +144,7 @@ def vendor_remarks(recording: Recording, ours: Wrench, chain: Chain) -> list[Rem
     empty = ~theirs.any(axis=1)
     share, remarks = float(empty.mean()), []
     norm = np.linalg.norm(ours.force[empty & ~ours.hidden], axis=1)
-    force = float(np.sqrt(np.mean(norm**2))) if len(norm) else float("nan")
+    force = root_mean_square(norm) if len(norm) else float("nan")
     if share == 1.0:
         return [caution("log-wrench-all-zero", force_N=force)]
     if share > 0:
