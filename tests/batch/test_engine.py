@@ -51,7 +51,8 @@ def test_a_failure_is_one_line_at_the_stage_that_was_begun() -> None:
 
 def test_the_stage_of_one_task_is_not_that_of_the_next() -> None:
     begin("writing")
-    assert perform(math.sqrt, -1.0)[1] == Failure("starting", "ValueError", "math domain error")
+    failure = perform(math.sqrt, -1.0).failure
+    assert failure == Failure("starting", "ValueError", "math domain error")
 
 
 def test_groups_are_taken_only_as_workers_get_free() -> None:

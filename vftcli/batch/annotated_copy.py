@@ -241,29 +241,21 @@ def write_file(dataset: Dataset, columns: list[ForceColumn], suffix: str, task: 
     rows: dict[str, Any] = {}
     for path in filter(Path.is_file, task.rows):
         rows |= stored_rows(path)
-    forces = {
-        number: filled(number, rows, columns, suffix, dataset.frames(task.file, number))
-        for number in task.file.episodes
-    }
+    forces: dict[int, dict[str, Single]] = {}
+    for number in task.file.episodes:
+        frames, own = dataset.frames(task.file, number), dict[str, Single]()
+        for column in columns:
+            name = column.name.removesuffix(suffix)
+            of = name.removesuffix("_valid")
+            values = rows.get(f"{number}/{of}")
+            if values is None:
+                values = np.full((frames, column.width), np.nan, np.float32)
+            if of != name:  # marks where there is a value
+                values = np.isfinite(values).all(axis=1, keepdims=True).astype(np.float32)
+            own[column.name] = np.nan_to_num(values, nan=0.0)
+        forces[number] = own
     with finished(task.target) as temporary:
         dataset.write(task.file, columns, forces, temporary)
     kept = forces.items() if dataset.has_statistics else ()
     statistics = {n: {name: statistics_of(x) for name, x in own.items()} for n, own in kept}
     return {"place": task.file.place.as_posix(), "statistics": statistics}
-
-
-def filled(
-    number: int, rows: Mapping[str, Any], columns: list[ForceColumn], suffix: str, frames: int
-) -> dict[str, Single]:
-    """An episode's columns with 0 for no value, and columns that mark these."""
-    found: dict[str, Single] = {}
-    for column in columns:
-        name = column.name.removesuffix(suffix)
-        of = name.removesuffix("_valid")
-        values = rows.get(f"{number}/{of}")
-        if values is None:
-            values = np.full((frames, column.width), np.nan, np.float32)
-        if of != name:
-            values = np.isfinite(values).all(axis=1, keepdims=True).astype(np.float32)
-        found[column.name] = np.nan_to_num(values, nan=0.0)
-    return found

@@ -101,7 +101,7 @@ def begin(stage: str) -> None:
     _stage.set(stage)
 
 
-def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:
+def perform(work: Work[Task], task: Task) -> Outcome[Task]:
     """Do the work on one task: what it returned, why it failed or None, what it took."""
     begin("starting")
     started, wall, cpu = time.time(), time.monotonic(), time.thread_time()
@@ -112,7 +112,7 @@ def perform(work: Work[Task], task: Task) -> tuple[Any, Failure | None, Effort]:
         failure = failure_of(error)
     seconds, cpu_seconds = time.monotonic() - wall, time.thread_time() - cpu
     place = f"{socket.gethostname()}:{os.getpid()}"
-    return value, failure, Effort(started, seconds, cpu_seconds, place)
+    return Outcome(task, value, failure, Effort(started, seconds, cpu_seconds, place))
 
 
 def failure_of(error: BaseException) -> Failure:
@@ -145,7 +145,7 @@ def run_tasks(
         # Little work ends sooner here than workers start.
         for group in rest:
             for task in group:
-                yield Outcome(task, *perform(work, task))
+                yield perform(work, task)
             if not choice.in_process and time.monotonic() - begun > LITTLE:
                 break
     if left := list(islice(rest, 1)):
@@ -294,7 +294,7 @@ def outcomes(
                 if ended is None:
                     sent[future] = group  # its worker died with the result: it is done again
                 elif not isinstance(ended, Failure):
-                    yield from (Outcome(task, *x) for task, x in zip(group, ended, strict=True))
+                    yield from ended
                 elif len(group) > 1 or standing:
                     again += [(task,) for task in group]
                 else:  # only one of a single task can have ended its worker
@@ -304,9 +304,7 @@ def outcomes(
             client.cancel(list(sent))
 
 
-def perform_there(
-    work: Work[Task], tasks: Sequence[Task]
-) -> list[tuple[Any, Failure | None, Effort]]:
+def perform_there(work: Work[Task], tasks: Sequence[Task]) -> list[Outcome[Task]]:
     """Do the work on each task of a group; this is what runs in a worker."""
     settle()
     return [perform(work, task) for task in tasks]

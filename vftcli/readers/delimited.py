@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from vftcli.readers.opening import LogFile
-from vftcli.readers.table import Block, Column, Names, Places, Table
+from vftcli.readers.table import Blocks, Column, Names, Places, Table
 from vftcli.signals.errors import LogError
 from vftcli.signals.remarks import fact
 
@@ -101,7 +101,7 @@ class TextTable(Table):
         """Whether a cell holds a number as this table writes them."""
         return is_number(cell, decimal_comma=self.decimal_comma)
 
-    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Parse some columns; a clock of long whole numbers or dates comes back as integers."""
         kinds = dict.fromkeys(columns, "Float64")
         if clock is not None:

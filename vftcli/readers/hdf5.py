@@ -29,7 +29,7 @@ from vftcli.readers.opening import (
 )
 from vftcli.readers.reader import ARMS, Episodes, RawLog, ReadChoice, arm_of
 from vftcli.readers.reading import FORMATS, LogFormat
-from vftcli.readers.table import Block, Names, Places, listed
+from vftcli.readers.table import Blocks, Names, Places, listed
 from vftcli.readers.tables import ArrayTable, from_table, read_known_columns
 from vftcli.signals.errors import LogError, UnknownFormatError
 from vftcli.signals.packages import needed
@@ -110,7 +110,7 @@ class Hdf5Table(ArrayTable):
         below = {n.removeprefix(group): d for n, d in self.columns.items() if n.startswith(group)}
         return Hdf5Table(self.path, {name: self.columns[name] for name in also} | below)
 
-    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Read datasets as float64; whole stamps stay whole."""
         self.check_size(columns)
         return super().blocks(columns, clock)

@@ -211,7 +211,7 @@ def text_of(path: Path) -> str:
     if path.stat().st_size > DESCRIPTION_BYTES:
         raise LogError(f"{path}: larger than {DESCRIPTION_BYTES >> 20} MiB; no description is.")
     try:
-        return path.read_text(encoding="utf-8")
+        return path.read_text("utf-8")
     except UnicodeDecodeError:
         raise LogError(f"{path}: not text in UTF-8; it is damaged") from None
 

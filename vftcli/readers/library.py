@@ -228,7 +228,7 @@ def matching(place: Path) -> list[Path]:
 def files_written(folder: Path) -> set[str]:
     """Names of the files in a folder that a command of ours wrote there, by its record."""
     try:
-        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
+        record = json.loads((folder / RECORD).read_text("utf-8"))
         return {RECORD, *map(str, record["files"])} if "vftcli" in record["versions"] else set()
     except (OSError, ValueError, LookupError, TypeError):
         return set()

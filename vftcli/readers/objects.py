@@ -329,8 +329,9 @@ def load_arrays_only(file: LogFile) -> Data:
         pickle.UnpicklingError, EOFError, ValueError, TypeError, KeyError, IndexError,
         AttributeError, OverflowError, MemoryError, SyntaxError,
     ) as error:  # fmt: skip
-        reason = str(error).split("\n")[0][:80]
-        raise LogError(f"{file.path}: a damaged pickle ({reason}). {remedy}") from None
+        raise LogError(
+            f"{file.path}: a damaged pickle ({reason_of(error)[:80]}). {remedy}"
+        ) from None
 
 
 def _check_opcodes(content: bytes) -> None:

@@ -19,7 +19,7 @@ import numpy as np
 
 from vftcli.readers.opening import LogFile, check_unpacked, naming_damage
 from vftcli.readers.reader import Episodes, RawLog, ReadChoice
-from vftcli.readers.table import Block, Column, Places, Table
+from vftcli.readers.table import Blocks, Column, Places, Table
 from vftcli.readers.tables import from_table
 from vftcli.signals.arrays import Indices
 from vftcli.signals.errors import LogError
@@ -93,7 +93,7 @@ class ColumnarTable(Table):
                 found[k] = len(first or ())
             return found
 
-    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Decode some columns."""
         self._check(columns)
         with guarded(self.path):

@@ -245,9 +245,7 @@ def assemble(t: ArrayLike, *, name: str = "arrays", **signals: ArrayLike) -> Rec
                 f"{key} of {name} has shape {value.shape}; expected ({np.size(t)}, n), a row for "
                 "each stamp of t"
             )
-    raw = RawLog(
-        stamps=np.array(number_array(t, "t", name)), tick=1.0, clock="as given", signals=arrays
-    )
+    raw = RawLog(stamps=np.array(number_array(t, "t", name)), clock="as given", signals=arrays)
     return cleaned(raw, Path(name), "arrays")
 
 

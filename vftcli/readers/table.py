@@ -26,6 +26,7 @@ Column = NDArray[Any]  #: One column as it is stored: (T,) numbers, or (T, k) fo
 Columns = dict[str, Column]  #: Name → column.
 Block = dict[int, Column]  #: Place in the table → column, or some rows of it.
 Places = Sequence[int]  #: Places of columns in the table.
+Blocks = Iterator[Block]  #: All rows, some thousand at a time.
 Notes = tuple[Remark, ...]  #: What is to be said of a log.
 Signals = dict[str, Array]  #: Signal → a row a sample. (T, k)
 Names = tuple[str, ...]  #: Names of columns, fields or joints, in their order.
@@ -45,7 +46,7 @@ class Table(ABC):
         return {}
 
     @abstractmethod
-    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """Columns as float64, some thousand rows at a time; the clock's may stay whole numbers."""
 
     def load(self, columns: Places, clock: int | None = None) -> Block:

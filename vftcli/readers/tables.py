@@ -24,6 +24,7 @@ from vftcli.readers.reader import RawLog, ReadChoice
 from vftcli.readers.reading import FORMATS, LogFormat
 from vftcli.readers.table import (
     Block,
+    Blocks,
     Cells,
     Column,
     Notes,
@@ -171,7 +172,7 @@ class ArrayTable(Table):
         arrays = enumerate(self.columns.values())
         return {k: array.shape[1] for k, array in arrays if array.ndim == 2}
 
-    def blocks(self, columns: Places, clock: int | None) -> Iterator[Block]:
+    def blocks(self, columns: Places, clock: int | None) -> Blocks:
         """All rows of some columns; whole stamps stay whole."""
         each = list(self.columns.items())
         if len({len(each[c][1]) for c in columns}) > 1:

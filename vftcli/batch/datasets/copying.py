@@ -62,9 +62,9 @@ def unfinished(copy: Path, key: str) -> Iterator[Path]:
         work.mkdir(parents=True, exist_ok=True)
         with held(work, wait=False):
             state = work / "key"
-            if not state.is_file() or state.read_text(encoding="utf-8") != key:
+            if not state.is_file() or state.read_text("utf-8") != key:
                 emptied(partial, keep=work)
-                state.write_text(key, encoding="utf-8")
+                state.write_text(key, "utf-8")
             try:
                 yield partial
             except BaseException:

@@ -179,7 +179,7 @@ def finish_lines(text: str, columns: ForceColumns, statistics: OfEpisodes, targe
             own = statistics[int(told[EPISODE])][column.name]
             told["stats"][PREFIX + column.name] = plain(own, known)
         lines.append(json.dumps(told, ensure_ascii=False) + "\n")
-    target.write_text("".join(lines), encoding="utf-8")
+    target.write_text("".join(lines), "utf-8")
 
 
 def codec_of(source: Any) -> str:  # noqa: ANN401 - a ParquetFile
@@ -196,7 +196,7 @@ def plain(statistics: Statistics, known: Iterable[str]) -> dict[str, list[Any]]:
 def write_json(path: Path, value: Any) -> None:  # noqa: ANN401 - what JSON holds
     """Write a description as LeRobot writes it."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(value, indent=4, ensure_ascii=False), encoding="utf-8")
+    path.write_text(json.dumps(value, indent=4, ensure_ascii=False), "utf-8")
 
 
 def kind_of(width: int) -> Any:  # noqa: ANN401 - a pyarrow type

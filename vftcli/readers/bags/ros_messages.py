@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vftcli.readers.bags.container import Bytes, Channel, type_name
+from vftcli.readers.opening import reason_of
 from vftcli.signals.errors import LogError, OutputError
 from vftcli.signals.parsing import tables_beside
 
@@ -51,8 +52,7 @@ def types_of(definition: str, name: str, *, idl: bool) -> Types:
     try:
         parsed = get_types_from_idl(definition) if idl else get_types_from_msg(definition, name)
     except (TypesysError, ValueError, KeyError, TypeError, RecursionError, AssertionError) as error:
-        reason = str(error).split("\n", maxsplit=1)[0][:60]
-        raise LayoutError(f"no message definition: {reason}") from None
+        raise LayoutError(f"no message definition: {reason_of(error)[:60]}") from None
     return {type_name(kind): fields_of(fields) for kind, (_, fields) in parsed.items()}
 
 
