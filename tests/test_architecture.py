@@ -268,13 +268,13 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 54_520,
-    "files": 263,
-    "functions": 2984,
+    "lines of Python": 52_203,
+    "files": 229,
+    "functions": 2827,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 384_457,
-    "characters a line that is not blank": 51.2,
-    "noqa": 94,
+    "names, operators, numbers": 372_112,
+    "characters a line that is not blank": 51.1,
+    "noqa": 92,
     "lines of TOML, JavaScript, CSS": 6545,
 }
 """The size of the package: whoever makes it smaller lowers these, nobody raises them."""

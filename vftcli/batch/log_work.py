@@ -24,7 +24,7 @@ from vftcli.pipeline import Analyser, AnalysisChoice, analyse, list_touches, pre
 from vftcli.readers.library import Library
 from vftcli.readers.references import refuse_estimates
 from vftcli.robots.run import Runs
-from vftcli.signals.arrays import Array
+from vftcli.signals.arrays import Array, root_mean_square
 from vftcli.signals.errors import LogError
 from vftcli.signals.parsing import check_known
 from vftcli.signals.wrench import AXES
@@ -218,4 +218,4 @@ def size_of(values: Array) -> tuple[float | None, float | None]:
     known = np.abs(values[np.isfinite(values)])
     if not len(known):
         return None, None
-    return float(np.sqrt(np.mean(known**2))), float(np.quantile(known, 0.99))
+    return root_mean_square(known), float(np.quantile(known, 0.99))

@@ -20,6 +20,7 @@ from vftcli.outputs.examination import health_record, rate_of
 from vftcli.outputs.files import OutputFolder, digest
 from vftcli.robots import PROFILES
 from vftcli.robots.robot import Robot
+from vftcli.signals.arrays import root_mean_squares
 from vftcli.signals.parsing import whole
 from vftcli.signals.recording import Recording
 from vftcli.signals.remarks import Remark, as_record
@@ -270,7 +271,7 @@ def refinement_record(analysis: Analysis) -> dict[str, Any] | None:
         },
         "error_budget_Nm": {budget.name: budget.parts for budget in found.budgets},
         "band_sd_Nm": {
-            e.name: np.sqrt(np.mean(e.error_sd**2, axis=0))
+            e.name: root_mean_squares(e.error_sd)
             for e in analysis.estimates
             if e.error_sd is not None
         },
@@ -295,8 +296,8 @@ def best_record(analysis: Analysis) -> dict[str, Any] | None:
         if corrected is None or not corrected.applied.any()
         else {
             "joints": [j + 1 for j in np.flatnonzero(corrected.applied)],
-            "rms_Nm": np.sqrt(np.mean(corrected.bias**2, axis=0)),
-            "sd_Nm": np.sqrt(np.mean(corrected.sd**2, axis=0)),
+            "rms_Nm": root_mean_squares(corrected.bias),
+            "sd_Nm": root_mean_squares(corrected.sd),
         },
     }
 

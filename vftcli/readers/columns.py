@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from vftcli.signals.arrays import Array, Mask
+from vftcli.signals.arrays import Array, Mask, root_mean_squares
 from vftcli.signals.errors import LogError
 from vftcli.signals.series import median_step
 
@@ -324,7 +324,7 @@ def _driven(
 ) -> Iterator[tuple[float, int, int, tuple[float, ...]]]:
     """Misfit of blocks as torque and current, friction beside it; both; constants [N·m/A]."""
     for torque, current in permutations(range(len(parts)), 2):
-        size = np.sqrt(np.mean(parts[current] ** 2, axis=0))
+        size = root_mean_squares(parts[current])
         if np.abs(parts[torque]).max() < CONSTANTS[0] * np.abs(parts[current]).max():
             continue
         live = np.flatnonzero(size > 2e-3 * size.max())
