@@ -268,11 +268,11 @@ def test_a_file_fits_a_few_screens() -> None:
 
 
 MOST = {
-    "lines of Python": 52_203,
+    "lines of Python": 52_206,
     "files": 229,
     "functions": 2827,
     "functions over 60 lines": 11,
-    "names, operators, numbers": 372_112,
+    "names, operators, numbers": 372_135,
     "characters a line that is not blank": 51.1,
     "noqa": 92,
     "lines of TOML, JavaScript, CSS": 6545,

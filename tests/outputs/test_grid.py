@@ -234,3 +234,9 @@ def test_a_table_without_room_breaks_its_headings_then_leaves_out_what_is_seldom
     assert "[m, rad]" in narrow
     assert max(map(len, narrow.splitlines())) <= 31
     assert least.splitlines()[-2:] == ["b         10.0", "No room for: work of all."]
+
+
+def test_a_table_without_rows_is_its_headings() -> None:
+    grid = Grid(columns=(Column("name", words=True), Column("", unit="")), rows=())
+    assert terminal(grid) == "name\n"
+    assert terminal(grid, width=3) == "name\n"

@@ -133,11 +133,12 @@ COLOUR, COMMAND = re.compile(r"\x1b\[[0-9;]*m"), "vftcli "
 
 
 def fitted(text: str, width: int) -> str:
-    """A text in lines of a width, but for commands, which are copied."""
+    """A text in lines of a width, but for commands and long paths, which are copied."""
     lines: list[str] = []
     for line in text.split("\n"):
         words = line.lstrip()
-        if len(COLOUR.sub("", line)) <= width or words.startswith(COMMAND):
+        is_short = len(COLOUR.sub("", line)) <= width
+        if is_short or words.startswith(COMMAND) or max(map(len, words.split())) > width:
             lines.append(line)
             continue
         indent = " " * (len(line) - len(words) + 2)

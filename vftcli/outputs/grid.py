@@ -155,16 +155,18 @@ def terminal(grid: Grid, letters: Callable[[str], str] = str, width: int | None 
 def table_lines(grid: Grid, letters: Callable[[str], str], *, broken: bool = False) -> list[str]:
     """Headings and rows as lines, a rule above the summaries; headings `broken` at blanks."""
     columns: list[list[str]] = []
-    for column, entries in zip(grid.columns, zip(*grid.cells, strict=True), strict=True):
+    cells = grid.cells
+    for k, column in enumerate(grid.columns):
         # Where numbers may bear a mark, those without one keep its place.
         room = " " * (grid.marked and not column.words)
+        entries = (row[k] for row in cells)
         texts = [letters(cell.text) + (cell.mark or room) for cell in entries]
         heads = [letters(column.heading)]
         if broken:
             # The unit is not broken: of its blanks textwrap knows nothing.
             unit = column.unit.replace(" ", "\N{NO-BREAK SPACE}")
             head = letters(column._replace(unit=unit).heading)
-            least = max(map(len, [*head.split(" "), *texts]))
+            least = max(1, *map(len, [*head.split(" "), *texts]))
             heads = [h.replace("\N{NO-BREAK SPACE}", " ") for h in textwrap.wrap(head, least)]
         columns.append([*(head + room for head in heads), *texts])
     heights = [len(texts) - len(grid.rows) for texts in columns]
