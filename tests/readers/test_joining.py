@@ -169,7 +169,7 @@ def test_what_the_last_tenth_says_counts(
         read_chosen(path, ReadChoice())
 
 
-def test_where_temporary_files_have_no_room_it_says_so(
+def test_where_temporary_files_have_no_room_a_table_stays_in_memory_and_a_bag_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full() -> None:
@@ -178,9 +178,9 @@ def test_where_temporary_files_have_no_room_it_says_so(
     path = tmp_path / "log.csv"
     table().write_csv(path)
     monkeypatch.setattr(importlib.import_module("vftcli.readers.table"), "TemporaryFile", full)
-    for log in (path, bare_mcap(tmp_path / "log.mcap")):
-        with pytest.raises(LogError, match=r"No space left on device.*TMPDIR=FOLDER"):
-            read_chosen(log, ReadChoice())
+    check_same(*both_ways(path))
+    with pytest.raises(LogError, match=r"No space left on device.*TMPDIR=FOLDER"):
+        read_chosen(bare_mcap(tmp_path / "log.mcap"), ReadChoice())
 
 
 def test_quoted_text_is_read_whole(tmp_path: Path) -> None:

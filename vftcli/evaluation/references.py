@@ -1,6 +1,6 @@
 """Reference torques, their sources, and estimates beside them: one table of errors."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
@@ -130,25 +130,46 @@ def load_of(
     return ReferenceLoad(torque=torque, wrench=wrench)
 
 
+def zero_reference(log: Run) -> ReferenceLoad:
+    """No contact at all: the reference of a free motion, of unknown error, with its contacts."""
+    zero, remarks = np.zeros(log.q.shape), (caution("reference-zero"), *touched_remarks(log))
+    return ReferenceLoad(torque=ExternalTorque(name="zero", t=log.t, tau=zero, remarks=remarks))
+
+
+def vendor_reference(recording: Recording) -> ReferenceLoad:
+    """The vendor's estimate in the log, torque on the robot, of unknown error."""
+    tau, remarks = recording.require("tau_ext"), (caution("reference-vendor"),)
+    torque = ExternalTorque(name="vendor", t=recording.t, tau=tau, remarks=remarks)
+    return ReferenceLoad(torque=torque)
+
+
+def sensor_reference(recording: Recording, robot: Robot, mounting: Mounting) -> ReferenceLoad:
+    """τ_ext = J_Fᵀ w of the wrench that the log holds."""
+    check_joints(recording, robot)
+    wrench = logged_wrench(recording, robot.chain, mounting)
+    return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
+
+
+#: One of `NAMES` of a choice → what makes it of a log, its free motion, and where tool and sensor
+#: sit.
+REFERENCES: dict[str, Callable[[FreeMotion, Mounting], ReferenceLoad]] = {
+    "zero": lambda motion, _: zero_reference(motion.log),
+    "vendor": lambda motion, _: vendor_reference(motion.log.recording),
+    "two-cycle": lambda motion, _: ReferenceLoad(torque=two_cycle_reference(motion)),
+    "sensor": lambda motion, mounting: sensor_reference(
+        motion.log.recording, motion.log.robot, mounting
+    ),
+}
+
+
 def make_reference(
     motion: FreeMotion, choice: ReferenceChoice, mounting: Mounting = NOTHING
 ) -> ReferenceLoad:
     """The reference that is asked for, on the clock of the log that is compared."""
-    log, recording, robot = motion.log, motion.log.recording, motion.log.robot
     if choice.path is not None:
-        return file_reference(choice.path, recording, robot, mounting, choice.columns)
-    if choice.name == "two-cycle":
-        return ReferenceLoad(torque=two_cycle_reference(motion))
-    if choice.name == "sensor":
-        check_joints(recording, robot)
-        wrench = logged_wrench(recording, robot.chain, mounting)
-        return load_of(wrench, recording, robot, "sensor", caution("reference-sensor"))
-    if choice.name == "vendor":
-        tau, remarks = recording.require("tau_ext"), [caution("reference-vendor")]
-    else:
-        tau, remarks = np.zeros(log.q.shape), [caution("reference-zero"), *touched_remarks(log)]
-    torque = ExternalTorque(name=choice.name, t=log.t, tau=tau, remarks=tuple(remarks))
-    return ReferenceLoad(torque=torque)
+        log = motion.log
+        return file_reference(choice.path, log.recording, log.robot, mounting, choice.columns)
+    return REFERENCES[choice.name](motion, mounting)
 
 
 def file_reference(

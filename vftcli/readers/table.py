@@ -268,16 +268,21 @@ def require_positions(table: Table, picks: Picks) -> Picks:
 HELD = 1 << 23
 
 
+class NoRoomError(LogError):
+    """The folder of temporary files has no room for a log."""
+
+
 class JoinedRows:
-    """The rows of a signal, part by part.
+    """The rows of a signal, part by part; beyond `held` bytes they wait in a file.
 
     Attributes:
         count: How many there are so far.
         shapes: The shapes of single rows.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, held: float | None = None) -> None:
         self.count, self.shapes = 0, set[tuple[int, ...]]()
+        self._most = HELD if held is None else held
         self._held: list[Column] = []
         self._size = 0
         self._file: Any = None
@@ -289,7 +294,7 @@ class JoinedRows:
         self._kind = rows.dtype
         self._held.append(rows)
         self._size += rows.nbytes
-        if self._size > HELD and self.count > len(rows):
+        if self._size > self._most and self.count > len(rows):
             self._write()
 
     def _write(self) -> None:
@@ -302,7 +307,7 @@ class JoinedRows:
                 release(rows)
             self._file.flush()
         except OSError as error:
-            raise LogError(
+            raise NoRoomError(
                 f"a long log has no room in the folder of temporary files ({error.strerror}). "
                 "Name another: TMPDIR=FOLDER"
             ) from None
@@ -317,12 +322,15 @@ class JoinedRows:
         return np.frombuffer(mapped, self._kind).reshape(-1, *min(self.shapes))
 
 
-def joined(parts: Iterable[Signals]) -> Signals:
-    """Signals that come part by part, each as one array; all parts have the same signals."""
+def joined(parts: Iterable[Signals], held: float | None = None) -> Signals:
+    """Signals that come part by part, each as one array; all parts have the same signals.
+
+    Beyond `held` bytes, by default `HELD`, a signal waits in a file.
+    """
     found: dict[str, JoinedRows] = {}
     for part in parts:
         for name, rows in part.items():
-            found.setdefault(name, JoinedRows()).add(rows)
+            found.setdefault(name, JoinedRows(held)).add(rows)
     if not found:
         raise LogError("the log has no rows; nothing was recorded into it")
     return {name: rows.whole() for name, rows in found.items()}

@@ -27,6 +27,7 @@ from vftcli.readers.table import (
     Blocks,
     Cells,
     Column,
+    NoRoomError,
     Notes,
     Pick,
     Picks,
@@ -249,12 +250,17 @@ def load_signals(
 
     def stacked() -> Iterator[Signals]:
         asked = sorted({*whole, *(cell.column for pick in signals for cell in pick.cells)})
+        for parts in whole.values():
+            parts.clear()
         for loaded in table.blocks(asked, clock[0].column if clock else None):
             for column, parts in whole.items():
                 parts.append(loaded[column])
             yield {pick.signal: _stacked(pick, loaded) for pick in signals}
 
-    arrays = joined(stacked())
+    try:
+        arrays = joined(stacked())
+    except NoRoomError:  # then it waits in memory
+        arrays = joined(stacked(), math.inf)
     loaded = {c: np.concatenate(parts) for c, parts in whole.items()}
     rows = len(next(iter(arrays.values())))
     stamps, tick, words = _stamps(table, picks, loaded, rows, clock_name)

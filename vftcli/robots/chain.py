@@ -245,6 +245,15 @@ class LinkPoses(NamedTuple):
     translation: Array  #: Origins. (T, n+1, 3) [m]
 
 
+def along(R: Array, vector: Array) -> Array:
+    """R v for R (3, 3, T) and v (3,), rounded alike whatever T is. (3, T)
+
+    A product of BLAS rounds by the length: a log in pieces would have other last digits.
+    """
+    x, y, z = vector
+    return np.asarray(x * R[:, 0] + y * R[:, 1] + z * R[:, 2])
+
+
 def link_poses(chain: Chain, q: Array) -> LinkPoses:
     """Poses of joints and flange in the base frame for q (T, n). [rad]"""
     check_kind(chain, Chain, "the chain", "robot.chain")
@@ -255,12 +264,12 @@ def link_poses(chain: Chain, q: Array) -> LinkPoses:
     R, o = np.broadcast_to(np.eye(3)[:, :, None], (3, 3, samples)), np.zeros((3, samples))
     cosine, sine = np.cos(q.T), np.sin(q.T)
     for j, (turn, offset) in enumerate(zip(chain.rotation, chain.translation, strict=True)):
-        o = o + offset @ R
-        x, y, z = np.moveaxis(turn.T @ R, 1, 0)
+        o = o + along(R, offset)
+        x, y, z = (along(R, column) for column in turn.T)
         R = np.stack([cosine[j] * x + sine[j] * y, cosine[j] * y - sine[j] * x, z], axis=1)
         rotation[j], translation[j] = R, o
-    translation[n] = o + chain.flange_translation @ R
-    rotation[n] = chain.flange_rotation.T @ R
+    translation[n] = o + along(R, chain.flange_translation)
+    rotation[n] = np.stack([along(R, column) for column in chain.flange_rotation.T], axis=1)
     return LinkPoses(rotation.transpose(3, 0, 1, 2), translation.transpose(2, 0, 1))
 
 
