@@ -20,6 +20,9 @@ settings.load_profile("steady")
 
 BEGUN, SHARED = pytest.StashKey[float](), pytest.StashKey[float]()
 
+DEAR = frozenset({"pushed", "worked_up"})
+"""Fixtures of the session that may take longer: whole reports, .8 s on a quiet machine."""
+
 LOADED_LATE = ("scipy.signal", "polars", "pinocchio", "rerun", "distributed", "matplotlib.figure")
 """What vftcli imports late, .3 to 1.6 s each: charged to no test, whatever the order."""
 
@@ -69,19 +72,32 @@ def pytest_runtest_setup(item: pytest.Item) -> Generator[None, object, object]:
 class SharedTime:
     """Charges what the session shares to no test: which needs it first depends on the worker.
 
-    A plugin, because fixtures of the session ask no conftest below the root.
+    What takes longer than the limit has to be one of `DEAR`, as a slow test has to be marked. A
+    plugin, because fixtures of the session ask no conftest below the root.
     """
 
     @pytest.hookimpl(wrapper=True)
     def pytest_fixture_setup(
         self, fixturedef: pytest.FixtureDef[object], request: pytest.FixtureRequest
     ) -> Generator[None, object, object]:
-        """Add up the time of the session's fixtures."""
+        """Add up the time of the session's fixtures; fail one that is dear and not named."""
         begun = cpu_time()
         result = yield
         if fixturedef.scope == "session":
-            request.config.stash[SHARED] += cpu_time() - begun
+            spent, name = cpu_time() - begun, fixturedef.argname
+            request.config.stash[SHARED] += spent
+            record(request.config, f"fixture {name}", spent)
+            limit = request.config.getoption("--cpu-limit")
+            if limit is not None and spent > limit and name not in DEAR:
+                pytest.fail(f"fixture {name}: {spent:.1f} s, over {limit:g} s: name it in DEAR")
         return result
+
+
+def record(config: pytest.Config, name: str, spent: float) -> None:
+    """Append a processor time [s] to the file that is asked for."""
+    if file := config.getoption("--cpu-record"):
+        with file.open("a", encoding="utf-8") as times:
+            times.write(f"{name}\t{spent:.2f}\n")
 
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
@@ -89,9 +105,7 @@ def pytest_runtest_call(item: pytest.Item) -> Generator[None, object, object]:
     """Record the time of a test that passed; fail it if it is over the limit."""
     result = yield
     spent = cpu_time() - item.config.stash[SHARED] - item.stash[BEGUN]
-    if file := item.config.getoption("--cpu-record"):
-        with file.open("a", encoding="utf-8") as times:
-            times.write(f"{item.nodeid}\t{spent:.2f}\n")
+    record(item.config, item.nodeid, spent)
     limit = item.config.getoption("--cpu-limit")
     if limit is not None and spent > limit and not item.get_closest_marker("slow"):
         pytest.fail(f"{spent:.1f} s of processor time, over {limit:g} s: mark it slow")

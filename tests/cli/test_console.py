@@ -46,6 +46,14 @@ class Terminal(io.StringIO):
         return True
 
 
+def test_lines_stay_lines_and_what_a_terminal_obeys_is_shown(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    with speaking(details=False, quiet=False):
+        say("one\x1b[2J\ntwo\rthree")
+    assert capsys.readouterr().err == "one\\x1b[2J\ntwo\\rthree\n"
+
+
 @pytest.mark.parametrize(
     ("variables", "colour"),
     [({}, True), ({"NO_COLOR": "1"}, False), ({"NO_COLOR": ""}, True), ({"TERM": "dumb"}, False)],

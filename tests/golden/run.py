@@ -191,21 +191,22 @@ def seen(commands: str) -> Leaves:
 def moves(old: Leaves, new: Leaves, rtol: float) -> list[str]:
     """A line for every place that is gone, new, or moved by more than `rtol` of its largest.
 
-    What moved by less than `ROUNDING` is where it was.
+    A column of a Parquet file that moved by less than `ROUNDING` is where it was.
     """
     lost = [f"{p}: gone" for p in old if p not in new] + [f"{p}: new" for p in new if p not in old]
-    both = {p: difference(old[p], new[p], rtol) for p in old if p in new}
+    least = {p: ROUNDING * (".parquet " in p) for p in old}
+    both = {p: difference(old[p], new[p], rtol, least[p]) for p in old if p in new}
     return lost + [f"{place}: {how}" for place, how in both.items() if how]
 
 
-def difference(old: list[Any], new: list[Any], rtol: float) -> str:
+def difference(old: list[Any], new: list[Any], rtol: float, least: float) -> str:
     """What moved between the values of one place, empty if nothing did; whole numbers are exact."""
     if len(old) != len(new):
         changed = list(difflib.unified_diff([*map(str, old)], [*map(str, new)], n=0))[2:]
         changed = [line for line in changed if line[:2] != "@@"]
         return f"{len(old)} → {len(new)} values: {' | '.join(changed[:6])}"
     largest = max((abs(x) for x in old if isinstance(x, float) and np.isfinite(x)), default=0)
-    room = max(rtol * largest, ROUNDING)
+    room = max(rtol * largest, least)
     bad = [
         f"{x} → {y}"
         for x, y in zip(old, new, strict=True)

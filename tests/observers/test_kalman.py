@@ -431,3 +431,51 @@ def test_the_filter_is_the_plain_loop(samples: int, scheme: str, q_tau: float) -
         # rounding over as many steps, of torques of 10
         np.testing.assert_allclose(found.tau[k], tau, rtol=1e-12, atol=1e-11)
     np.testing.assert_allclose(found.sd, np.sqrt(gains.posterior.p22), rtol=1e-12)
+
+
+@pytest.mark.parametrize("scheme", ["fe", "zoh"])
+def test_a_users_initial_covariance_is_followed_exactly(scheme: str, wandering: MakesTerms) -> None:
+    """Blocks run side by side give the plain loop's covariances, transient and all."""
+    start = np.array([[50.0] * 6, [3.0] * 6, [4e4] * 6])
+    observer, log = paper(scheme, initial_covariance=start), wandering(samples=800, jitter=0.3)
+    dt = log.dt[:, 0]
+    P = start.copy()
+    expected = []
+    for k in range(log.samples):
+        m = observer.model(dt[k], 6)
+        p11, p12, p22 = P
+        if k:
+            p11, p12, p22 = (
+                p11 + 2 * m.a12 * p12 + m.a12**2 * p22 + m.q11,
+                m.a22 * (p12 + m.a12 * p22) + m.q12,
+                m.a22**2 * p22 + m.q22,
+            )
+        s = p11 + m.r
+        P = np.array([p11 - p11**2 / s, p12 - p11 * p12 / s, p22 - p12**2 / s])
+        expected.append(np.sqrt(P[2]))
+    # P₂₂ − P₁₂²/s cancels four digits at the start, where P₂₂ is 4e4
+    np.testing.assert_allclose(observer.estimate(log).sd, expected, rtol=1e-9)
+
+
+def test_gains_are_found_for_a_covariance_that_forgets_slowly() -> None:
+    """A nearly constant disturbance: the blocks need many passes and still end at the loop's P."""
+    observer = KalmanObserver(q_tau_diag=1e-6, q_p_diag=1e-8, r_diag=0.5)
+    samples = 900
+    model = observer.model(np.full((samples, 1), STEP), 1)
+    start = Covariance(np.array([10.0]), np.array([0.0]), np.array([1e3]))
+    guess = observer.steady(STEP, 1).posterior
+    found = gain_sequence(model, start, guess).posterior.p22[-1, 0]
+    P, m = np.array([10.0, 0.0, 1e3]), observer.model(STEP, 1)
+    for k in range(samples):
+        p11, p12, p22 = P
+        if k:
+            p11, p12, p22 = (
+                p11 + 2 * STEP * p12 + STEP**2 * p22 + m.q11[0],
+                p12 + STEP * p22,
+                p22 + m.q22[0],
+            )
+        L = np.array([p11, p12]) / (p11 + m.r[0])
+        I_LC = np.array([[1 - L[0], 0], [-L[1], 1]])
+        full = I_LC @ np.array([[p11, p12], [p12, p22]]) @ I_LC.T + np.outer(L, L) * m.r[0]
+        P = np.array([full[0, 0], full[0, 1], full[1, 1]])
+    np.testing.assert_allclose(found, P[2], rtol=1e-9)

@@ -306,9 +306,10 @@ def test_seconds_count_in_round_steps() -> None:
 
 def test_numbers_stand_below_the_peaks_where_there_is_room() -> None:
     rows = [contact(number=1, peak=0.0), contact(number=2, peak=9.0), contact(number=3, peak=9.1)]
-    line = force_bars(*pushed((8.0, 10.0, 5.0)), rows, Canvas(width=69))[-1]
+    *bars, line = force_bars(*pushed((8.0, 10.0, 5.0)), rows, Canvas(width=69))
     assert line.split() == ["#", "1", "2"]  # the third would touch the second
-    assert line.index("2") - line.index("1") == 30
+    begins = next(bar.index("┤") for bar in bars if "┤" in bar) + 1
+    assert (line.index("1"), line.index("2")) == (begins, begins + 30)
 
 
 def test_the_forces_are_those_of_the_list(without_reference: Analysis) -> None:
